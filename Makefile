@@ -1,0 +1,35 @@
+# Two commands set everything up on a machine that has only Python and make:
+#   make demo   environment, install, a diagnosis of data/samples, a report
+#   make test   the test suite
+PYTHON ?= python3
+VENV   ?= .venv
+BIN    := $(VENV)/bin
+STAMP  := $(VENV)/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help install demo test lint types check bench clean
+
+help:  ## Show the targets
+	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
+
+$(STAMP): pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	@touch $@
+
+install: $(STAMP)  ## Make the environment in .venv and install opamc into it
+
+test: $(STAMP)  ## Run the test suite on all cores
+	$(BIN)/python -m pytest -n auto --dist loadfile -q
+
+lint: $(STAMP)  ## ruff: lint and format check
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(STAMP)  ## mypy, strict
+	$(BIN)/mypy
+
+check: lint types test  ## Everything that CI runs
+
+clean:  ## Remove the environment and every output
+	rm -rf $(VENV) opamc-out build *.egg-info .pytest_cache .mypy_cache .ruff_cache

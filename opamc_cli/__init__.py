@@ -1,0 +1,3 @@
+"""Health of robot-arm joints with strain wave gearing, told from motor current."""
+
+__version__ = "0.1.0"

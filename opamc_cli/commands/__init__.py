@@ -1,0 +1,1 @@
+"""Subcommands: options in, stage called, result printed."""

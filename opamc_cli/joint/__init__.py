@@ -1,0 +1,1 @@
+"""The model of a joint's motor current, and the loop that finds what it lacks."""

@@ -1,0 +1,1 @@
+"""The signal chain: from phase currents to ordinal counts."""

@@ -1,0 +1,1 @@
+"""Stages: tables in, tables out."""

@@ -1,0 +1,1 @@
+"""From ordinal counts to a decision: divergence, features, discriminant, p-values."""

@@ -1,0 +1,1 @@
+"""Files: the run format, stage tables, foreign formats."""

@@ -1,0 +1,1 @@
+"""The virtual robot: a six-axis arm with strain wave gears."""
