@@ -1,1 +1,13 @@
 """Subcommands: options in, stage called, result printed."""
+
+from collections.abc import Callable
+
+import typer
+
+from opamc_cli.commands import config
+
+COMMANDS: dict[str, Callable[..., None]] = {}
+"""Subcommands by name, in the order of the chain."""
+
+GROUPS: dict[str, typer.Typer] = {"config": config.app}
+"""Subcommands that have subcommands."""

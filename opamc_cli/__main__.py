@@ -1,0 +1,5 @@
+"""`python -m opamc_cli`."""
+
+from opamc_cli.app import main
+
+main()

@@ -1,0 +1,32 @@
+"""Options that every subcommand shares."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+ConfigFile = Annotated[
+    Path | None,
+    typer.Option("--config", metavar="FILE", help="YAML file with the options of the stages."),
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set", metavar="KEY=VALUE", help="Override one option, such as patterns.gamma=1."
+    ),
+]
+Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results are written.")]
+Jobs = Annotated[
+    int,
+    typer.Option("--jobs", min=0, help="Worker processes; 0: one per core. Results do not change."),
+]
+Json = Annotated[
+    bool,
+    typer.Option("--json", help="Machine-readable result on stdout, all else on stderr."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+ExitZero = Annotated[
+    bool, typer.Option("--exit-zero", help="Exit 0 where the verdict alone would make it 1.")
+]
+
+DEFAULT_OUT = Path("opamc-out")

@@ -1,0 +1,58 @@
+"""What a subcommand prints: results on stdout, notes on stderr."""
+
+import json
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from opamc_cli.errors import ExitCode
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results and notes go.
+
+    Attributes
+    ----------
+    as_json
+        Print the machine-readable result alone on stdout.
+    quiet
+        Print nothing but errors (and the JSON result, if asked for).
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+
+    def note(self, text: str) -> None:
+        """Print something worth knowing that is not the result."""
+        if not self.quiet:
+            print(text, file=sys.stderr)
+
+    def failure(self, text: str) -> None:
+        """Print why one of several runs could not be used."""
+        print(f"opamc: {text}", file=sys.stderr)
+
+    def result(self, values: Mapping[str, Any], *shown: "RenderableType") -> None:
+        """Print the result: `values` as JSON, or `shown` for people."""
+        if self.as_json:
+            print(json.dumps(values, indent=2, sort_keys=True, allow_nan=False))
+        elif not self.quiet:
+            from rich.console import Console
+
+            # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched
+            console = Console(width=None if sys.stdout.isatty() else 120)
+            for item in shown:
+                console.print(item)
+
+    def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
+        """Print the runs that failed and return the exit code that they make."""
+        for failure in failures:
+            self.failure(failure)
+        if failures and n_done:
+            self.note(f"{len(failures)} of {len(failures) + n_done} runs failed, the rest are done")
+            return ExitCode.PARTIAL
+        return ExitCode.BAD_INPUT if failures else ExitCode.DONE

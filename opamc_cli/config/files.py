@@ -1,0 +1,139 @@
+"""Configuration from YAML files and `--set key=value`, with errors that name the key."""
+
+import difflib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from opamc_cli.config.models import Config
+from opamc_cli.errors import ConfigError
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class _UniqueKeyLoader(yaml.SafeLoader):
+    """Safe loader that refuses a key given twice instead of keeping the last."""
+
+    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
+        seen = set()
+        for key_node, _ in node.value:
+            key = self.construct_object(key_node, deep=deep)
+            if key in seen:
+                msg = f"key {key!r} is given twice (line {key_node.start_mark.line + 1})"
+                raise yaml.YAMLError(msg)
+            seen.add(key)
+        return super().construct_mapping(node, deep)
+
+
+def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
+    """Return the configuration of a file, with `key=value` overrides applied.
+
+    Parameters
+    ----------
+    path
+        YAML file; None for the defaults.
+    overrides
+        Such as ``patterns.gamma=1``; values are YAML.
+
+    Raises
+    ------
+    ConfigError
+        If the file cannot be read, or a key or value is not allowed.
+    """
+    values = read_yaml(path) if path is not None else {}
+    for override in overrides:
+        key, separator, text = override.partition("=")
+        if not separator or not key:
+            msg = f"--set {override}: write it as key=value, such as patterns.gamma=1"
+            raise ConfigError(msg)
+        try:
+            value = yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            msg = f"--set {override}: the value is not YAML ({_flat(error)})"
+            raise ConfigError(msg) from error
+        _set(values, key.split("."), value, override)
+    return validate(Config, values, str(path) if path else "--set")
+
+
+def read_yaml(path: Path) -> dict[str, Any]:
+    """Read a YAML file that must hold a mapping.
+
+    Raises
+    ------
+    ConfigError
+        If it is missing, not YAML, has a key twice, or is no mapping.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        msg = f"{path}: cannot be read ({error.strerror}); check the path"
+        raise ConfigError(msg) from error
+    except UnicodeDecodeError as error:
+        msg = f"{path}: is not a text file in UTF-8 (byte {error.start}); save it as UTF-8"
+        raise ConfigError(msg) from error
+    try:
+        values = yaml.load(text, Loader=_UniqueKeyLoader)  # a SafeLoader
+    except yaml.YAMLError as error:
+        msg = f"{path}: is not valid YAML: {_flat(error)}"
+        raise ConfigError(msg) from error
+    if values is None:
+        return {}
+    if not isinstance(values, dict):
+        msg = f"{path}: holds a {type(values).__name__}, a mapping of keys is needed"
+        raise ConfigError(msg)
+    return values
+
+
+def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
+    """Return `values` as a `model`, or name the first key that is wrong.
+
+    Raises
+    ------
+    ConfigError
+        For an unknown key (with a suggestion) or a value out of bounds.
+    """
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = [str(part) for part in first["loc"]]
+        key = ".".join(place)
+        if first["type"] == "extra_forbidden":
+            known = _known_keys(model, first["loc"][:-1])
+            close = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.5)
+            hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+            msg = f"{source}: unknown key {key!r}; {hint}"
+        else:
+            value = first["input"]
+            msg = f"{source}: {key} is {value!r}; {_lower_first(first['msg'])}"
+        raise ConfigError(msg) from error
+
+
+def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    current: Any = model
+    for part in place:
+        field = getattr(current, "model_fields", {}).get(part)
+        if field is None:
+            return []
+        current = field.annotation
+    return sorted(getattr(current, "model_fields", {}))
+
+
+def _set(values: dict[str, Any], keys: list[str], value: Any, override: str) -> None:
+    for key in keys[:-1]:
+        values = values.setdefault(key, {})
+        if not isinstance(values, dict):
+            msg = f"--set {override}: {key!r} is not a section of the configuration"
+            raise ConfigError(msg)
+    values[keys[-1]] = value
+
+
+def _flat(error: Exception) -> str:
+    return " ".join(str(error).split())
+
+
+def _lower_first(text: str) -> str:
+    return text[:1].lower() + text[1:]

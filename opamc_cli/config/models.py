@@ -1,0 +1,126 @@
+"""Every option of every stage, with its default, its bounds and what it does.
+
+The descriptions are the documentation: `configs/default.yaml` is made from them.
+"""
+
+import hashlib
+import json
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class Section(BaseModel):
+    """Options of one stage; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class JointConfig(Section):
+    """Constants of the joints, where known."""
+
+    gear_ratio: Positive | None = Field(
+        None, description="Motor revolutions per joint revolution; null if unknown."
+    )
+    pole_pairs: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Pole pairs of the motor; null if unknown."
+    )
+
+
+class SegmentConfig(Section):
+    """Motion segmentation (thesis 3.2)."""
+
+    engine: Literal["band-limited", "ssqueezepy"] = Field(
+        "band-limited",
+        description="Wavelet transform: our streaming one, or the full one of ssqueezepy.",
+    )
+    gamma: Positive = Field(3.0, description="Symmetry of the generalised Morse wavelet.")
+    beta: Positive = Field(
+        20.0,
+        description="Compactness of the Morse wavelet: 20 is the thesis's time-bandwidth of 60; "
+        "ssqueezepy's own default is 60.",
+    )
+    voices_per_octave: Annotated[int, Field(ge=2, le=64)] = Field(
+        8, description="Scales per octave of the wavelet transform."
+    )
+
+
+class IdentifyConfig(Section):
+    """Identification of cycles and motions (thesis 3.3)."""
+
+    segments_per_cycle: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Motions in a cycle; null: found from the repetition in the reference."
+    )
+    min_similarity: Fraction = Field(
+        0.9, description="Least cosine similarity of variance vectors for a cycle to be one."
+    )
+    duration_tolerance: Positive = Field(
+        0.35,
+        description="Largest relative difference of a segment's duration from the reference's.",
+    )
+    f_max_tolerance: Positive = Field(
+        0.25, description="Largest relative difference of f_d,max from the reference's."
+    )
+    use_direction: bool = Field(
+        True, description="A segment that turns the other way than the reference's does not match."
+    )
+    max_lag_s: Positive = Field(
+        0.5, description="Largest lag that the synchronisation with the reference looks at."
+    )
+
+
+class PatternsConfig(Section):
+    """Ordinal pattern analysis of the envelope (thesis 4.2)."""
+
+    orders: tuple[Annotated[int, Field(ge=3, le=7)], ...] = Field(
+        (4, 5), min_length=1, description="Orders of the ordinal patterns, 3..7."
+    )
+    gamma: Positive = Field(
+        2.0, description="Periods of the fastest carrier that the pattern window spans (4-2)."
+    )
+    tau: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="Fixed time delay in samples; null: from (4-2) for each motion."
+    )
+    envelope: Literal["auto", "clarke", "hilbert", "reported"] = Field(
+        "auto",
+        description="Where the envelope comes from: Clarke vector of three phases, Hilbert "
+        "transform of the first phase, or the modulus of the reported current.",
+    )
+
+
+class ScoreConfig(Section):
+    """Divergence, features and decision (thesis 4.3)."""
+
+    base: Positive = Field(
+        2.0, gt=1, description="Base of the logarithm in the Jensen-Shannon divergence."
+    )
+
+
+class ReportConfig(Section):
+    """The report."""
+
+    title: str = Field("Joint health", description="Heading of the HTML report.")
+
+
+class Config(Section):
+    """All options of a diagnosis."""
+
+    joint: JointConfig = JointConfig()
+    segment: SegmentConfig = SegmentConfig()
+    identify: IdentifyConfig = IdentifyConfig()
+    patterns: PatternsConfig = PatternsConfig()
+    score: ScoreConfig = ScoreConfig()
+    report: ReportConfig = ReportConfig()
+
+    def canonical(self, *sections: str) -> dict[str, Any]:
+        """Return the values of some sections (all by default) as plain JSON types."""
+        values = self.model_dump(mode="json")
+        return {name: values[name] for name in sorted(sections or values)}
+
+    def digest(self, *sections: str) -> str:
+        """Return the SHA-256 of the canonical values of some sections (all by default)."""
+        text = json.dumps(self.canonical(*sections), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()

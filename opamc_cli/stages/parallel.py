@@ -1,0 +1,86 @@
+"""One worker process per run: the same results for any number of workers."""
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import Generic, TypeVar
+
+from opamc_cli.errors import OpamcError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[Result]):
+    """Results in the items' order, and one sentence for each item that could not be used."""
+
+    results: tuple[Result, ...]
+    errors: tuple[OpamcError, ...]
+
+
+def map_items(
+    function: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1
+) -> Outcome[Result]:
+    """Apply a function to every item, in worker processes if that is asked for.
+
+    A user's error (`OpamcError`) in one item does not stop the others. Workers are spawned, never
+    forked: threads of compiled libraries do not survive a fork. Each computes on one thread, so
+    that workers do not compete for the cores.
+
+    Parameters
+    ----------
+    function
+        Importable by name (workers are spawned).
+    items
+        What it is applied to.
+    jobs
+        Number of workers; 0: one per core; 1: this process.
+    """
+    workers = min(jobs or os.cpu_count() or 1, len(items))
+    if workers <= 1:
+        return _gather([_Immediate(function, item) for item in items])
+    saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    try:
+        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+            return _gather([pool.submit(function, item) for item in items])
+    finally:
+        for name, value in saved.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+class _Immediate(Generic[Item, Result]):
+    """A call that is made when its result is asked for."""
+
+    def __init__(self, function: Callable[[Item], Result], item: Item) -> None:
+        self._function = function
+        self._item = item
+
+    def result(self) -> Result:
+        return self._function(self._item)
+
+
+def _gather(
+    calls: Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]],
+) -> Outcome[Result]:
+    results: list[Result] = []
+    errors: list[OpamcError] = []
+    for call in calls:
+        try:
+            results.append(call.result())
+        except OpamcError as error:
+            errors.append(error)
+    return Outcome(tuple(results), tuple(errors))

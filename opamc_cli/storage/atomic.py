@@ -1,0 +1,81 @@
+"""Files that are either whole or not there."""
+
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from opamc_cli.errors import UsageError
+
+
+def ensure_directory(folder: Path) -> Path:
+    """Make an output folder with its parents.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be made or is a file.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        msg = f"{folder}: cannot make this output folder ({reason}); choose another with --out"
+        raise UsageError(msg) from error
+    return folder
+
+
+@contextmanager
+def atomic_path(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path` and rename it onto `path` on success.
+
+    The file is flushed to disk before the rename and the folder after it, so a kill or a power
+    cut leaves the old file or the new one, never half of one.
+
+    Raises
+    ------
+    UsageError
+        If the folder cannot be written or the disk is full.
+    """
+    path = Path(path)
+    ensure_directory(path.parent)
+    try:
+        handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
+    except OSError as error:
+        msg = f"{path}: cannot write here ({error.strerror}); choose another folder with --out"
+        raise UsageError(msg) from error
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        _flush(temporary)
+        # mkstemp makes files private; a report is for everybody the umask lets read it
+        temporary.chmod(0o666 & ~_umask())
+        temporary.replace(path)
+        _flush(path.parent)
+    except OSError as error:
+        msg = f"{path}: cannot be written ({error.strerror or error}); check space and permissions"
+        raise UsageError(msg) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file atomically (UTF-8)."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,437 @@
+"""The run format: one recording = one Parquet file, one row per sample.
+
+A run is opened lazily: its metadata and schema are read at once, its samples only by column and
+row group as they are asked for.
+"""
+
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.atomic import atomic_path
+
+METADATA_KEY = b"opamc"
+ROW_GROUP_SAMPLES = 1 << 18
+"""Samples per row group: 128 s at 2048 Hz, 19 MB for 18 float32 channels."""
+
+RATE_TOLERANCE = 1e-3
+"""Largest relative disagreement of `time_s` with the declared sampling rate."""
+
+_AXIS_COLUMN = re.compile(r"axis([1-9][0-9]*)_(a|b|c|current|position|velocity|temperature)")
+
+Array = npt.NDArray[Any]
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a run says of itself in the schema metadata key `opamc`.
+
+    Attributes
+    ----------
+    sampling_rate_hz
+        Samples per second; required, positive.
+    robot, program
+        Names; runs of different program or robot are not comparable.
+    speed_percent, payload_kg
+        Conditions of the recording.
+    started_at
+        ISO 8601, UTC.
+    source_sha256
+        Of the file that the run was made from.
+    """
+
+    sampling_rate_hz: float
+    robot: str | None = None
+    program: str | None = None
+    speed_percent: float | None = None
+    payload_kg: float | None = None
+    started_at: str | None = None
+    source_sha256: str | None = None
+
+    def to_json(self) -> str:
+        """Return canonical JSON without the unknown fields."""
+        known = {key: value for key, value in asdict(self).items() if value is not None}
+        return json.dumps(known, sort_keys=True)
+
+
+@dataclass(frozen=True)
+class AxisChannels:
+    """Names of the columns that a run holds for one axis; None or empty where absent."""
+
+    axis: int
+    phases: tuple[str, ...]
+    current: str | None
+    position: str | None
+    velocity: str | None
+    temperature: str | None
+
+
+class Run:
+    """A recording, opened lazily.
+
+    Parameters
+    ----------
+    path
+        The Parquet file.
+    name
+        How stage tables call it; the file's stem by default.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, not Parquet, damaged, or not a run.
+    """
+
+    def __init__(self, path: Path, name: str | None = None) -> None:
+        self.path = Path(path)
+        self.name = name or self.path.stem
+        self._file = _open_parquet(self.path)
+        schema = self._file.schema_arrow
+        self.info = _parse_info(self.path, schema.metadata)
+        self.n_samples: int = self._file.metadata.num_rows
+        self.columns: tuple[str, ...] = tuple(schema.names)
+        if self.n_samples == 0:
+            msg = f"{self.path}: the run has no samples (0 rows); record at least one cycle"
+            raise InputError(msg)
+        self._channels = _axis_channels(self.path, schema)
+
+    @property
+    def sampling_rate_hz(self) -> float:
+        """Samples per second."""
+        return self.info.sampling_rate_hz
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the recording in seconds."""
+        return self.n_samples / self.sampling_rate_hz
+
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Axes with a current, ascending, counted from 1."""
+        return tuple(self._channels)
+
+    def channels(self, axis: int) -> AxisChannels:
+        """Return the columns of one axis.
+
+        Raises
+        ------
+        InputError
+            If the run has no current for this axis.
+        """
+        if axis not in self._channels:
+            have = ", ".join(str(a) for a in self.axes)
+            msg = f"{self.path}: axis {axis} has no current column; the run has axes {have}"
+            raise InputError(msg)
+        return self._channels[axis]
+
+    @cached_property
+    def _row_group_starts(self) -> list[int]:
+        starts = [0]
+        for index in range(self._file.num_row_groups):
+            starts.append(starts[-1] + self._file.metadata.row_group(index).num_rows)
+        return starts
+
+    def read(
+        self, columns: Sequence[str], start: int = 0, stop: int | None = None
+    ) -> dict[str, Array]:
+        """Read samples start..stop (half-open) of some columns; nulls become NaN.
+
+        Only the row groups that hold these samples are touched.
+
+        Returns
+        -------
+        dict
+            One array of shape (stop - start,) per column, in the file's own float width.
+        """
+        stop = self.n_samples if stop is None else min(stop, self.n_samples)
+        start = max(start, 0)
+        starts = self._row_group_starts
+        groups = [g for g in range(len(starts) - 1) if starts[g] < stop and starts[g + 1] > start]
+        if not groups:
+            return {name: np.empty(0, dtype=np.float32) for name in columns}
+        table = self._read_groups(groups, columns)
+        table = table.slice(start - starts[groups[0]], stop - start)
+        return {name: _to_numpy(table.column(name)) for name in columns}
+
+    def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, Array]]]:
+        """Yield (start sample, samples by column), one row group at a time."""
+        starts = self._row_group_starts
+        for group in range(len(starts) - 1):
+            table = self._read_groups([group], columns)
+            yield starts[group], {name: _to_numpy(table.column(name)) for name in columns}
+
+    def _read_groups(self, groups: list[int], columns: Sequence[str]) -> pa.Table:
+        try:
+            return self._file.read_row_groups(groups, columns=list(columns), use_threads=False)
+        except (pa.ArrowException, OSError) as error:
+            msg = (
+                f"{self.path}: samples of {', '.join(columns)} cannot be read "
+                f"({_first_line(error)}); the file is damaged, copy it again from its source"
+            )
+            raise InputError(msg) from error
+
+    def check_time(self) -> None:
+        """Check that `time_s`, where it is there, agrees with the sampling rate.
+
+        Raises
+        ------
+        InputError
+            If it does not, or if it has gaps.
+        """
+        if "time_s" not in self.columns or self.n_samples < 2:
+            return
+        period = 1.0 / self.sampling_rate_hz
+        last: float | None = None
+        for start, block in self.blocks(["time_s"]):
+            time = np.asarray(block["time_s"], dtype=np.float64)
+            if last is not None:
+                time = np.concatenate(([last], time))
+                start -= 1
+            step = np.diff(time)
+            bad = np.flatnonzero(~(np.abs(step - period) <= 0.5 * period))
+            if bad.size:
+                at = start + int(bad[0])
+                msg = (
+                    f"{self.path}: column time_s steps by {step[bad[0]]:.6g} s at sample {at} "
+                    f"where the rate of {self.sampling_rate_hz:g} Hz needs {period:.6g} s; "
+                    "resample the recording with `opamc ingest`"
+                )
+                raise InputError(msg)
+            if step.size and abs(float(step.mean()) / period - 1.0) > RATE_TOLERANCE:
+                msg = (
+                    f"{self.path}: column time_s says {1 / step.mean():.6g} Hz, the metadata "
+                    f"{self.sampling_rate_hz:g} Hz; correct sampling_rate_hz or drop time_s"
+                )
+                raise InputError(msg)
+            last = float(time[-1])
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the file."""
+        return file_sha256(self.path)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        """Return the run itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self.close()
+
+
+def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
+    """List the runs named by files and folders, as (name, path), sorted, each once.
+
+    A folder stands for every `*.parquet` below it that is not a stage table. Names are the
+    paths below the folder without their ending; of files given one by one, their stems.
+
+    Raises
+    ------
+    InputError
+        If a path does not exist or a folder holds no run.
+    """
+    found: dict[Path, str] = {}
+    for path in paths:
+        if path.is_dir():
+            files = [f for f in sorted(path.rglob("*.parquet")) if _may_be_run(path, f)]
+            if not files:
+                msg = f"{path}: the folder holds no run (*.parquet); record or ingest one first"
+                raise InputError(msg)
+            for file in files:
+                found.setdefault(file, file.relative_to(path).with_suffix("").as_posix())
+        elif path.exists():
+            found.setdefault(path, path.stem)
+        else:
+            msg = f"{path}: no such file or folder; check the path"
+            raise InputError(msg)
+    runs = [(name, path) for path, name in found.items()]
+    names = [name for name, _ in runs]
+    if len(set(names)) < len(names):
+        # two folders with equal file names: the whole path tells them apart
+        runs = [(path.with_suffix("").as_posix(), path) for _, path in runs]
+    return sorted(runs)
+
+
+def _may_be_run(folder: Path, file: Path) -> bool:
+    relative = file.relative_to(folder)
+    if any(part.startswith(".") for part in relative.parts):
+        return False
+    try:
+        metadata = pq.read_schema(file).metadata or {}
+    except (pa.ArrowException, OSError):
+        return True  # opening it will say what is wrong with it
+    return b"opamc_table" not in metadata
+
+
+@contextmanager
+def write_run(path: Path, info: RunInfo, schema: pa.Schema) -> Iterator[pq.ParquetWriter]:
+    """Open a run for writing, block by block; it appears under its name when all is written.
+
+    Yields
+    ------
+    pyarrow.parquet.ParquetWriter
+        Call `write_table` with tables of the given schema. Blocks of `ROW_GROUP_SAMPLES` rows
+        keep row groups whole.
+    """
+    metadata = dict(schema.metadata or {})
+    metadata[METADATA_KEY] = info.to_json().encode()
+    floats = [f.name for f in schema if pa.types.is_floating(f.type)]
+    with (
+        atomic_path(path) as temporary,
+        pq.ParquetWriter(
+            temporary,
+            schema.with_metadata(metadata),
+            compression="zstd",
+            compression_level=1,
+            # float noise has no repeated values: a dictionary only costs, split bytes compress
+            use_dictionary=False,
+            use_byte_stream_split=floats,
+            write_page_checksum=True,
+        ) as writer,
+    ):
+        yield writer
+
+
+def save_run(path: Path, info: RunInfo, columns: Mapping[str, Array]) -> None:
+    """Write a run from arrays of equal length, each in its own float width.
+
+    Raises
+    ------
+    InputError
+        If the arrays differ in length.
+    """
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        msg = f"{path}: columns of different length {lengths}; a run has one row per sample"
+        raise InputError(msg)
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    with write_run(path, info, table.schema) as writer:
+        for start in range(0, table.num_rows, ROW_GROUP_SAMPLES):
+            writer.write_table(table.slice(start, ROW_GROUP_SAMPLES))
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of a file's content as hexadecimal digits."""
+    with path.open("rb") as handle:
+        return hashlib.file_digest(handle, "sha256").hexdigest()
+
+
+def _open_parquet(path: Path) -> pq.ParquetFile:
+    if not path.exists():
+        msg = f"{path}: no such file; check the path"
+        raise InputError(msg)
+    if path.is_dir():
+        msg = f"{path}: is a folder where a run file (*.parquet) is needed"
+        raise InputError(msg)
+    try:
+        return pq.ParquetFile(path, page_checksum_verification=True, memory_map=False)
+    except (pa.ArrowException, OSError) as error:
+        msg = (
+            f"{path}: cannot be opened as Parquet ({_first_line(error)}); "
+            "if it is another format, turn it into a run with `opamc ingest`"
+        )
+        raise InputError(msg) from error
+
+
+def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
+    raw = (metadata or {}).get(METADATA_KEY)
+    if raw is None:
+        what = "is a stage table" if b"opamc_table" in (metadata or {}) else "is not a run"
+        msg = (
+            f"{path}: {what}: its schema metadata has no key 'opamc' with sampling_rate_hz; "
+            "make a run of it with `opamc ingest`"
+        )
+        raise InputError(msg)
+    try:
+        values = json.loads(raw)
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        msg = f"{path}: metadata key 'opamc' is not JSON ({error}); write the run again"
+        raise InputError(msg) from error
+    if not isinstance(values, dict):
+        msg = f"{path}: metadata key 'opamc' holds {type(values).__name__}, not a JSON object"
+        raise InputError(msg)
+    rate = values.get("sampling_rate_hz")
+    if rate is None:
+        msg = f"{path}: no sampling_rate_hz in metadata key 'opamc'; add the samples per second"
+        raise InputError(msg)
+    if (
+        isinstance(rate, bool)
+        or not isinstance(rate, int | float)
+        or not (math.isfinite(rate) and rate > 0)
+    ):
+        msg = f"{path}: sampling_rate_hz is {rate!r}; it must be a positive number of Hz"
+        raise InputError(msg)
+    known = {f.name for f in fields(RunInfo)}
+    kept = {key: value for key, value in values.items() if key in known}
+    for key in ("speed_percent", "payload_kg"):
+        if kept.get(key) is not None and not isinstance(kept[key], int | float):
+            msg = f"{path}: {key} is {kept[key]!r} in metadata key 'opamc'; it must be a number"
+            raise InputError(msg)
+    kept["sampling_rate_hz"] = float(rate)
+    return RunInfo(**kept)
+
+
+def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
+    by_axis: dict[int, set[str]] = {}
+    for field in schema:
+        match = _AXIS_COLUMN.fullmatch(field.name)
+        if match is None and field.name != "time_s":
+            continue
+        if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
+            msg = f"{path}: column {field.name} has type {field.type}; it must hold numbers"
+            raise InputError(msg)
+        if match is not None:
+            by_axis.setdefault(int(match[1]), set()).add(match[2])
+    channels = {}
+    for axis in sorted(by_axis):
+        have = by_axis[axis]
+        phases = tuple(f"axis{axis}_{p}" for p in "abc" if p in have)
+        if not phases and "current" not in have:
+            continue
+
+        def column(kind: str, axis: int = axis, have: set[str] = have) -> str | None:
+            return f"axis{axis}_{kind}" if kind in have else None
+
+        channels[axis] = AxisChannels(
+            axis=axis,
+            phases=phases,
+            current=column("current"),
+            position=column("position"),
+            velocity=column("velocity"),
+            temperature=column("temperature"),
+        )
+    if not channels:
+        names = ", ".join(schema.names[:8])
+        msg = (
+            f"{path}: no current column among [{names}]; a run needs axis1_a (axis1_b, axis1_c) "
+            "or axis1_current, counted from axis 1; rename with `opamc ingest --map`"
+        )
+        raise InputError(msg)
+    return channels
+
+
+def _to_numpy(column: pa.ChunkedArray) -> Array:
+    if pa.types.is_integer(column.type):
+        column = column.cast(pa.float64())
+    return np.asarray(column.to_numpy())
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else "no reason"
