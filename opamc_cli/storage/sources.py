@@ -1,0 +1,155 @@
+"""Which runs a stage table was made from, and how a later stage finds their samples again."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.runs import Run, RunInfo
+from opamc_cli.storage.tables import table_record
+
+COMPARED = ("sampling_rate_hz", "robot", "program", "speed_percent", "payload_kg")
+"""What must agree between recordings before their patterns can be compared."""
+
+
+@dataclass(frozen=True)
+class RunSource:
+    """A run as a stage table remembers it.
+
+    Attributes
+    ----------
+    name
+        How the table's rows call it.
+    path
+        Where its file was.
+    sha256
+        Of the file.
+    n_samples
+        Its length.
+    info
+        Its metadata.
+    """
+
+    name: str
+    path: Path
+    sha256: str
+    n_samples: int
+    info: RunInfo
+
+    @classmethod
+    def of(cls, run: Run) -> "RunSource":
+        """Describe an open run (reads the whole file once, for its hash)."""
+        return cls(run.name, run.path, run.sha256, run.n_samples, run.info)
+
+    def open(self) -> Run:
+        """Open the run again.
+
+        Raises
+        ------
+        InputError
+            If it is gone, or is no longer the file that the table was made from.
+        """
+        if not self.path.exists():
+            msg = (
+                f"{self.path}: run {self.name!r} is no longer there; put it back or name its "
+                "folder with --runs"
+            )
+            raise InputError(msg)
+        run = Run(self.path, self.name)
+        if run.n_samples != self.n_samples or run.sha256 != self.sha256:
+            run.close()
+            msg = (
+                f"{self.path}: run {self.name!r} has changed since its segments were found; "
+                "run `opamc segment` again"
+            )
+            raise InputError(msg)
+        return run
+
+
+def sources_record(sources: Sequence[RunSource], folder: Path) -> dict[str, Any]:
+    """Return the JSON that keeps `sources` in the metadata of a table in `folder`."""
+    root = folder.resolve()
+    return {
+        "runs": [
+            {
+                "name": source.name,
+                "path": Path(os.path.relpath(source.path.resolve(), root)).as_posix(),
+                "sha256": source.sha256,
+                "n_samples": source.n_samples,
+                "info": asdict(source.info),
+            }
+            for source in sources
+        ]
+    }
+
+
+def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource, ...]:
+    """Return the runs that the stage table at `table` was made from.
+
+    Parameters
+    ----------
+    table
+        A stage table.
+    moved_to
+        Folders where the runs are now, if they are no longer where they were; each run is
+        looked for there by its name or file name.
+
+    Raises
+    ------
+    InputError
+        If the table names no runs.
+    """
+    try:
+        metadata = pq.read_schema(table).metadata
+    except (pa.ArrowException, OSError) as error:
+        msg = f"{table}: cannot be read as Parquet; run the stage before this one"
+        raise InputError(msg) from error
+    record = table_record(table, metadata)
+    if "runs" not in record:
+        msg = f"{table}: does not say which runs it was made from; make it again"
+        raise InputError(msg)
+    return tuple(
+        RunSource(
+            name=entry["name"],
+            path=_locate(table.parent / entry["path"], entry["name"], moved_to),
+            sha256=entry["sha256"],
+            n_samples=entry["n_samples"],
+            info=RunInfo(**entry["info"]),
+        )
+        for entry in record["runs"]
+    )
+
+
+def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> None:
+    """Check that runs were recorded under the same conditions.
+
+    Raises
+    ------
+    InputError
+        If rate, robot, program, speed or payload differ where both are known.
+    """
+    runs = [*baseline, *target]
+    for key in COMPARED:
+        known = [(run, getattr(run.info, key)) for run in runs]
+        known = [(run, value) for run, value in known if value is not None]
+        for run, value in known[1:]:
+            first, expected = known[0]
+            if value != expected:
+                msg = (
+                    f"{run.path}: {key} is {value!r} where {first.path} has {expected!r}; "
+                    "a baseline and a target must be recorded under the same conditions"
+                )
+                raise InputError(msg)
+
+
+def _locate(path: Path, name: str, moved_to: Sequence[Path]) -> Path:
+    for folder in moved_to:
+        for candidate in (folder / f"{name}.parquet", folder / path.name):
+            if candidate.exists():
+                return candidate
+    return Path(os.path.normpath(path))
