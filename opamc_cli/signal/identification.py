@@ -1,0 +1,270 @@
+"""Identification of cycles and motions by the similarity of variance vectors."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+UNIDENTIFIED = -1
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SegmentFeatures:
+    """What identification knows of a series of segments, in time order; each of shape (n,).
+
+    Attributes
+    ----------
+    variance
+        Variance of the current, A², > 0.
+    duration_s
+        Length, s.
+    f_max_hz
+        Largest fundamental frequency reached, Hz.
+    direction
+        -1, 0 (unknown) or 1.
+    pause_s
+        Standstill before the segment, s; NaN where the recording starts too late to know.
+    """
+
+    variance: Floats
+    duration_s: Floats
+    f_max_hz: Floats
+    direction: Ints
+    pause_s: Floats
+
+    def __len__(self) -> int:
+        """Return the number of segments."""
+        return len(self.variance)
+
+    def part(self, start: int, stop: int) -> "SegmentFeatures":
+        """Return the segments start..stop (half-open)."""
+        return SegmentFeatures(
+            self.variance[start:stop],
+            self.duration_s[start:stop],
+            self.f_max_hz[start:stop],
+            self.direction[start:stop],
+            self.pause_s[start:stop],
+        )
+
+
+@dataclass(frozen=True)
+class MatchRule:
+    """When a series of segments is the reference cycle once more.
+
+    Attributes
+    ----------
+    min_similarity
+        Least cosine similarity of the variance vectors, 0..1.
+    duration_tolerance, f_max_tolerance
+        Largest relative difference of each segment from its reference.
+    use_direction
+        Whether known directions must agree.
+    """
+
+    min_similarity: float = 0.9
+    duration_tolerance: float = 0.35
+    f_max_tolerance: float = 0.25
+    use_direction: bool = True
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Cycle, motion and similarity of each segment; -1, -1 and its best similarity where none.
+
+    Attributes
+    ----------
+    cycle, motion
+        Shape (n,); counted from 0, -1 where unidentified.
+    similarity
+        Shape (n,); cosine similarity of the cycle that the segment belongs to, or the largest
+        among the windows that hold an unidentified one.
+    """
+
+    cycle: Ints
+    motion: Ints
+    similarity: Floats
+
+
+def sliding_similarity(reference_variance: Floats, variance: Floats) -> Floats:
+    """Cosine similarity of the reference's variance vector with every window of segments.
+
+    Parameters
+    ----------
+    reference_variance
+        Shape (n,), A².
+    variance
+        Shape (m,), A², in time order.
+
+    Returns
+    -------
+    array
+        Shape (max(0, m - n + 1),), 0..1; entry k compares with segments k..k+n.
+
+    Notes
+    -----
+    Equation (3-2) of the thesis, whose variance lacks the square.
+    """
+    n = len(reference_variance)
+    if len(variance) < n or n == 0:
+        return np.empty(0)
+    windows = np.lib.stride_tricks.sliding_window_view(variance, n)
+    norms = np.linalg.norm(windows, axis=1) * np.linalg.norm(reference_variance)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        similarity = windows @ reference_variance / norms
+    return np.clip(np.where(norms > 0, similarity, 0.0), 0.0, 1.0)
+
+
+def identify(
+    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
+) -> Identification:
+    """Find the reference cycle in a series of segments.
+
+    Variances are positive, so two cycles of alike motions are similar at every shift. A window
+    is therefore a cycle only if each of its segments also agrees with its reference in
+    duration, f_d,max and direction. Of the windows that pass, the most that do not overlap are
+    taken, and among equally many those of the largest similarity. What fits nothing stays
+    unidentified.
+
+    Parameters
+    ----------
+    reference
+        One cycle.
+    segments
+        The series to identify.
+    rule
+        When a window is a cycle.
+
+    Returns
+    -------
+    Identification
+        Cycle, motion and similarity by segment.
+    """
+    n, m = len(reference), len(segments)
+    cycle = np.full(m, UNIDENTIFIED, dtype=np.int64)
+    motion = np.full(m, UNIDENTIFIED, dtype=np.int64)
+    best_similarity = np.zeros(m)
+    similarity = sliding_similarity(reference.variance, segments.variance)
+    for k, value in enumerate(similarity):
+        best_similarity[k : k + n] = np.maximum(best_similarity[k : k + n], value)
+    fits = np.array(
+        [
+            value >= rule.min_similarity and _agree(reference, segments.part(k, k + n), rule)
+            for k, value in enumerate(similarity)
+        ],
+        dtype=bool,
+    )
+    for index, k in enumerate(_most_windows(fits, similarity, n)):
+        cycle[k : k + n] = index
+        motion[k : k + n] = np.arange(n)
+        best_similarity[k : k + n] = similarity[k]
+    return Identification(cycle, motion, best_similarity)
+
+
+def find_reference(
+    segments: SegmentFeatures, rule: MatchRule, segments_per_cycle: int | None = None
+) -> tuple[int, int]:
+    """Find a reference cycle in a series of segments by its own repetition.
+
+    Parameters
+    ----------
+    segments
+        In time order, at least one.
+    rule
+        As for `identify`.
+    segments_per_cycle
+        Motions in a cycle, where known.
+
+    Returns
+    -------
+    tuple of int
+        Half-open interval (start, stop) of segments: the first full cycle.
+    """
+    n = segments_per_cycle or period(segments)
+    n = min(n, len(segments))
+    starts = range(len(segments) - n + 1)[: max(n, 1)]
+    # the first of the shifts that yield the most cycles; of equal ones, the one after the
+    # longest pause: a program waits between its cycles, if anywhere
+    counts = [
+        int(identify(segments.part(s, s + n), segments, rule).cycle.max(initial=-1)) for s in starts
+    ]
+    most = [s for s, count in zip(starts, counts, strict=True) if count == max(counts)]
+    pauses = [_median_pause(segments.pause_s[s::n]) for s in most]
+    start = most[int(np.argmax(pauses))] if _clearly_longer(pauses) else most[0]
+    return start, start + n
+
+
+def period(segments: SegmentFeatures) -> int:
+    """Return the smallest number of segments after which the series repeats itself.
+
+    For every shift the squared differences of log variance, log duration, log f_d,max and
+    direction are summed, each in units of its own spread over the series, and their median
+    taken, so that a few missing or extra segments do not matter. The smallest shift wins whose
+    median is within a factor of the best one's. Differences below 2 % count as none.
+    """
+    m = len(segments)
+    if m < 2:
+        return max(m, 1)
+    columns = []
+    for values in (segments.variance, segments.duration_s, segments.f_max_hz):
+        logs = np.log(np.maximum(values, 1e-12))
+        columns.append(logs / max(float(logs.std()), 0.02))
+    turning = segments.direction.astype(np.float64)
+    columns.append(2.0 * turning)
+    features = np.column_stack(columns)
+    shifts = np.arange(1, m // 2 + 1)
+    distance = np.array(
+        [np.median(((features[k:] - features[:-k]) ** 2).sum(axis=1)) for k in shifts]
+    )
+    good = distance <= max(4.0 * float(distance.min()), 0.5)
+    return int(shifts[np.argmax(good)])
+
+
+def _median_pause(pauses: Floats) -> float:
+    known = pauses[np.isfinite(pauses)]
+    return float(np.median(known)) if known.size else 0.0
+
+
+def _clearly_longer(pauses: list[float]) -> bool:
+    # dwell times jitter: a longest pause that is only a little longer says nothing
+    ordered = sorted(pauses, reverse=True)
+    return len(ordered) > 1 and ordered[0] > 1.5 * ordered[1]
+
+
+def _agree(reference: SegmentFeatures, window: SegmentFeatures, rule: MatchRule) -> bool:
+    near = [
+        np.abs(have - want) <= tolerance * want
+        for have, want, tolerance in (
+            (window.duration_s, reference.duration_s, rule.duration_tolerance),
+            (window.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
+        )
+    ]
+    if rule.use_direction:
+        near.append(window.direction * reference.direction >= 0)
+    return bool(np.all(near))
+
+
+def _most_windows(fits: npt.NDArray[np.bool_], similarity: Floats, n: int) -> list[int]:
+    """Choose windows that do not overlap: the most of them, then the most similar."""
+    m = len(fits)
+    # best[k]: (count, total similarity, first chosen window or -1) for windows k and later
+    best: list[tuple[int, float]] = [(0, 0.0)] * (m + n + 1)
+    take = [False] * m
+    for k in range(m - 1, -1, -1):
+        best[k] = best[k + 1]
+        if fits[k]:
+            after = best[min(k + n, m)]
+            with_k = (after[0] + 1, after[1] + float(similarity[k]))
+            # at equal worth the earlier window: cycles count from the recording's start
+            if with_k >= (best[k + 1][0], best[k + 1][1] - 1e-12):
+                best[k], take[k] = with_k, True
+    chosen, k = [], 0
+    while k < m:
+        if take[k]:
+            chosen.append(k)
+            k += n
+        else:
+            k += 1
+    return chosen
