@@ -4,9 +4,12 @@ from collections.abc import Callable
 
 import typer
 
-from opamc_cli.commands import config
+from opamc_cli.commands import config, identify, patterns
 
-COMMANDS: dict[str, Callable[..., None]] = {}
+COMMANDS: dict[str, Callable[..., None]] = {
+    "identify": identify.identify,
+    "patterns": patterns.patterns,
+}
 """Subcommands by name, in the order of the chain."""
 
 GROUPS: dict[str, typer.Typer] = {"config": config.app}

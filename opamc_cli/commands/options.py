@@ -28,5 +28,9 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors."
 ExitZero = Annotated[
     bool, typer.Option("--exit-zero", help="Exit 0 where the verdict alone would make it 1.")
 ]
+MovedRuns = Annotated[
+    list[Path] | None,
+    typer.Option("--runs", metavar="DIR", help="Where the runs are now, if they were moved."),
+]
 
 DEFAULT_OUT = Path("opamc-out")

@@ -5,6 +5,7 @@ The descriptions are the documentation: `configs/default.yaml` is made from them
 
 import hashlib
 import json
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -120,7 +121,12 @@ class Config(Section):
         values = self.model_dump(mode="json")
         return {name: values[name] for name in sorted(sections or values)}
 
-    def digest(self, *sections: str) -> str:
-        """Return the SHA-256 of the canonical values of some sections (all by default)."""
-        text = json.dumps(self.canonical(*sections), sort_keys=True, separators=(",", ":"))
-        return hashlib.sha256(text.encode()).hexdigest()
+    def digest(self) -> str:
+        """Return the SHA-256 of all canonical values."""
+        return digest(self.canonical())
+
+
+def digest(values: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of configuration values of plain JSON types, whatever their order."""
+    text = json.dumps(values, sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

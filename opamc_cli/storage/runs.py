@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Self
 
@@ -26,6 +26,9 @@ from opamc_cli.storage.atomic import atomic_path
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
 """Samples per row group: 128 s at 2048 Hz, 19 MB for 18 float32 channels."""
+
+RECENT_GROUPS = 2
+"""Row groups kept after reading: a segment may span a boundary."""
 
 RATE_TOLERANCE = 1e-3
 """Largest relative disagreement of `time_s` with the declared sampling rate."""
@@ -107,6 +110,7 @@ class Run:
             msg = f"{self.path}: the run has no samples (0 rows); record at least one cycle"
             raise InputError(msg)
         self._channels = _axis_channels(self.path, schema)
+        self._recent: dict[tuple[int, str], Array] = {}
 
     @property
     def sampling_rate_hz(self) -> float:
@@ -162,26 +166,58 @@ class Run:
         groups = [g for g in range(len(starts) - 1) if starts[g] < stop and starts[g + 1] > start]
         if not groups:
             return {name: np.empty(0, dtype=np.float32) for name in columns}
-        table = self._read_groups(groups, columns)
-        table = table.slice(start - starts[groups[0]], stop - start)
-        return {name: _to_numpy(table.column(name)) for name in columns}
+        pieces = [self._group(group, columns) for group in groups]
+        cut = slice(start - starts[groups[0]], stop - starts[groups[0]])
+        return {name: _join([piece[name] for piece in pieces])[cut] for name in columns}
 
     def blocks(self, columns: Sequence[str]) -> Iterator[tuple[int, dict[str, Array]]]:
-        """Yield (start sample, samples by column), one row group at a time."""
-        starts = self._row_group_starts
-        for group in range(len(starts) - 1):
-            table = self._read_groups([group], columns)
-            yield starts[group], {name: _to_numpy(table.column(name)) for name in columns}
+        """Yield (start sample, samples by column) in blocks of at most `ROW_GROUP_SAMPLES`.
+
+        Raises
+        ------
+        InputError
+            If the file is damaged.
+        """
+        start = 0
+        batches = self._file.iter_batches(ROW_GROUP_SAMPLES, columns=list(columns))
+        while True:
+            try:
+                batch = next(batches, None)
+            except (pa.ArrowException, OSError) as error:
+                raise self._damaged(columns, error) from error
+            if batch is None:
+                return
+            yield start, {name: _to_numpy(batch.column(name)) for name in columns}
+            start += batch.num_rows
+
+    def _group(self, group: int, columns: Sequence[str]) -> dict[str, Array]:
+        """Read one row group, or take it from the last ones read.
+
+        Segments are read one after the other and many lie in the same row group: each group is
+        decoded once instead of once per segment.
+        """
+        missing = [name for name in columns if (group, name) not in self._recent]
+        if missing:
+            table = self._read_groups([group], missing)
+            for name in missing:
+                self._recent[group, name] = _to_numpy(table.column(name))
+        found = {name: self._recent[group, name] for name in columns}
+        kept = max(RECENT_GROUPS * len(columns), len(columns))
+        while len(self._recent) > kept:
+            self._recent.pop(next(iter(self._recent)))
+        return found
 
     def _read_groups(self, groups: list[int], columns: Sequence[str]) -> pa.Table:
         try:
             return self._file.read_row_groups(groups, columns=list(columns), use_threads=False)
         except (pa.ArrowException, OSError) as error:
-            msg = (
-                f"{self.path}: samples of {', '.join(columns)} cannot be read "
-                f"({_first_line(error)}); the file is damaged, copy it again from its source"
-            )
-            raise InputError(msg) from error
+            raise self._damaged(columns, error) from error
+
+    def _damaged(self, columns: Sequence[str], error: Exception) -> InputError:
+        return InputError(
+            f"{self.path}: samples of {', '.join(columns)} cannot be read "
+            f"({_first_line(error)}); the file is damaged, copy it again from its source"
+        )
 
     def check_time(self) -> None:
         """Check that `time_s`, where it is there, agrees with the sampling rate.
@@ -329,6 +365,14 @@ def save_run(path: Path, info: RunInfo, columns: Mapping[str, Array]) -> None:
 
 def file_sha256(path: Path) -> str:
     """Return the SHA-256 of a file's content as hexadecimal digits."""
+    state = path.stat()
+    return _sha256(path.resolve(), state.st_mtime_ns, state.st_size)
+
+
+@lru_cache(maxsize=4096)
+def _sha256(path: Path, modified_ns: int, size: int) -> str:
+    # a diagnosis names the same gigabytes in three tables: they are hashed once
+    del modified_ns, size
     with path.open("rb") as handle:
         return hashlib.file_digest(handle, "sha256").hexdigest()
 
@@ -427,10 +471,16 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     return channels
 
 
-def _to_numpy(column: pa.ChunkedArray) -> Array:
+def _to_numpy(column: pa.ChunkedArray | pa.Array) -> Array:
     if pa.types.is_integer(column.type):
         column = column.cast(pa.float64())
+    if isinstance(column, pa.Array):
+        return np.asarray(column.to_numpy(zero_copy_only=False))
     return np.asarray(column.to_numpy())
+
+
+def _join(pieces: list[Array]) -> Array:
+    return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
 
 
 def _first_line(error: Exception) -> str:

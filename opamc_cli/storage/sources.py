@@ -13,8 +13,11 @@ from opamc_cli.errors import InputError
 from opamc_cli.storage.runs import Run, RunInfo
 from opamc_cli.storage.tables import table_record
 
-COMPARED = ("sampling_rate_hz", "robot", "program", "speed_percent", "payload_kg")
+REQUIRED_EQUAL = ("sampling_rate_hz", "program")
 """What must agree between recordings before their patterns can be compared."""
+
+WORTH_NOTING = ("robot", "speed_percent", "payload_kg")
+"""What may differ, since it may be the very thing that is looked for, but has to be said."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +50,12 @@ class RunSource:
         return cls(run.name, run.path, run.sha256, run.n_samples, run.info)
 
     def open(self) -> Run:
-        """Open the run again.
+        """Open the run again, without a look at its content; see `verify`.
 
         Raises
         ------
         InputError
-            If it is gone, or is no longer the file that the table was made from.
+            If it is gone.
         """
         if not self.path.exists():
             msg = (
@@ -60,15 +63,24 @@ class RunSource:
                 "folder with --runs"
             )
             raise InputError(msg)
-        run = Run(self.path, self.name)
-        if run.n_samples != self.n_samples or run.sha256 != self.sha256:
-            run.close()
-            msg = (
-                f"{self.path}: run {self.name!r} has changed since its segments were found; "
-                "run `opamc segment` again"
-            )
-            raise InputError(msg)
-        return run
+        return Run(self.path, self.name)
+
+    def verify(self) -> None:
+        """Check that the run is still the file that the table was made from.
+
+        Raises
+        ------
+        InputError
+            If it is gone or has changed.
+        """
+        with self.open() as run:
+            if run.n_samples == self.n_samples and run.sha256 == self.sha256:
+                return
+        msg = (
+            f"{self.path}: run {self.name!r} has changed since its segments were found; "
+            "run `opamc segment` again"
+        )
+        raise InputError(msg)
 
 
 def sources_record(sources: Sequence[RunSource], folder: Path) -> dict[str, Any]:
@@ -125,26 +137,47 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
     )
 
 
-def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> None:
-    """Check that runs were recorded under the same conditions.
+def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> tuple[str, ...]:
+    """Check that runs can be compared, and say which of their conditions differ.
+
+    Returns
+    -------
+    tuple of str
+        One sentence for each condition that differs but does not forbid the comparison.
 
     Raises
     ------
     InputError
-        If rate, robot, program, speed or payload differ where both are known.
+        If rate or program differ where both are known.
     """
     runs = [*baseline, *target]
-    for key in COMPARED:
-        known = [(run, getattr(run.info, key)) for run in runs]
-        known = [(run, value) for run, value in known if value is not None]
-        for run, value in known[1:]:
-            first, expected = known[0]
-            if value != expected:
-                msg = (
-                    f"{run.path}: {key} is {value!r} where {first.path} has {expected!r}; "
-                    "a baseline and a target must be recorded under the same conditions"
-                )
-                raise InputError(msg)
+    for key in REQUIRED_EQUAL:
+        difference = _first_difference(runs, key)
+        if difference is not None:
+            (first, expected), (other, value) = difference
+            msg = (
+                f"{other.path}: {key} is {value!r} where {first.path} has {expected!r}; "
+                "a baseline and a target must be recorded at the same rate with the same program"
+            )
+            raise InputError(msg)
+    notes = []
+    for key in WORTH_NOTING:
+        difference = _first_difference(runs, key)
+        if difference is not None:
+            (first, expected), (other, value) = difference
+            notes.append(f"{key} differs: {first.name} has {expected!r}, {other.name} {value!r}")
+    return tuple(notes)
+
+
+def _first_difference(
+    runs: Sequence[RunSource], key: str
+) -> tuple[tuple[RunSource, object], tuple[RunSource, object]] | None:
+    known = [(run, getattr(run.info, key)) for run in runs]
+    known = [(run, value) for run, value in known if value is not None]
+    for other in known[1:]:
+        if other[1] != known[0][1]:
+            return known[0], other
+    return None
 
 
 def _locate(path: Path, name: str, moved_to: Sequence[Path]) -> Path:

@@ -19,6 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from opamc_cli import __version__
+from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
 from opamc_cli.storage.atomic import atomic_path
 from opamc_cli.storage.runs import file_sha256
@@ -53,6 +54,7 @@ MOTIONS = pa.schema(
         pa.field("lag", pa.int64()),
         pa.field("reference", pa.bool_()),
         pa.field("reference_f_max_hz", pa.float64()),
+        pa.field("reference_samples", pa.int64()),
     ]
 )
 PATTERNS = pa.schema(
@@ -105,7 +107,6 @@ def write_table(
     *,
     stage: str,
     config: Mapping[str, Any],
-    config_hash: str,
     inputs: Sequence[tuple[Path, str]],
     extra: Mapping[str, Any] | None = None,
 ) -> None:
@@ -117,8 +118,10 @@ def write_table(
         Where to.
     table
         Rows in their final order.
-    stage, config, config_hash
-        What made it, see `Provenance`.
+    stage
+        What made it.
+    config
+        The options that it was made with, as plain JSON types; hashed into `config_hash`.
     inputs
         (path, SHA-256) of every file that was read.
     extra
@@ -128,7 +131,7 @@ def write_table(
         "stage": stage,
         "schema_version": SCHEMA_VERSION,
         "config": config,
-        "config_hash": config_hash,
+        "config_hash": digest(config),
         "inputs": [
             {"path": _relative(source, path.parent), "sha256": digest} for source, digest in inputs
         ],

@@ -1,0 +1,59 @@
+"""`opamc patterns`: ordinal patterns of the envelope of every identified segment."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.options import (
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    MovedRuns,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.output import Output
+
+
+def patterns(
+    motions: Annotated[
+        Path | None,
+        typer.Argument(metavar="[MOTIONS]", help="Motion table; default: that in --out."),
+    ] = None,
+    runs: MovedRuns = None,
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = 1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Count ordinal patterns of the identified segments; writes patterns.parquet."""
+    from opamc_cli.config import load_config
+    from opamc_cli.stages import identify
+    from opamc_cli.stages import patterns as stage
+    from opamc_cli.storage.lock import output_lock
+
+    output = Output(as_json, quiet)
+    with output_lock(out):
+        outcome = stage.run(
+            motions or out / identify.FILE_NAME,
+            load_config(config, overrides or ()),
+            out,
+            moved_to=runs or (),
+            jobs=jobs,
+        )
+    counted = outcome.by_motion()
+    output.result(
+        {"written": str(outcome.path), "motions": counted},
+        *(
+            f"axis {c['axis']} motion {c['motion']} order {c['order']}: tau {c['tau']}, "
+            f"{c['n_patterns']} patterns in {c['segments']} segments"
+            for c in counted
+        ),
+        str(outcome.path),
+    )
+    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))

@@ -1,0 +1,83 @@
+"""The envelope of one segment, from whichever current a run holds."""
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.errors import InputError
+from opamc_cli.signal.analytic import analytic_signal, clarke, envelope
+from opamc_cli.storage.runs import AxisChannels, Run
+
+EnvelopeKind = Literal["auto", "clarke", "hilbert", "reported"]
+
+GUARD_S = 0.25
+"""Read beside a segment of one phase, so that the Hilbert transform's edges fall outside it."""
+
+
+def envelope_kind(path: object, channels: AxisChannels, wanted: EnvelopeKind) -> EnvelopeKind:
+    """Return the kind of envelope that an axis can give.
+
+    Raises
+    ------
+    InputError
+        If the wanted kind needs a current that the run does not hold.
+    """
+    if wanted == "auto":
+        if len(channels.phases) == 3:
+            return "clarke"
+        return "hilbert" if channels.phases else "reported"
+    lacking = {
+        "clarke": len(channels.phases) < 3 and "three phase currents",
+        "hilbert": not channels.phases and "a phase current",
+        "reported": channels.current is None and f"axis{channels.axis}_current",
+    }[wanted]
+    if lacking:
+        msg = (
+            f"{path}: patterns.envelope is {wanted!r} but axis {channels.axis} lacks {lacking}; "
+            "use 'auto'"
+        )
+        raise InputError(msg)
+    return wanted
+
+
+def read_envelope(
+    run: Run, axis: int, start: int, stop: int, wanted: EnvelopeKind = "auto"
+) -> npt.NDArray[np.floating]:
+    """Read the current of an axis and return its envelope over start..stop.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    axis
+        Counted from 1.
+    start, stop
+        Half-open interval of samples; what lies outside the run is left out.
+    wanted
+        Which current it is taken from, see `PatternsConfig.envelope`.
+
+    Returns
+    -------
+    array
+        Shape (stop - start,), A, in the run's own float width.
+
+    Raises
+    ------
+    InputError
+        If the axis lacks the current that is wanted.
+    """
+    start, stop = max(start, 0), min(stop, run.n_samples)
+    channels = run.channels(axis)
+    kind = envelope_kind(run.path, channels, wanted)
+    if kind == "clarke":
+        phases = run.read(channels.phases, start, stop)
+        return envelope(clarke(*(phases[name] for name in channels.phases)))
+    if kind == "hilbert":
+        guard = round(GUARD_S * run.sampling_rate_hz)
+        first = max(start - guard, 0)
+        name = channels.phases[0]
+        current = run.read([name], first, stop + guard)[name]
+        return envelope(analytic_signal(current))[start - first : stop - first]
+    assert channels.current is not None
+    return np.abs(run.read([channels.current], start, stop)[channels.current])

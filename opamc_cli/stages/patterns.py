@@ -1,0 +1,178 @@
+"""Stage `patterns`: motions and runs in, ordinal pattern counts out (thesis 4.2)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.errors import OpamcError
+from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
+from opamc_cli.stages.envelope import read_envelope
+from opamc_cli.stages.parallel import map_items
+from opamc_cli.storage.sources import RunSource, read_sources, sources_record
+from opamc_cli.storage.tables import MOTIONS, PATTERNS, read_table, table_input, write_table
+
+FILE_NAME = "patterns.parquet"
+
+
+@dataclass(frozen=True)
+class PatternsOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The table that was written.
+    table
+        Its rows.
+    errors
+        One for each axis of a run that could not be read.
+    """
+
+    path: Path
+    table: pa.Table
+    errors: tuple[OpamcError, ...]
+
+    def by_motion(self) -> list[dict[str, Any]]:
+        """Return delay, patterns and segments by axis, motion and order."""
+        rows = self.table.group_by(["axis", "motion", "order", "tau"]).aggregate(
+            [("n_patterns", "sum"), ("segment", "count")]
+        )
+        named = rows.rename_columns({"n_patterns_sum": "n_patterns", "segment_count": "segments"})
+        keys = [(key, "ascending") for key in ("axis", "motion", "order", "tau")]
+        listed: list[dict[str, Any]] = named.sort_by(keys).to_pylist()
+        return listed
+
+
+@dataclass(frozen=True)
+class _Job:
+    """The identified segments of one axis of one run."""
+
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+    config: PatternsConfig
+
+
+def run(
+    motions: Path,
+    config: Config,
+    out: Path,
+    *,
+    moved_to: Sequence[Path] = (),
+    jobs: int = 1,
+) -> PatternsOutcome:
+    """Count the ordinal patterns of every identified segment's envelope.
+
+    Parameters
+    ----------
+    motions
+        Table of stage `identify`.
+    config
+        Section `patterns` is used.
+    out
+        Folder of the pattern table.
+    moved_to
+        Folders of the runs, if they were moved.
+    jobs
+        Worker processes.
+
+    Raises
+    ------
+    InputError
+        If a table or run cannot be used.
+    """
+    table = read_table(motions, "identify", MOTIONS)
+    sources = read_sources(motions, moved_to)
+    by_name = {source.name: source for source in sources}
+    work: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in table.to_pylist():
+        if row["motion"] >= 0:
+            work.setdefault((row["run"], row["axis"]), []).append(row)
+    for name in dict.fromkeys(name for name, _ in work):
+        by_name[name].verify()
+    outcome = map_items(
+        count_patterns,
+        [
+            _Job(by_name[name], axis, tuple(rows), config.patterns)
+            for (name, axis), rows in work.items()
+        ],
+        jobs,
+    )
+    patterns = pa.concat_tables([PATTERNS.empty_table(), *outcome.results]).combine_chunks()
+    path = out / FILE_NAME
+    write_table(
+        path,
+        patterns,
+        stage="patterns",
+        config=config.canonical("patterns"),
+        inputs=[table_input(motions)],
+        extra=sources_record(sources, out),
+    )
+    return PatternsOutcome(path, patterns, outcome.errors)
+
+
+def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
+    """Return the samples of a segment that correspond to its reference segment's.
+
+    The segment's own ends are where a threshold was crossed; synchronised with the reference
+    and of its length, every cycle is cut at the same places of the motion (thesis 4.1.1).
+    """
+    if row["kind"] == "window":
+        return row["start"], row["stop"]
+    start = max(row["start"] + row["lag"], 0)
+    return start, start + row["reference_samples"]
+
+
+def delay(config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int) -> int:
+    """Return the time delay of a motion: the fixed one, or that of (4-2)."""
+    return config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
+
+
+def count_patterns(job: _Job) -> pa.Table:
+    """Count the patterns of each segment of one axis, for every order."""
+    config = job.config
+    rows = []
+    with job.source.open() as run:
+        for row in job.rows:
+            start, stop = aligned_span(row)
+            stop = min(stop, run.n_samples)
+            envelope = _finite(read_envelope(run, job.axis, start, stop, config.envelope))
+            delays = {
+                order: delay(config, run.sampling_rate_hz, row["reference_f_max_hz"], order)
+                for order in sorted(set(config.orders))
+            }
+            for tau in sorted(set(delays.values())):
+                orders = [order for order, other in delays.items() if other == tau]
+                for order, counts in ordinal_counts(envelope, orders, tau).items():
+                    counted = int(counts.sum())
+                    rows.append(
+                        {
+                            **{name: row[name] for name in _COPIED},
+                            "start": start,
+                            "stop": stop,
+                            "order": order,
+                            "tau": tau,
+                            "gamma": None if config.tau else config.gamma,
+                            "f_max_hz": row["reference_f_max_hz"],
+                            "n_patterns": counted,
+                            "n_masked": n_windows(envelope.size, order, tau) - counted,
+                            "counts": counts,
+                        }
+                    )
+    rows.sort(key=lambda row: (row["segment"], row["order"]))
+    return pa.Table.from_pylist(rows, schema=PATTERNS)
+
+
+_COPIED = ("run", "axis", "cycle", "motion", "segment", "signal", "temperature_c")
+
+
+def _finite(envelope: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+    """Turn infinities into NaN: a current without bound is a fault of the logger, not a rank."""
+    return np.where(np.isinf(envelope), np.nan, envelope)
