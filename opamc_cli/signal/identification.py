@@ -41,12 +41,16 @@ class SegmentFeatures:
 
     def part(self, start: int, stop: int) -> "SegmentFeatures":
         """Return the segments start..stop (half-open)."""
+        return self.take(np.arange(start, stop))
+
+    def take(self, indices: Ints) -> "SegmentFeatures":
+        """Return some segments."""
         return SegmentFeatures(
-            self.variance[start:stop],
-            self.duration_s[start:stop],
-            self.f_max_hz[start:stop],
-            self.direction[start:stop],
-            self.pause_s[start:stop],
+            self.variance[indices],
+            self.duration_s[indices],
+            self.f_max_hz[indices],
+            self.direction[indices],
+            self.pause_s[indices],
         )
 
 
