@@ -4,11 +4,13 @@ from collections.abc import Callable
 
 import typer
 
-from opamc_cli.commands import config, identify, patterns
+from opamc_cli.commands import config, identify, ingest, patterns, simulate
 
 COMMANDS: dict[str, Callable[..., None]] = {
+    "ingest": ingest.ingest,
     "identify": identify.identify,
     "patterns": patterns.patterns,
+    "simulate": simulate.simulate,
 }
 """Subcommands by name, in the order of the chain."""
 

@@ -1,0 +1,205 @@
+"""Undeclared effects: what each name does to the robot when it is switched on.
+
+Torque effects act on the motor shaft and are sized in ampere of motor current per unit of their
+regressor; mechanical ones change a parameter; sensor effects change what is recorded.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opamc_cli.testbed.kernel import AxisConstants
+from opamc_cli.testbed.parameters import Effect
+
+Constants = dict[str, float]
+_Change = Callable[[Constants, float, dict[str, float]], None]
+
+
+@dataclass(frozen=True)
+class EffectKind:
+    """One name of the list.
+
+    Attributes
+    ----------
+    unit : str
+        Of the magnitude.
+    parameters : dict
+        Parameters with their defaults.
+    change : callable or None
+        Changes the constants of the axis; None for ripples and for what happens to the
+        recording.
+    """
+
+    unit: str
+    parameters: dict[str, float]
+    change: _Change | None
+
+
+def _set(*names: str) -> _Change:
+    """Add the magnitude to the first name, set the rest from the parameters in order."""
+
+    def change(constants: Constants, magnitude: float, parameters: dict[str, float]) -> None:
+        constants[names[0]] += magnitude
+        for name, value in zip(names[1:], parameters.values(), strict=True):
+            constants[name] = value
+
+    return change
+
+
+def _inertia(c: Constants, magnitude: float, _: dict[str, float]) -> None:
+    c["motor_inertia"] += magnitude * c["torque_constant"] / c["ratio"]
+
+
+def _payload(c: Constants, magnitude: float, parameters: dict[str, float]) -> None:
+    c["late_link_inertia"] += magnitude * c["payload_inertia_per_kg"]
+    c["late_gravity"] += magnitude * c["payload_gravity_per_kg"]
+    c["payload_change_s"] = parameters["start_s"]
+
+
+def _elasticity(c: Constants, magnitude: float, _: dict[str, float]) -> None:
+    c["stiffness"] *= 1.0 - magnitude
+    c["stiffening"] *= 1.0 - magnitude
+
+
+KINDS: dict[str, EffectKind] = {
+    "inertia": EffectKind("A per rad/s^2", {}, _inertia),
+    "gravity": EffectKind("A", {"angle_rad": 0.0}, _set("fx_gravity", "fx_gravity_angle")),
+    "offset": EffectKind("A", {}, _set("fx_offset")),
+    "coulomb": EffectKind("A", {}, _set("fx_coulomb")),
+    "viscous": EffectKind("A per rad/s", {}, _set("fx_viscous")),
+    "stribeck": EffectKind(
+        "A", {"velocity_rad_s": 0.1}, _set("fx_stribeck", "fx_stribeck_velocity")
+    ),
+    "quadratic_friction": EffectKind("A per (rad/s)^2", {}, _set("fx_quadratic")),
+    "sublinear_friction": EffectKind(
+        "A per (rad/s)^exponent", {"exponent": 0.5}, _set("fx_power", "fx_power_exponent")
+    ),
+    "asymmetric_friction": EffectKind("A", {}, _set("fx_asymmetric")),
+    "load_friction": EffectKind("A per N.m of joint torque", {}, _set("fx_load")),
+    "thermal_viscous": EffectKind(
+        "A per rad/s per K",
+        {"reference_c": 25.0},
+        _set("fx_thermal", "fx_thermal_reference_c"),
+    ),
+    "warmup": EffectKind("A", {"time_constant_s": 60.0}, _set("fx_warmup", "fx_warmup_time")),
+    "spring": EffectKind("A per rad", {"angle_rad": 0.0}, _set("fx_spring", "fx_spring_angle")),
+    "payload_change": EffectKind("kg", {"start_s": 0.0}, _payload),
+    "position_drag": EffectKind(
+        "A",
+        {"angle_rad": 0.3, "width_rad": 0.1},
+        _set("fx_drag", "fx_drag_angle", "fx_drag_width"),
+    ),
+    "hysteresis": EffectKind(
+        "A", {"width_rad": 0.02}, _set("fx_hysteresis", "fx_hysteresis_width")
+    ),
+    "elasticity": EffectKind("share of the stiffness lost", {}, _elasticity),
+    "ripple": EffectKind("A", {"order": 2.0, "phase_rad": 0.0, "speed_exponent": 0.0}, None),
+    "time_delay": EffectKind("s", {}, None),
+    "sensor_offset": EffectKind("A", {"phase": 0.0}, None),
+    "sensor_gain": EffectKind("relative", {"phase": 0.0}, None),
+    "dead_time": EffectKind("A", {}, _set("fx_dead_time")),
+    "mains_hum": EffectKind("A", {"frequency_hz": 50.0, "phase_rad": 0.0}, None),
+}
+"""Every effect name with its unit, its parameters and what it changes."""
+
+
+def complete(effect: Effect) -> Effect:
+    """Return an effect with the defaults of its parameters filled in.
+
+    Raises
+    ------
+    ValueError
+        For an unknown name or parameter; the message names it and what is known.
+    """
+    if effect.name not in KINDS:
+        msg = f"effect {effect.name!r} is unknown; known: {', '.join(sorted(KINDS))}"
+        raise ValueError(msg)
+    known = KINDS[effect.name].parameters
+    unknown = sorted(set(effect.parameters) - set(known))
+    if unknown:
+        have = ", ".join(known) or "none"
+        msg = f"effect {effect.name!r} has no parameter {unknown[0]!r}; it has: {have}"
+        raise ValueError(msg)
+    return Effect(effect.name, effect.axis, effect.magnitude, {**known, **effect.parameters})
+
+
+def apply_to_constants(effects: Sequence[Effect], constants: Constants) -> NDArray[np.float64]:
+    """Switch the mechanical and electrical effects of one axis on.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    constants : dict
+        The axis's constants by name; changed in place.
+
+    Returns
+    -------
+    ndarray, shape (k, 4)
+        The ripples for the kernel: order, amplitude in A, phase in rad, exponent of the speed.
+    """
+    ripples = []
+    for effect in effects:
+        change = KINDS[effect.name].change
+        if change is not None:
+            change(constants, effect.magnitude, effect.parameters)
+        elif effect.name == "ripple":
+            p = effect.parameters
+            ripples.append([p["order"], effect.magnitude, p["phase_rad"], p["speed_exponent"]])
+    names = [name for name in AxisConstants._fields if name.startswith("fx_")]
+    constants["any_effect"] = bool(ripples) or any(constants[name] != 0.0 for name in names)
+    return np.array(ripples, dtype=np.float64).reshape(-1, 4)
+
+
+def apply_to_phases(
+    effects: Sequence[Effect], phases_a: NDArray[np.float64], rate_hz: float
+) -> NDArray[np.float64]:
+    """Apply the sensor effects of one axis to its phase currents (n, 3); the first is delayed."""
+    out = phases_a
+    for effect in effects:
+        size, p = effect.magnitude, effect.parameters
+        if effect.name == "time_delay":
+            out = np.column_stack([delayed(out[:, k], size * rate_hz) for k in range(3)])
+        elif effect.name == "mains_hum":
+            out = out + _hum(len(out), size, p, rate_hz)[:, None]
+        elif effect.name in ("sensor_offset", "sensor_gain"):
+            out = out.copy()
+            k = int(p["phase"])
+            if effect.name == "sensor_offset":
+                out[:, k] += size
+            else:
+                out[:, k] *= 1.0 + size
+    return out
+
+
+def apply_to_reported(
+    effects: Sequence[Effect], current_a: NDArray[np.float64], rate_hz: float
+) -> NDArray[np.float64]:
+    """Apply the sensor effects of one axis to its reported current (n,)."""
+    out = current_a
+    for effect in effects:
+        size = effect.magnitude
+        if effect.name == "time_delay":
+            out = delayed(out, size * rate_hz)
+        elif effect.name == "mains_hum":
+            out = out + _hum(len(out), size, effect.parameters, rate_hz)
+        elif effect.name == "sensor_offset":
+            out = out + size
+        elif effect.name == "sensor_gain":
+            out = out * (1.0 + size)
+    return out
+
+
+def delayed(values: NDArray[np.float64], samples: float) -> NDArray[np.float64]:
+    """Delay a signal by a number of samples, whole or not; the first value is held."""
+    n = len(values)
+    result: NDArray[np.float64] = np.interp(np.arange(n) - samples, np.arange(n), values)
+    return result
+
+
+def _hum(n: int, size: float, p: dict[str, float], rate_hz: float) -> NDArray[np.float64]:
+    turn = 2.0 * np.pi * p["frequency_hz"] / rate_hz
+    result: NDArray[np.float64] = size * np.sin(turn * np.arange(n) + p["phase_rad"])
+    return result
