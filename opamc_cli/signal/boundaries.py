@@ -1,0 +1,129 @@
+"""Where exactly a motion starts and stops, read from the angle of the current vector.
+
+The motion signal needs a few carrier periods to rise, and a carrier of very low frequency is no
+carrier yet: its threshold is crossed when the joint already turns. The vector's angle tells more:
+at standstill it keeps its value, whatever the torque does, up to the jump by π when the torque
+changes sign. The angle of its square does not jump.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+SMOOTHING_S = 0.004  # a quarter period at 60 Hz, faster than any carrier that just begins to turn
+LEAST_TURN_RAD = 0.12  # the least turn that counts as leaving standstill
+# A smaller current at standstill may be the sensors' offset, which has an angle of its own.
+MIN_HOLDING_SHARE = 0.15
+CLEAR_TURN_RAD = 1.5  # the turn up to which the angle is followed
+
+
+def refine_boundaries(
+    z: NDArray[np.complexfloating],
+    start: int,
+    stop: int,
+    fs_hz: float,
+    noise_a: float,
+) -> tuple[int, int]:
+    """Move coarse boundaries outwards to where the vector leaves and reaches standstill.
+
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Current vector of the motion with the standstill before and after it, up to the middle of
+        the gap to the neighbouring motions, or the recording's ends.
+    start, stop : int
+        Coarse boundaries within `z`, half-open; the joint turns at both.
+    fs_hz : float
+        Sampling rate, Hz.
+    noise_a : float
+        Standard deviation of the noise in each component of `z`, A.
+
+    Returns
+    -------
+    tuple of int
+        Refined (start, stop), half-open, start <= the coarse one, stop >= the coarse one. A
+        boundary with too little standstill beside it to compare with is returned as it was.
+    """
+    middle = (start + stop) // 2
+    amplitude_a = float(np.median(np.abs(z[start:stop])))
+    refined_start = _onset(z[:middle], start, fs_hz, noise_a, amplitude_a)
+    # Backwards in time a stop is a start.
+    reverse = z[middle:][::-1]
+    refined_stop = z.size - _onset(reverse, z.size - stop, fs_hz, noise_a, amplitude_a)
+    return refined_start, refined_stop
+
+
+def _onset(
+    z: NDArray[np.complexfloating],
+    coarse: int,
+    fs_hz: float,
+    noise_a: float,
+    amplitude_a: float,
+) -> int:
+    """Sample at which a vector that stands at first begins to turn, at most `coarse`."""
+    width = max(1, round(SMOOTHING_S * fs_hz))
+    n_rest = int(0.4 * coarse)
+    if n_rest < 2 * width:
+        return coarse
+    end = min(z.size, coarse + round(0.1 * fs_hz))
+    smooth = _moving_mean(z[:end], width)
+    noise = max(noise_a / np.sqrt(width), 1e-12)
+
+    rest = smooth[:n_rest]
+    reference = np.mean(rest * rest)
+    if np.sqrt(np.abs(reference)) < max(3 * noise, MIN_HOLDING_SHARE * amplitude_a):
+        return _rise(smooth - np.mean(rest), coarse, noise)
+    turned = _turn_since(smooth, reference, noise)
+    least = max(LEAST_TURN_RAD, 4 * noise / float(np.sqrt(np.abs(reference))))
+    return _extrapolate(turned, np.abs(smooth), least, coarse)
+
+
+def _turn_since(
+    smooth: NDArray[np.complexfloating], reference: np.complexfloating, noise: float
+) -> NDArray[np.float64]:
+    """Angle turned since standstill, rad, from the squared vector; positive on the whole."""
+    doubled = np.angle(smooth * smooth * np.conj(reference))
+    # While the torque passes zero the vector has no angle: it is bridged.
+    known = np.flatnonzero(np.abs(smooth) > 2.5 * noise)
+    if known.size < 2:
+        return np.zeros(smooth.size)
+    followed = np.unwrap(doubled[known]) / 2
+    turned = np.interp(np.arange(smooth.size), known, followed)
+    return turned * np.sign(turned[-1])
+
+
+def _extrapolate(
+    turned: NDArray[np.float64], weight: NDArray[np.floating], least: float, coarse: int
+) -> int:
+    """Trace the turn back to zero: as t^2 (constant acceleration) or t^3 (constant jerk)."""
+    clear = max(CLEAR_TURN_RAD, 4 * least)
+    below_clear = np.flatnonzero(turned[: max(coarse, 1)] < clear)
+    t_clear = int(below_clear[-1]) + 1 if below_clear.size else 0
+    t_clear = min(t_clear, turned.size - 1)
+    below_least = np.flatnonzero(turned[:t_clear] < least)
+    t_least = int(below_least[-1]) + 1 if below_least.size else 0
+    if t_clear - t_least < 4:
+        return min(t_least, coarse)
+    t = np.arange(t_least, t_clear)
+    y = np.maximum(turned[t_least:t_clear], 1e-6)
+    w = weight[t_least:t_clear]
+    best = (np.inf, float(t_least))
+    for power in (2, 3):
+        slope, intercept = np.polyfit(t, y ** (1 / power), 1, w=w)
+        if slope <= 0:
+            continue
+        zero = -intercept / slope
+        misfit = float(np.sum((w * (y - np.maximum(slope * (t - zero), 0) ** power)) ** 2))
+        best = min(best, (misfit, zero))
+    earliest = t_least - 1.5 * (t_clear - t_least)
+    return int(np.clip(round(best[1]), max(0, earliest), min(t_least, coarse)))
+
+
+def _rise(smooth: NDArray[np.complexfloating], coarse: int, noise: float) -> int:
+    """Without current at standstill the motion begins where the current does."""
+    quiet = np.flatnonzero(np.abs(smooth[:coarse]) < 4 * noise)
+    return int(quiet[-1]) + 1 if quiet.size else coarse
+
+
+def _moving_mean(x: NDArray[np.complexfloating], width: int) -> NDArray[np.complexfloating]:
+    kernel = np.full(width, 1 / width)
+    return np.convolve(x, kernel, mode="same")
