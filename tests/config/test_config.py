@@ -1,0 +1,99 @@
+import ast
+from pathlib import Path
+
+import pytest
+import yaml
+from pydantic import BaseModel
+
+from opamc_cli.config import Config, load_config
+from opamc_cli.config.document import to_yaml
+from opamc_cli.errors import ConfigError
+
+PACKAGE = Path(__file__).parents[2] / "opamc_cli"
+DEFAULTS = Path(__file__).parents[2] / "configs" / "default.yaml"
+
+
+def leaves(model):
+    for name, field in model.model_fields.items():
+        if isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            yield from leaves(field.annotation)
+        else:
+            yield name, field
+
+
+def test_the_default_file_is_the_documented_defaults():
+    assert DEFAULTS.read_text(encoding="utf-8") == to_yaml(Config())
+    assert load_config(DEFAULTS) == Config()
+
+
+@pytest.mark.parametrize("name", sorted({name for name, _ in leaves(Config)}))
+def test_every_key_is_documented_and_read(name):
+    field = next(field for other, field in leaves(Config) if other == name)
+    assert field.description
+    read = {
+        node.attr
+        for path in PACKAGE.rglob("*.py")
+        if "config" not in path.relative_to(PACKAGE).parts[:1]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)
+    }
+    assert name in read
+
+
+def test_yaml_round_trip():
+    assert load_config(None) == Config.model_validate(yaml.safe_load(to_yaml(Config())))
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("patterns: {gama: 1}", ["patterns.gama", "did you mean 'gamma'"]),
+        ("patern: {gamma: 1}", ["patern", "did you mean 'patterns'"]),
+        ("patterns: {gamma: -1}", ["patterns.gamma is -1", "greater than 0"]),
+        ("patterns: {gamma: .nan}", ["patterns.gamma is nan"]),
+        ("patterns: {orders: [2]}", ["patterns.orders.0 is 2", "greater than or equal to 3"]),
+        ("patterns: {gamma: 1, gamma: 2}", ["given twice"]),
+        ("- a", ["holds a list"]),
+        ("a: [", ["not valid YAML"]),
+    ],
+)
+def test_wrong_files_are_named_in_one_line(tmp_path, text, words):
+    path = tmp_path / "c.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_config(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path}: ")
+    assert "\n" not in message
+    for word in words:
+        assert word in message
+
+
+def test_overrides_win_over_the_file(tmp_path):
+    path = tmp_path / "c.yaml"
+    path.write_text("patterns: {gamma: 1.0, tau: 4}")
+    config = load_config(path, ["patterns.gamma=3", "patterns.tau=null"])
+    assert (config.patterns.gamma, config.patterns.tau) == (3.0, None)
+
+
+@pytest.mark.parametrize("override", ["patterns.gamma", "=3", "patterns.gamma.deep=[1", "a.b.c=1"])
+def test_wrong_overrides(override):
+    with pytest.raises(ConfigError):
+        load_config(None, [override])
+
+
+def test_a_missing_and_a_binary_file(tmp_path):
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_config(tmp_path / "absent.yaml")
+    binary = tmp_path / "b.yaml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="UTF-8"):
+        load_config(binary)
+
+
+def test_a_changed_key_changes_the_hash_and_order_does_not():
+    changed = load_config(None, ["patterns.gamma=1"])
+    assert changed.digest() != Config().digest()
+    one = load_config(None, ["patterns.gamma=1", "score.base=10"])
+    other = load_config(None, ["score.base=10", "patterns.gamma=1"])
+    assert one.digest() == other.digest()
