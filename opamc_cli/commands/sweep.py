@@ -1,0 +1,97 @@
+"""`opamc sweep`: which delay and order separate two sets of runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.options import (
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.output import Output
+from opamc_cli.errors import UsageError
+
+
+def sweep(
+    baseline: Annotated[
+        list[Path], typer.Option("--baseline", metavar="RUNS", help="Runs of the healthy state.")
+    ],
+    target: Annotated[
+        list[Path] | None,
+        typer.Option("--target", metavar="RUNS", help="Runs to set against them."),
+    ] = None,
+    tau: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Delays, in samples.")] = "1:25",
+    order: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Orders, 3..7.")] = "4:5",
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = 1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Compute divergences over delays and orders; writes sweep.parquet and sweep.png."""
+    taus, orders = _span("--tau", tau, 1, 10_000), _span("--order", order, 3, 7)
+
+    from opamc_cli.config import load_config
+    from opamc_cli.stages import sweep as stage
+    from opamc_cli.stages.chain import run_chain
+    from opamc_cli.stages.sweep_figure import write_figure
+    from opamc_cli.storage.lock import output_lock
+
+    output = Output(as_json, quiet)
+    effective = load_config(config, overrides or ())
+    with output_lock(out):
+        normal = run_chain(baseline, effective, out / "baseline", jobs=jobs)
+        errors, done = list(normal.errors), list(normal.runs_done)
+        motions = None
+        if target:
+            other = run_chain(
+                target, effective, out / "target", reference=normal.motions, jobs=jobs
+            )
+            motions = other.motions
+            errors += other.errors
+            done += other.runs_done
+        outcome = stage.run(
+            normal.motions,
+            effective,
+            out,
+            taus=taus,
+            orders=orders,
+            target=motions,
+            jobs=jobs,
+        )
+        write_figure(outcome.table, out / "sweep.png")
+    errors += outcome.errors
+    best = outcome.best()
+    output.result(
+        {"written": str(outcome.path), "best": best, "base": effective.score.base},
+        *(
+            f"axis {b['axis']} order {b['order']}: separates best at tau {b['tau']} "
+            f"(JSD {b['jsd_baseline']:.3f} against {b['jsd_target']:.3f}, KS {b['ks']:.2f}); "
+            f"(4-2) gives {', '.join(map(str, b['tau_opt']))}"
+            for b in best
+        ),
+        str(outcome.path),
+        str(out / "sweep.png"),
+    )
+    raise typer.Exit(output.failures([str(error) for error in errors], len(done)))
+
+
+def _span(option: str, text: str, smallest: int, largest: int) -> list[int]:
+    """Read FIRST:LAST, both included, or one number."""
+    first, separator, last = text.partition(":")
+    try:
+        start, stop = int(first), int(last if separator else first)
+    except ValueError as error:
+        msg = f"{option} {text}: write it as FIRST:LAST, such as {smallest}:{largest}"
+        raise UsageError(msg) from error
+    if not smallest <= start <= stop <= largest:
+        msg = f"{option} {text}: must rise within {smallest}..{largest}"
+        raise UsageError(msg)
+    return list(range(start, stop + 1))

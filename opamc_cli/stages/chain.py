@@ -1,0 +1,71 @@
+"""The first three stages in a row: from runs to ordinal patterns."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from opamc_cli.config import Config
+from opamc_cli.errors import OpamcError
+from opamc_cli.stages import identify, patterns, segment
+
+
+@dataclass(frozen=True)
+class ChainOutcome:
+    """Tables that the chain wrote, and what could not be used.
+
+    Attributes
+    ----------
+    segments, motions, patterns
+        Paths of the three tables.
+    runs_done
+        Names of the runs that went through.
+    errors
+        One for each run, or axis of a run, that could not be used.
+    """
+
+    segments: Path
+    motions: Path
+    patterns: Path
+    runs_done: tuple[str, ...]
+    errors: tuple[OpamcError, ...]
+
+
+def run_chain(
+    paths: Sequence[Path],
+    config: Config,
+    out: Path,
+    *,
+    reference: Path | None = None,
+    jobs: int = 1,
+) -> ChainOutcome:
+    """Run segment, identify and patterns over runs, each stage from the file before it.
+
+    Parameters
+    ----------
+    paths
+        Run files and folders of them.
+    config
+        All options.
+    out
+        Folder of the three tables.
+    reference
+        Motion table whose reference cycles are taken; None: found in these runs.
+    jobs
+        Worker processes.
+
+    Raises
+    ------
+    OpamcError
+        If no run can be used.
+    """
+    segmented = segment.run(paths, config, out, jobs=jobs)
+    identified = identify.run(segmented.path, config, out, reference=reference, jobs=jobs)
+    counted = patterns.run(identified.path, config, out, jobs=jobs)
+    names = dict.fromkeys(segmented.table.column("run").to_pylist())
+    return ChainOutcome(
+        segments=segmented.path,
+        motions=identified.path,
+        patterns=counted.path,
+        runs_done=tuple(names),
+        errors=(*segmented.errors, *identified.errors, *counted.errors),
+    )
