@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -43,6 +43,18 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
     ConfigError
         If the file cannot be read, or a key or value is not allowed.
     """
+    values = read_values(path, overrides)
+    return validate(Config, values, str(path) if path else "--set")
+
+
+def read_values(path: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
+    """Return the mapping of a YAML file (empty without one), with `key=value` overrides applied.
+
+    Raises
+    ------
+    ConfigError
+        If the file or an override cannot be read.
+    """
     values = read_yaml(path) if path is not None else {}
     for override in overrides:
         key, separator, text = override.partition("=")
@@ -55,7 +67,7 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
             msg = f"--set {override}: the value is not YAML ({_flat(error)})"
             raise ConfigError(msg) from error
         _set(values, key.split("."), value, override)
-    return validate(Config, values, str(path) if path else "--set")
+    return values
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -116,9 +128,10 @@ def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[st
     current: Any = model
     for part in place:
         field = getattr(current, "model_fields", {}).get(part)
-        if field is None:
-            return []
-        current = field.annotation
+        annotation = current if field is None else field.annotation
+        # a section may be optional, one of several kinds, or the value of a free-named mapping
+        options = [annotation, *get_args(annotation)]
+        current = next((o for o in options if hasattr(o, "model_fields")), annotation)
     return sorted(getattr(current, "model_fields", {}))
 
 

@@ -1,1 +1,1 @@
-"""Foreign formats turned into runs."""
+"""Foreign formats: CSV, MAT, HDF5 and TDMS become runs by a map file."""

@@ -1,0 +1,59 @@
+"""Channels of a foreign recording in the units of the run format."""
+
+import math
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.storage.ingest.map import ColumnMap, IngestMap, quantity_of
+from opamc_cli.storage.ingest.source import Block
+from opamc_cli.storage.ingest.units import conversion
+
+Float = npt.NDArray[np.float64]
+
+
+def convert(blocks: Iterable[Block], channels: IngestMap) -> Iterator[Block]:
+    """Yield the blocks in A, rad, rad/s and °C, positions unwrapped where the map says so."""
+    unwrapped = {name: _Turns() for name, column in channels.columns.items() if column.unwrap}
+    for block in blocks:
+        converted: Block = {}
+        for name, values in block.items():
+            column = channels.columns.get(name)
+            converted[name] = values if column is None else _scaled(values, name, column)
+        for name, turns in unwrapped.items():
+            converted[name] = turns.unwrap(converted[name])
+        yield converted
+
+
+def _scaled(values: Float, name: str, column: ColumnMap) -> Float:
+    unit = conversion(column.unit, quantity_of(name))
+    factor, offset = (unit.factor, unit.offset) if unit else (1.0, 0.0)
+    # exact where nothing is to be done: 1 · x + 0 would turn -0.0 into 0.0
+    if column.scale != 1.0 or column.offset != 0.0:
+        values = values * column.scale + column.offset
+    return values if factor == 1.0 and offset == 0.0 else values * factor + offset
+
+
+class _Turns:
+    """Unwraps an angle block by block: a jump of more than half a turn is a turn.
+
+    Missing values stay missing; the jump is looked for between the values beside them.
+    """
+
+    def __init__(self) -> None:
+        self._last = math.nan
+        self._turns = 0.0
+
+    def unwrap(self, angle_rad: Float) -> Float:
+        known = np.flatnonzero(np.isfinite(angle_rad))
+        if known.size == 0:
+            return angle_rad
+        angle = angle_rad[known]
+        first = angle[0] if math.isnan(self._last) else self._last
+        jumps = -np.round(np.diff(angle, prepend=first) / (2 * math.pi))
+        turns = self._turns + np.cumsum(jumps)
+        self._last, self._turns = float(angle[-1]), float(turns[-1])
+        result = angle_rad.copy()
+        result[known] = angle + turns * (2 * math.pi)
+        return result

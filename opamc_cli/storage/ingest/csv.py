@@ -1,0 +1,208 @@
+"""Text tables: any separator, decimal mark, encoding; with or without a header.
+
+Rows are parsed block by block, so that a recording of gigabytes does not need gigabytes.
+"""
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.dates import timestamp_type
+from opamc_cli.storage.ingest.map import IngestMap, Name
+from opamc_cli.storage.ingest.source import Block, Selection, missing_channel
+
+BLOCK_BYTES = 1 << 22
+FIELD_MARK = "\x1f"
+"""Stands for a separator of more than one character once the text is rewritten."""
+
+_CONVERSION = re.compile(r"column #(\d+): Row #(\d+): .*invalid value '(.*)'", re.DOTALL)
+_WIDTH = re.compile(r"Row #(\d+): Expected (\d+) columns, got (\d+)")
+
+
+class CsvSource:
+    """An open text table.
+
+    Raises
+    ------
+    InputError
+        If there are no data rows, or the text is not in the map's encoding.
+    """
+
+    def __init__(self, path: Path, channels: IngestMap) -> None:
+        self.path = path
+        self._map = channels
+        self._skipped = channels.skip_rows + channels.header + channels.units_rows * channels.header
+        separator = {"tab": "\t", "\\t": "\t"}.get(channels.separator, channels.separator)
+        self._pattern = r"[ \t]+" if separator == "whitespace" else re.escape(separator)
+        self._rewrites = separator == "whitespace" or len(separator) > 1
+        self._delimiter = FIELD_MARK if self._rewrites else separator
+        header, self._first_row = self._read_top()
+        self._names = [name.strip() for name in header]
+
+    def __enter__(self) -> Self:
+        """Return the source itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Nothing is held open between reads."""
+
+    def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
+        """Yield the selected columns block by block."""
+        position = {name: self._position(s.source) for name, s in selections.items()}
+        types = {}
+        for name, selection in selections.items():
+            at = f"c{position[name]}"
+            dates = timestamp_type(self._first_row[position[name]])
+            types[at] = dates if selection.dates else pa.float64()
+        for batch in self._batches(types):
+            yield {
+                name: _to_numpy(batch.column(f"c{position[name]}"), selection.dates)
+                for name, selection in selections.items()
+            }
+
+    def value(self, source: Name) -> object:
+        """Return the value of a column in the first data row."""
+        return self._first_row[self._position(source)].strip()
+
+    def _position(self, source: Name) -> int:
+        if isinstance(source, int):
+            if not 0 <= source < len(self._first_row):
+                known = [f"0..{len(self._first_row) - 1}"]
+                raise missing_channel(self.path, source, known)
+            return source
+        found = [i for i, name in enumerate(self._names) if name == source.strip()]
+        if not found or found[0] >= len(self._first_row):
+            raise missing_channel(self.path, source, [name for name in self._names if name])
+        if len(found) > 1:
+            msg = (
+                f"{self.path}: {len(found)} columns are called {source!r}; "
+                f"name one by its number: {', '.join(map(str, found))}"
+            )
+            raise InputError(msg)
+        return found[0]
+
+    def _read_top(self) -> tuple[list[str], list[str]]:
+        try:
+            with self._text() as text:
+                for _ in range(self._map.skip_rows):
+                    text.readline()
+                rows = (row for row in csv.reader(text, delimiter=self._delimiter) if row)
+                header = next(rows, []) if self._map.header else []
+                for _ in range(self._map.units_rows * self._map.header):
+                    next(rows, None)
+                first = next(rows, None)
+        except UnicodeDecodeError as error:
+            raise self._wrong_encoding(error) from error
+        except csv.Error as error:
+            msg = f"{self.path}: its first rows are not a text table ({error})"
+            raise InputError(msg) from error
+        if first is None:
+            msg = f"{self.path}: no data rows after {self._skipped} lines; check skip_rows, header"
+            raise InputError(msg)
+        return header, first
+
+    def _text(self) -> io.TextIOWrapper:
+        encoding = "utf-8-sig" if _is_utf8(self._map.encoding) else self._map.encoding
+        # universal newlines: csv.reader alone would refuse files that end lines by CR
+        return io.TextIOWrapper(self._bytes(), encoding=encoding, newline=None)
+
+    def _bytes(self) -> Any:
+        raw = pa.input_stream(str(self.path), compression="detect")
+        if not self._rewrites:
+            return raw
+        blanks = self._map.separator == "whitespace"
+        return io.BufferedReader(_Rewritten(raw, self._pattern, blanks), BLOCK_BYTES)
+
+    def _batches(self, types: Mapping[str, pa.DataType]) -> Iterator[pa.RecordBatch]:
+        names = [f"c{i}" for i in range(len(self._first_row))]
+        try:
+            reader = pacsv.open_csv(
+                self._bytes(),
+                read_options=pacsv.ReadOptions(
+                    column_names=names,
+                    skip_rows=self._skipped,
+                    block_size=BLOCK_BYTES,
+                    encoding="utf8" if _is_utf8(self._map.encoding) else self._map.encoding,
+                    use_threads=False,
+                ),
+                parse_options=pacsv.ParseOptions(delimiter=self._delimiter),
+                convert_options=pacsv.ConvertOptions(
+                    include_columns=list(types),
+                    column_types=dict(types),
+                    decimal_point=self._map.decimal,
+                ),
+            )
+            yield from reader
+        except UnicodeDecodeError as error:
+            raise self._wrong_encoding(error) from error
+        except (pa.ArrowException, OSError) as error:
+            raise InputError(self._reason(str(error))) from error
+
+    def _reason(self, text: str) -> str:
+        first_line = " ".join(text.split())[:200]
+        if match := _CONVERSION.search(text):
+            column, row, value = int(match[1]), int(match[2]), match[3]
+            name = self._names[column] if column < len(self._names) else f"number {column}"
+            return (
+                f"{self.path}: column {name} holds {value[:40]!r} in data row {row}, which is not "
+                f"a number with decimal {self._map.decimal!r}; check decimal and separator"
+            )
+        if match := _WIDTH.search(text):
+            return (
+                f"{self.path}: data row {match[1]} has {match[3]} columns where the first has "
+                f"{match[2]}; check separator, skip_rows and whether the file is cut off"
+            )
+        return f"{self.path}: cannot be read as a text table ({first_line})"
+
+    def _wrong_encoding(self, error: UnicodeDecodeError) -> InputError:
+        return InputError(
+            f"{self.path}: is not text in {self._map.encoding} (byte {error.start} cannot be "
+            "decoded); set encoding, such as latin-1, in the map"
+        )
+
+
+class _Rewritten(io.RawIOBase):
+    """A byte stream in which every separator is one `FIELD_MARK`."""
+
+    def __init__(self, raw: Any, pattern: str, blanks: bool) -> None:
+        self._raw = raw
+        self._pattern = re.compile(pattern.encode())
+        self._blanks = blanks
+        self._rest = b""
+        self._ready = b""
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        while not self._ready:
+            chunk = self._raw.read(BLOCK_BYTES)
+            if not chunk and not self._rest:
+                return 0
+            lines = self._rest + chunk
+            # whole lines only: a separator must not be cut in two
+            end = lines.rfind(b"\n") + 1 if chunk else len(lines)
+            self._rest, lines = lines[end:], lines[:end]
+            if self._blanks:
+                lines = re.sub(rb"(?m)^[ \t]+|[ \t]+(?=\r?$)", b"", lines)
+            self._ready = self._pattern.sub(FIELD_MARK.encode(), lines)
+        n = min(len(buffer), len(self._ready))
+        buffer[:n], self._ready = self._ready[:n], self._ready[n:]
+        return n
+
+
+def _is_utf8(encoding: str) -> bool:
+    return encoding.lower().replace("_", "-") in ("utf-8", "utf8", "utf-8-sig")
+
+
+def _to_numpy(column: pa.Array, dates: bool) -> np.ndarray[Any, np.dtype[Any]]:
+    values = np.asarray(column.to_numpy(zero_copy_only=False))
+    return values.astype("datetime64[us]") if dates else values.astype(np.float64, copy=False)

@@ -1,0 +1,261 @@
+"""Time stamps: are they even, and if not, what is wrong with them.
+
+Stamps are even where a straight line explains them: to 1 % of a sample, or to their own
+resolution where they are rounded more coarsely than that. Samples with even stamps are kept as
+they are, since interpolating them could only lose what they hold.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.map import Name
+
+Seconds = npt.NDArray[np.float64]
+
+EVEN_WITHIN = 0.01
+"""Largest deviation from the line, in samples, of stamps that count as even."""
+
+DRIFT_WITHIN = 1e-3
+"""Relative difference of declared and measured rate that is a clock's drift, not another rate."""
+
+RATE_WITHIN = 0.1
+"""Relative difference of declared and measured rate beyond which the declaration is wrong: far
+beyond, resampling would alias or invent."""
+
+MAX_DROPPED = 0.05
+"""Share of rows with unusable stamps beyond which the stamps tell no time."""
+
+MAX_STRETCH = 10
+"""Samples per row beyond which a recording is mostly gap."""
+
+_CHUNK = 1 << 20
+
+
+@dataclass(frozen=True)
+class StampAccount:
+    """What was found in the time stamps.
+
+    Attributes
+    ----------
+    even
+        The samples are kept as they are.
+    measured_rate_hz
+        What the stamps say.
+    jitter_s
+        Largest deviation of a step from the measured period, of steps below 1.5 periods.
+    n_bridged
+        Longer steps that are interpolated across: a sample is missing.
+    n_gaps, longest_gap_s
+        Steps that are filled with NaN instead of values.
+    n_duplicates, n_backward, n_unreadable
+        Rows dropped: a stamp for the second time, before an earlier one, or none.
+    """
+
+    even: bool
+    measured_rate_hz: float
+    jitter_s: float
+    n_bridged: int
+    n_gaps: int
+    longest_gap_s: float
+    n_duplicates: int
+    n_backward: int
+    n_unreadable: int
+
+
+@dataclass(frozen=True)
+class Clock:
+    """The uniform grid that the samples are put on.
+
+    Attributes
+    ----------
+    sampling_rate_hz
+        Of the grid.
+    n_samples
+        Of the grid.
+    start_s
+        Of the grid, on the stamps' scale.
+    kept
+        Rows that are used, None for all.
+    max_gap_s
+        Longest step across which values are interpolated.
+    account
+        What was found.
+    """
+
+    sampling_rate_hz: float
+    n_samples: int
+    start_s: float
+    kept: npt.NDArray[np.bool_] | None
+    max_gap_s: float
+    account: StampAccount
+
+
+def examine(
+    path: Path,
+    source: Name,
+    times_s: Seconds,
+    declared_rate_hz: float | None,
+    max_gap_samples: float,
+) -> Clock:
+    """Find the uniform grid of a recording's time stamps.
+
+    Parameters
+    ----------
+    path, source
+        File and time column, for messages.
+    times_s
+        Stamps, shape (rows,); NaN where unreadable.
+    declared_rate_hz
+        Rate of the grid; None: the measured one.
+    max_gap_samples
+        Longest step, in samples, that is interpolated across.
+
+    Raises
+    ------
+    InputError
+        If the stamps tell no rate, contradict the declared one, or are mostly gap.
+    """
+    if len(times_s) < 3:
+        msg = f"{path}: {len(times_s)} rows are too few; a recording has many cycles"
+        raise InputError(msg)
+    clock = _even_clock(times_s, declared_rate_hz)
+    if clock is None:
+        clock = _uneven_clock(path, source, times_s, declared_rate_hz, max_gap_samples)
+    return clock
+
+
+def resolution_s(times_s: Seconds) -> float:
+    """Return the decimal step that stamps are rounded to, 0 where none shows.
+
+    Examples
+    --------
+    >>> resolution_s(np.round(np.arange(50) / 2048, 3))
+    0.001
+    """
+    steps = times_s[:4096] - times_s[0]
+    for digits in range(10):
+        unit = 10.0**-digits
+        counts = steps / unit
+        if np.all(np.abs(counts - np.round(counts)) < 1e-3):
+            return unit
+    return 0.0
+
+
+def _even_clock(times_s: Seconds, declared_rate_hz: float | None) -> Clock | None:
+    if not all(np.isfinite(times_s[a:b]).all() for a, b in _chunks(len(times_s))):
+        return None
+    period = _fitted_period(times_s)
+    if period <= 0:
+        return None
+    coarse = resolution_s(times_s)
+    # where a stamp's step is nearly a sample, a missing sample would pass as rounding
+    rounding = coarse * (1 - 1e-9) if coarse < period / 2 else 0.0
+    allowed = max(2 * EVEN_WITHIN * period, rounding)
+    if _spread(times_s, period) > allowed:
+        return None
+    measured = 1.0 / period
+    if declared_rate_hz is None:
+        simple = float(f"{measured:.6g}")
+        rate = simple if _spread(times_s, 1.0 / simple) <= allowed else measured
+    elif abs(measured / declared_rate_hz - 1.0) <= DRIFT_WITHIN:
+        rate = declared_rate_hz
+    else:
+        return None
+    jitter = max(float(np.abs(step - period).max()) for step in _steps(times_s))
+    account = StampAccount(True, measured, jitter, 0, 0, 0.0, 0, 0, 0)
+    return Clock(rate, len(times_s), float(times_s[0]), None, 0.0, account)
+
+
+def _uneven_clock(
+    path: Path,
+    source: Name,
+    times_s: Seconds,
+    declared_rate_hz: float | None,
+    max_gap_samples: float,
+) -> Clock:
+    readable = np.isfinite(times_s)
+    latest = np.fmax.accumulate(times_s)
+    # a stamp counts if it is later than every stamp before it
+    kept = readable.copy()
+    kept[1:] &= ~(times_s[1:] <= latest[:-1])
+    repeated = readable[1:] & (times_s[1:] == latest[:-1])
+    n_duplicates = int(repeated.sum())
+    n_unreadable = int((~readable).sum())
+    n_dropped = int((~kept).sum())
+    if n_dropped > MAX_DROPPED * len(times_s) or n_dropped > len(times_s) - 3:
+        msg = (
+            f"{path}: time column {source!r} is unusable in {n_dropped} of {len(times_s)} rows "
+            f"({n_duplicates} repeated, {n_dropped - n_duplicates - n_unreadable} backward, "
+            f"{n_unreadable} unreadable; first: data row {int(np.argmin(kept)) + 1}), "
+            f"at most {MAX_DROPPED:.0%} may be; correct its unit in the map, or drop time and "
+            "give sampling_rate_hz"
+        )
+        raise InputError(msg)
+    step = np.diff(times_s[kept])
+    typical = float(np.median(step))
+    measured = 1.0 / float(step[step < 1.5 * typical].mean())
+    rate = declared_rate_hz or float(f"{measured:.6g}")
+    if abs(measured / rate - 1.0) > RATE_WITHIN:
+        msg = (
+            f"{path}: time column {source!r} says {measured:.6g} Hz, the map {rate:g} Hz, "
+            f"more than {RATE_WITHIN:.0%} apart; correct sampling_rate_hz or time.unit"
+        )
+        raise InputError(msg)
+    max_gap_s = max_gap_samples / rate
+    gaps = step[step > max_gap_s]
+    start_s, stop_s = (float(times_s[kept][i]) for i in (0, -1))
+    n_samples = int((stop_s - start_s) * rate + 1e-6) + 1
+    if n_samples > MAX_STRETCH * len(times_s):
+        msg = (
+            f"{path}: time column {source!r} spans {stop_s - start_s:.6g} s, {n_samples} samples "
+            f"at {rate:g} Hz, with {len(times_s)} rows; it is mostly gap (longest "
+            f"{float(gaps.max()):.6g} s): split the recording there"
+        )
+        raise InputError(msg)
+    regular = step[step < 1.5 / measured]
+    account = StampAccount(
+        even=False,
+        measured_rate_hz=measured,
+        jitter_s=float(np.abs(regular - 1.0 / measured).max()),
+        n_bridged=int(np.sum((step >= 1.5 / measured) & (step <= max_gap_s))),
+        n_gaps=len(gaps),
+        longest_gap_s=float(gaps.max(initial=0.0)),
+        n_duplicates=n_duplicates,
+        n_backward=n_dropped - n_duplicates - n_unreadable,
+        n_unreadable=n_unreadable,
+    )
+    return Clock(rate, n_samples, start_s, kept, max_gap_s, account)
+
+
+def _fitted_period(times_s: Seconds) -> float:
+    """Return the slope of the least-squares line through the stamps."""
+    n = len(times_s)
+    middle = (n - 1) / 2
+    total = 0.0
+    for a, b in _chunks(n):
+        total += float(np.dot(np.arange(a, b) - middle, times_s[a:b] - times_s[0]))
+    return total * 12 / (n * (n * n - 1.0))
+
+
+def _spread(times_s: Seconds, period: float) -> float:
+    """Return the range of the stamps' deviations from evenly spaced ones."""
+    low, high = np.inf, -np.inf
+    for a, b in _chunks(len(times_s)):
+        deviation = times_s[a:b] - times_s[0] - np.arange(a, b) * period
+        low, high = min(low, float(deviation.min())), max(high, float(deviation.max()))
+    return high - low
+
+
+def _steps(times_s: Seconds) -> Iterator[Seconds]:
+    for a, b in _chunks(len(times_s) - 1):
+        yield np.diff(times_s[a : b + 1])
+
+
+def _chunks(n: int) -> Iterator[tuple[int, int]]:
+    for start in range(0, n, _CHUNK):
+        yield start, min(start + _CHUNK, n)

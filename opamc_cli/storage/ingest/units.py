@@ -1,0 +1,105 @@
+"""Units of foreign recordings, converted by declaration and never guessed.
+
+A unit belongs to one quantity: a current declared in degrees is refused, not scaled by chance.
+"""
+
+import math
+from dataclasses import dataclass
+from types import MappingProxyType
+
+QUANTITY_OF_KIND = MappingProxyType(
+    {
+        "a": "current",
+        "b": "current",
+        "c": "current",
+        "current": "current",
+        "position": "position",
+        "velocity": "velocity",
+        "temperature": "temperature",
+    }
+)
+"""Quantity of a run's column by the part of its name after `axisN_`."""
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """A linear conversion to the unit of the run format: value · factor + offset."""
+
+    factor: float
+    offset: float = 0.0
+
+
+CONVERSIONS: dict[str, dict[str, Conversion]] = {
+    "current": {
+        "A": Conversion(1.0),
+        "mA": Conversion(1e-3),
+        "uA": Conversion(1e-6),
+        "kA": Conversion(1e3),
+    },
+    "position": {
+        "rad": Conversion(1.0),
+        "mrad": Conversion(1e-3),
+        "deg": Conversion(math.pi / 180),
+        "rev": Conversion(2 * math.pi),
+    },
+    "velocity": {
+        "rad/s": Conversion(1.0),
+        "deg/s": Conversion(math.pi / 180),
+        "rpm": Conversion(2 * math.pi / 60),
+        "rev/s": Conversion(2 * math.pi),
+    },
+    "temperature": {
+        "degC": Conversion(1.0),
+        "K": Conversion(1.0, -273.15),
+        "degF": Conversion(5 / 9, -160 / 9),
+    },
+    "time": {
+        "s": Conversion(1.0),
+        "ms": Conversion(1e-3),
+        "us": Conversion(1e-6),
+        "ns": Conversion(1e-9),
+        "min": Conversion(60.0),
+        "h": Conversion(3600.0),
+    },
+    "rate": {"Hz": Conversion(1.0), "kHz": Conversion(1e3)},
+}
+"""Conversions to A, rad, rad/s, °C, s and Hz, by quantity and unit."""
+
+SAMPLES = "samples"
+"""Unit of a time column that counts samples; the sampling rate turns it into seconds."""
+
+ISO8601 = "iso8601"
+"""Unit of a time column that holds dates and times, such as 2022-10-26T08:17:21.847Z."""
+
+ALIASES = {
+    "µA": "uA",
+    "°": "deg",
+    "°/s": "deg/s",
+    "1/min": "rpm",
+    "rev/min": "rpm",
+    "°C": "degC",
+    "°F": "degF",
+    "µs": "us",
+    "sec": "s",
+}
+
+
+def conversion(unit: str, quantity: str) -> Conversion | None:
+    """Return how a unit becomes the run format's, or None where it is not known.
+
+    Examples
+    --------
+    >>> conversion("mA", "current").factor
+    0.001
+    >>> conversion("deg", "current") is None
+    True
+    """
+    return CONVERSIONS[quantity].get(ALIASES.get(unit, unit))
+
+
+def known_units(quantity: str) -> str:
+    """Return the units of a quantity, for a message."""
+    names = list(CONVERSIONS[quantity])
+    if quantity == "time":
+        names += [SAMPLES, ISO8601]
+    return ", ".join(names)
