@@ -1,0 +1,164 @@
+"""Verdicts, features and loops as tables for the terminal."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.table import Table
+    from rich.text import Text
+
+    from opamc_cli.stages.report.inputs import ReportInputs
+
+STYLES = {"healthy": "green", "changed": "yellow", "fault": "bold red", "unknown": "dim"}
+
+
+def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
+    """Return a verdict for the terminal: one line if all is well, else a table and what to do.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+    """
+    from rich.console import Group
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    axes = list(verdict.get("axes", ()))
+    states = wording.by_state(verdict)
+    worst = next(iter(states), None)
+    title = Text(wording.headline(verdict), style=_style(worst or "unknown"))
+    if set(states) <= {"healthy"}:
+        known = [a for a in axes if isinstance(a.get("health_index"), int | float)]
+        if known:
+            top = max(known, key=lambda a: float(a["health_index"]))
+            title.append(
+                f" (largest health index {wording.number(top['health_index'])}, "
+                f"axis {top['axis']})",
+                style="dim",
+            )
+        return title
+    table = _table("axis", "state", "health index", "p", "Δμ", "Δσ²", "KS", right=(0, 2, 3, 4, 5, 6))
+    for entry in axes:
+        features = entry.get("features") or {}
+        state = str(entry.get("state"))
+        table.add_row(
+            str(entry.get("axis")),
+            _state(state),
+            wording.number(entry.get("health_index")),
+            wording.p_value(entry.get("p_value")),
+            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+        )
+    lines = []
+    for entry in axes:
+        if entry.get("state") != "healthy":
+            lines.append(_explanation(entry))
+    return Group(title, table, *lines)
+
+
+def feature_table(inputs: "ReportInputs") -> "RenderableType":
+    """Return the features of every axis, for a folder without a verdict."""
+    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.focus import choose_focus, pooled_features
+
+    focus = choose_focus(inputs)
+    table = _table("axis", "order", "Δμ", "Δσ²", "KS", right=(0, 1, 2, 3, 4))
+    for axis in inputs.axes:
+        features = pooled_features(inputs, axis, focus.order[axis]) or {}
+        table.add_row(
+            str(axis),
+            str(focus.order[axis]),
+            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+        )
+    return table
+
+
+def loop_table(loop: Mapping[str, Any]) -> "RenderableType":
+    """Return what the loop found on each axis.
+
+    Parameters
+    ----------
+    loop
+        Content of loop.json.
+    """
+    from rich.console import Group
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    parts: list[RenderableType] = []
+    for entry in loop.get("axes", ()):
+        before = (entry.get("before") or {}).get("rmse_a")
+        after = (entry.get("after") or {}).get("rmse_a")
+        parts.append(
+            Text(
+                printable(
+                    f"Model of axis {entry.get('axis')}: {entry.get('verdict')}, sealed error "
+                    f"{wording.number(before)} A before, {wording.number(after)} A after"
+                ),
+                style="bold",
+            )
+        )
+        steps = entry.get("steps", ())
+        if steps:
+            table = _table(
+                "step", "effect", "meaning", "gain", "decoy", "A before", "A after",
+                right=(0, 3, 4, 5, 6),
+            )
+            for number, step in enumerate(steps, start=1):
+                table.add_row(
+                    str(number),
+                    Text(printable(wording.effect_phrase(step))),
+                    Text(printable(str(step.get("interpretation") or "–"))),
+                    *(
+                        wording.number(step.get(name))
+                        for name in ("gain", "decoy_gain", "rmse_before_a", "rmse_after_a")
+                    ),
+                )
+            parts.append(table)
+    return Group(*parts)
+
+
+def printable(text: str) -> str:
+    """Return text from a file without the control characters that steer a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def _explanation(entry: Mapping[str, Any]) -> "Text":
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    text = Text(f"axis {entry.get('axis')}: ", style="bold")
+    sentences = [printable(str(reason)) for reason in entry.get("reasons", ())]
+    if entry.get("cause"):
+        sentences.append("cause: " + printable(wording.cause_phrase(entry["cause"])))
+    text.append("; ".join(sentences), style="not bold")
+    advice = wording.advice(entry)
+    if advice:
+        text.append(("\n  " if sentences else "") + "→ " + printable(advice), style="not bold")
+    return text
+
+
+def _state(state: str) -> "Text":
+    from rich.text import Text
+
+    from opamc_cli.stages.report.palette import state_sign
+
+    return Text(f"{state_sign(state)} {printable(state)}", style=_style(state))
+
+
+def _style(state: str) -> str:
+    return STYLES.get(state, STYLES["unknown"])
+
+
+def _table(*headings: str, right: tuple[int, ...]) -> "Table":
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for place, heading in enumerate(headings):
+        table.add_column(heading, justify="right" if place in right else "left")
+    return table

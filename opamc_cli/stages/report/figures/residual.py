@@ -1,0 +1,122 @@
+"""The model's residual before and after the loop: over time, angle and speed."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from opamc_cli.stages.report.columns import Columns, select
+from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
+from opamc_cli.stages.report.palette import colour
+
+N_STRETCHES = 400
+N_BINS = 60
+MIN_PER_BIN = 5
+
+SERIES = (("before", "residual_before_a", "target"), ("after", "residual_after_a", "baseline"))
+
+
+def figure(inputs: ReportInputs, axis: int) -> Figure:
+    """Draw one axis's residual."""
+    if inputs.residuals is None:
+        msg = "residuals.parquet is absent"
+        raise NothingToDrawError(msg)
+    rows = select(inputs.residuals, inputs.residuals["axis"] == axis)
+    if not rows["axis"].size:
+        msg = f"residuals.parquet has no row of axis {axis}"
+        raise NothingToDrawError(msg)
+    with style():
+        drawing = canvas(4.4)
+        layout = drawing.add_gridspec(2, 2)
+        over_time = drawing.add_subplot(layout[0, :])
+        _over_time(over_time, rows)
+        for place, (column, label) in enumerate(
+            (("position_rad", "joint angle (rad)"), ("velocity_rad_s", "joint speed (rad/s)"))
+        ):
+            panel = drawing.add_subplot(layout[1, place], sharey=None)
+            _over_quantity(panel, rows, column, label)
+        rms = {name: _rms(rows[column]) for name, column, _ in SERIES}
+        over_time.set_title(
+            f"Axis {axis}   RMS {rms['before']:.3g} A before, {rms['after']:.3g} A after"
+        )
+        return finish(
+            drawing,
+            f"residual-{axis}",
+            f"Residual of axis {axis} before and after",
+            "Measured less modelled current with the declared effects (before) and with those "
+            "that the loop added (after). Above: the range of every stretch of time, moving "
+            "samples one after the other. Below: its RMS where the joint was and how fast it "
+            "moved.",
+            f"Residual current of axis {axis}: RMS {rms['before']:.3g} ampere before and "
+            f"{rms['after']:.3g} ampere after the loop, over time, joint angle and joint speed.",
+        )
+
+
+def _over_time(panel: Axes, rows: Columns) -> None:
+    size = -(-rows["time_s"].size // N_STRETCHES)
+    for name, column, role in SERIES:
+        low, high = _ranges(rows[column], size)
+        middle = np.arange(low.size) * size
+        time = _elapsed(rows["time_s"])[middle]
+        panel.fill_between(
+            time, low, high, color=colour(role), alpha=0.75, linewidth=0.3, label=name, step="mid"
+        )
+    panel.set_xlabel("recorded time, one recording after the other (s)")
+    panel.set_ylabel("residual (A)")
+    panel.legend(loc="upper right", ncols=2)
+    panel.margins(x=0.0)
+
+
+def _elapsed(time: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Time with gaps and jumps back between recordings closed."""
+    step = np.diff(time, prepend=time[:1])
+    usual = float(np.median(step[1:])) if step.size > 1 else 0.0
+    step[(step < 0) | (step > 10 * usual)] = usual
+    return np.asarray(np.cumsum(step))
+
+
+def _ranges(
+    values: NDArray[np.float64], size: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    starts = np.arange(0, values.size, size)
+    clean = np.nan_to_num(values)
+    return np.minimum.reduceat(clean, starts), np.maximum.reduceat(clean, starts)
+
+
+def _over_quantity(panel: Axes, rows: Columns, column: str, label: str) -> None:
+    x = rows[column].astype(np.float64)
+    known = np.isfinite(x)
+    panel.set_xlabel(label)
+    panel.set_ylabel("RMS (A)")
+    if np.unique(x[known]).size < 2:
+        panel.text(0.5, 0.5, "not recorded", ha="center", transform=panel.transAxes)
+        return
+    low, high = np.quantile(x[known], [0.001, 0.999])
+    edges = np.linspace(low, high, N_BINS + 1)
+    place = np.digitize(x, edges) - 1
+    for name, residual, role in SERIES:
+        values = rows[residual]
+        usable = known & np.isfinite(values) & (place >= 0) & (place < N_BINS)
+        count = np.bincount(place[usable], minlength=N_BINS)
+        power = np.bincount(place[usable], values[usable] ** 2, minlength=N_BINS)
+        rms = np.full(N_BINS, np.nan)
+        enough = count >= MIN_PER_BIN
+        rms[enough] = np.sqrt(power[enough] / count[enough])
+        panel.plot(0.5 * (edges[1:] + edges[:-1]), rms, color=colour(role), label=name)
+    panel.set_ylim(bottom=0.0)
+
+
+def _rms(values: NDArray[np.float64]) -> float:
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
+
+
+def loop_axis(inputs: ReportInputs, axis: int) -> Mapping[str, Any]:
+    """Return what the loop says of an axis (empty if nothing)."""
+    for entry in (inputs.loop or {}).get("axes", ()):
+        if entry.get("axis") == axis:
+            return dict(entry)
+    return {}

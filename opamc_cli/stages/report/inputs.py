@@ -1,0 +1,271 @@
+"""What a report is made from: the tables, the verdict and the loop of one output folder."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from opamc_cli.errors import InputError
+from opamc_cli.stages.report.columns import Columns, to_columns
+from opamc_cli.storage.runs import Run, file_sha256
+from opamc_cli.storage.sources import RunSource, read_sources
+from opamc_cli.storage.tables import TABLE_KEY, read_table, table_record
+
+ROLES = ("baseline", "target")
+
+SCORE_COLUMNS = ("role", "run", "axis", "cycle", "motion", "order", "tau", "jsd")
+FEATURE_COLUMNS = ("axis", "motion", "order", "delta_mu", "delta_var", "ks")
+RESIDUAL_COLUMNS = (
+    "axis",
+    "time_s",
+    "position_rad",
+    "velocity_rad_s",
+    "residual_before_a",
+    "residual_after_a",
+)
+SPECTRUM_COLUMNS = ("axis", "order", "before_a", "after_a")
+
+
+class NothingToDrawError(Exception):
+    """A part of the report that its inputs do not allow, with the reason as message."""
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A file that the report was made from.
+
+    Attributes
+    ----------
+    name
+        Path below the output folder.
+    sha256
+        Of its content.
+    record
+        Its provenance, where it is a stage table.
+    """
+
+    name: str
+    sha256: str
+    record: Mapping[str, Any] | None
+
+
+@dataclass(frozen=True)
+class RoleTables:
+    """The tables of the baseline's or the target's runs; None where there is none.
+
+    Attributes
+    ----------
+    motions
+        Identified segments; of `segment` alone where nothing was identified yet.
+    patterns
+        Ordinal counts.
+    sources
+        The runs, in time order as far as they say when they began.
+    config
+        Configuration that the segments were found with.
+    """
+
+    motions: Columns | None
+    patterns: Columns | None
+    sources: tuple[RunSource, ...]
+    config: Mapping[str, Any]
+
+    def run_rank(self) -> dict[str, int]:
+        """Return the place of every run in time order."""
+        return {source.name: rank for rank, source in enumerate(self.sources)}
+
+    def open_run(self, name: str) -> Run:
+        """Open a run whose samples a figure needs.
+
+        Raises
+        ------
+        NothingToDrawError
+            If it is not where the tables or the options say.
+        """
+        for source in self.sources:
+            if source.name == name:
+                if not source.path.exists():
+                    msg = f"the samples of run {name} are not there; name its folder"
+                    raise NothingToDrawError(msg)
+                return source.open()
+        msg = f"no table says where run {name} is"
+        raise NothingToDrawError(msg)
+
+
+@dataclass(frozen=True)
+class ReportInputs:
+    """Everything that a report shows, read once.
+
+    Attributes
+    ----------
+    scores, features
+        Tables of the stage `score`.
+    verdict
+        verdict.json, or None.
+    roles
+        Tables of the baseline and of the target.
+    loop, residuals, spectrum
+        What `opamc model close` left, or None.
+    files
+        Every file that was read.
+    """
+
+    scores: Columns
+    features: Columns
+    verdict: Mapping[str, Any] | None
+    roles: Mapping[str, RoleTables]
+    loop: Mapping[str, Any] | None
+    residuals: Columns | None
+    spectrum: Columns | None
+    files: tuple[SourceFile, ...] = field(default=())
+
+    @property
+    def axes(self) -> list[int]:
+        """Axes with scores, ascending."""
+        return sorted({int(axis) for axis in self.scores["axis"]})
+
+    def axis_verdict(self, axis: int) -> Mapping[str, Any] | None:
+        """Return what the verdict says of an axis, if anything."""
+        for entry in (self.verdict or {}).get("axes", ()):
+            if entry.get("axis") == axis:
+                return dict(entry)
+        return None
+
+    def state(self, axis: int) -> str | None:
+        """Return the state of an axis, if the verdict names one."""
+        entry = self.axis_verdict(axis)
+        return None if entry is None else str(entry.get("state"))
+
+
+def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInputs:
+    """Read what an output folder holds for a report.
+
+    Parameters
+    ----------
+    out
+        The folder; scores.parquet and features.parquet must be in it, all else may be.
+    moved_to
+        For each role the folders or files where its runs are now.
+
+    Raises
+    ------
+    InputError
+        If scores or features are missing, or any file is damaged or of another kind.
+    """
+    files: list[SourceFile] = []
+
+    def note(path: Path, record: Mapping[str, Any] | None) -> None:
+        files.append(SourceFile(path.relative_to(out).as_posix(), file_sha256(path), record))
+
+    def stage_table(name: str, needed: Sequence[str]) -> Columns:
+        path = out / name
+        table = read_table(path, "score")
+        _need_columns(path, table, needed)
+        note(path, table_record(path, table.schema.metadata))
+        return to_columns(table)
+
+    def optional_table(name: str, needed: Sequence[str]) -> Columns | None:
+        path = out / name
+        if not path.exists():
+            return None
+        table = _read_parquet(path)
+        _need_columns(path, table, needed)
+        metadata = table.schema.metadata or {}
+        note(path, table_record(path, metadata) if TABLE_KEY in metadata else None)
+        return to_columns(table)
+
+    def optional_json(name: str) -> Mapping[str, Any] | None:
+        path = out / name
+        if not path.exists():
+            return None
+        note(path, None)
+        return _read_json(path)
+
+    scores = stage_table("scores.parquet", SCORE_COLUMNS)
+    features = stage_table("features.parquet", FEATURE_COLUMNS)
+    verdict = optional_json("verdict.json")
+    roles = {}
+    for role in ROLES:
+        motions = optional_table(f"{role}/motions.parquet", ("run", "axis", "start", "stop"))
+        segments = optional_table(f"{role}/segments.parquet", ("run", "axis", "start", "stop"))
+        roles[role] = RoleTables(
+            motions=motions if motions is not None else segments,
+            patterns=optional_table(
+                f"{role}/patterns.parquet", ("axis", "motion", "order", "counts")
+            ),
+            sources=_sources(out, role, moved_to.get(role, ())),
+            config=_recorded_config(files, role),
+        )
+    return ReportInputs(
+        scores=scores,
+        features=features,
+        verdict=verdict,
+        roles=roles,
+        loop=optional_json("loop.json"),
+        residuals=optional_table("residuals.parquet", RESIDUAL_COLUMNS),
+        spectrum=optional_table("order_spectrum.parquet", SPECTRUM_COLUMNS),
+        files=tuple(files),
+    )
+
+
+def _read_parquet(path: Path) -> pa.Table:
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            return file.read()
+    except (pa.ArrowException, OSError) as error:
+        reason = str(error).strip().splitlines()[0]
+        msg = f"{path}: cannot be read as Parquet ({reason}); make it again or remove it"
+        raise InputError(msg) from error
+
+
+def _read_json(path: Path) -> Mapping[str, Any]:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        msg = f"{path}: cannot be read as JSON ({error}); make it again or remove it"
+        raise InputError(msg) from error
+    axes = values.get("axes") if isinstance(values, dict) else None
+    if not isinstance(axes, list) or not all(isinstance(a, dict) and "axis" in a for a in axes):
+        msg = f"{path}: holds no list 'axes' of objects with 'axis'; make it again or remove it"
+        raise InputError(msg)
+    return dict(values)
+
+
+def _need_columns(path: Path, table: pa.Table, needed: Sequence[str]) -> None:
+    missing = [name for name in needed if name not in table.column_names]
+    if missing:
+        msg = f"{path}: column {missing[0]} is missing; make the table again with this opamc"
+        raise InputError(msg)
+
+
+def _sources(out: Path, role: str, moved_to: Sequence[Path]) -> tuple[RunSource, ...]:
+    for name in ("segments.parquet", "motions.parquet", "patterns.parquet"):
+        path = out / role / name
+        if not path.exists():
+            continue
+        record = table_record(path, pq.read_schema(path).metadata)
+        if "runs" in record:
+            found = read_sources(path, moved_to)
+            return tuple(sorted(found, key=lambda s: (s.info.started_at or "", s.name)))
+    return ()
+
+
+def _recorded_config(files: Sequence[SourceFile], role: str) -> Mapping[str, Any]:
+    config: dict[str, Any] = {}
+    for file in files:
+        if file.name.startswith(f"{role}/") and file.record is not None:
+            config.update(file.record.get("config", {}))
+    return config
+
+
+def time_order(columns: Columns, rank: Mapping[str, int]) -> np.ndarray[Any, np.dtype[np.intp]]:
+    """Return the order of rows by run in time, then by their place in the run."""
+    unknown = len(rank)
+    runs = np.array([rank.get(str(run), unknown) for run in columns["run"]], dtype=np.intp)
+    within = [columns[name] for name in ("segment", "motion", "cycle") if name in columns]
+    return np.asarray(np.lexsort((*within, runs)))

@@ -1,0 +1,160 @@
+"""The sentences of a verdict, the same in the terminal and on the page."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
+
+
+def axes_phrase(axes: Sequence[int]) -> str:
+    """Return "axis 3", "axes 1 and 4" or "axes 1-6"."""
+    numbers = sorted(axes)
+    if not numbers:
+        return "no axis"
+    if len(numbers) == 1:
+        return f"axis {numbers[0]}"
+    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
+        return f"axes {numbers[0]}-{numbers[-1]}"
+    return "axes " + ", ".join(str(n) for n in numbers[:-1]) + f" and {numbers[-1]}"
+
+
+def by_state(verdict: Mapping[str, Any]) -> dict[str, list[int]]:
+    """Return the axes of each state, worst state first, without empty ones."""
+    axes = verdict.get("axes", ())
+    return {
+        state: found
+        for state in STATE_ORDER
+        if (found := [int(a["axis"]) for a in axes if a.get("state") == state])
+    }
+
+
+def headline(verdict: Mapping[str, Any]) -> str:
+    """Return the verdict in one sentence."""
+    states = by_state(verdict)
+    phrases = {
+        "fault": "at fault",
+        "changed": "changed",
+        "insufficient-data": "not judged for want of data",
+        "healthy": "healthy",
+    }
+    parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
+    if not parts:
+        return "No axis was judged"
+    text = "; ".join(parts)
+    return text[0].upper() + text[1:]
+
+
+def number(value: object, digits: int = 3) -> str:
+    """Return a number in few digits, or a dash where there is none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}g}"
+    if "e" in text:
+        mantissa, _, exponent = text.partition("e")
+        text = f"{mantissa}e{int(exponent)}"
+    return text.replace("-", "−")
+
+
+def p_value(value: object) -> str:
+    """Return a p-value as it is usually printed: not smaller than "< 0.0001"."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return "–"
+    return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
+
+
+def cause_phrase(cause: Mapping[str, Any] | None) -> str:
+    """Return a cause in one phrase: effect, its parameters, meaning and share."""
+    if not cause:
+        return "–"
+    text = str(cause.get("effect", cause.get("name", "unnamed")))
+    parameters = cause.get("parameters")
+    if isinstance(parameters, Mapping) and parameters:
+        text += " (" + ", ".join(f"{k} {_plain(v)}" for k, v in sorted(parameters.items())) + ")"
+    if cause.get("interpretation"):
+        text += f": {cause['interpretation']}"
+    share = cause.get("share")
+    if isinstance(share, int | float) and not isinstance(share, bool):
+        text += f"; explains {100 * share:.0f} % of the change"
+    return text
+
+
+def advice(entry: Mapping[str, Any]) -> str | None:
+    """Return what to do about an axis, or None where nothing is to be done.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
+    cause = entry.get("cause") or {}
+    for key in ("inspect", "action", "advice"):
+        if cause.get(key):
+            return str(cause[key])
+    state = entry.get("state")
+    axis = entry.get("axis")
+    if state == "fault":
+        return (
+            f"Inspect the strain wave gear of axis {axis} (flexspline teeth, wave generator "
+            "bearing, lubricant); the current alone does not say which part."
+        )
+    if state == "changed":
+        return (
+            f"Check what differs on axis {axis} since the baseline: payload, program, "
+            "temperature, lubricant; record again, then judge."
+        )
+    if state == "insufficient-data":
+        return f"Record more cycles of axis {axis} and diagnose again."
+    return None
+
+
+def loop_phrase(verdict: object) -> str:
+    """Return the loop's verdict on one joint in plain words."""
+    return {
+        "nothing-missing": "nothing is missing: the declared effects explain what can be explained",
+        "closed": "closed: the effects added explain what the declared ones left over",
+        "partial": "partly closed: effects were added, and something reproducible is left over",
+        "not-in-library": "something reproducible is left over that no effect in the library fits",
+    }.get(str(verdict), str(verdict))
+
+
+def _plain(value: object) -> str:
+    return number(value, 4) if isinstance(value, int | float) else str(value)
+
+
+def effect_phrase(step: Mapping[str, Any]) -> str:
+    """Return a step's effect with its parameters."""
+    return cause_phrase(
+        {"effect": step.get("effect", "unnamed"), "parameters": step.get("parameters")}
+    )
+
+
+def set_aside(item: object) -> str:
+    """Return a rejected or untestable effect with the reason, in whatever form it comes."""
+    if not isinstance(item, Mapping):
+        return str(item)
+    reason = next((item[key] for key in ("why", "reason") if item.get(key)), None)
+    text = effect_phrase(item)
+    return f"{text}: {reason}" if reason else text
+
+
+def remains(entry: Mapping[str, Any]) -> str:
+    """Return what a loop left unexplained, in one sentence.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
+    after = (entry.get("after") or {}).get("rmse_a")
+    floor = entry.get("floor_a")
+    share = entry.get("explained_share")
+    parts = []
+    if isinstance(after, int | float):
+        parts.append(f"the sealed error is {number(after)} A")
+    if isinstance(floor, int | float):
+        parts.append(f"{number(floor)} A of it does not repeat and cannot be modelled")
+    if isinstance(share, int | float):
+        parts.append(f"{100 * share:.0f} % of what could be explained is explained")
+    text = "; ".join(parts) or "loop.json does not say"
+    return text[0].upper() + text[1:] + "."
