@@ -1,0 +1,252 @@
+"""In which domain a residual is structured, and how much of it any effect could explain.
+
+A domain is seen through a flexible basis: hat functions over the covariate, without any claim
+about the form. What such a basis predicts in groups that it was not fitted to is structure; what
+is left of it after an effect was added says that the effect has the wrong form.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import gamma
+
+from opamc_cli.joint.model import Fit
+from opamc_cli.joint.normal import held_out_error, normal_equations
+from opamc_cli.joint.spectra import (
+    LOWEST_ORDER,
+    OVERSAMPLING,
+    frequency_lines,
+    order_resolution,
+    order_spectrum,
+)
+from opamc_cli.joint.trace import prepare, residual_on
+from opamc_cli.joint.track import Floats, Track
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Held-out share of the residual's mean square that a domain's flexible basis explains."""
+
+    domain: str
+    gain: float
+    t_value: float
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """What any reproducible effect could explain, and what nothing can.
+
+    Attributes
+    ----------
+    share : float
+        Share of the residual's mean square that repeats, at least 0.
+    t_value : float
+        Of that share.
+    how : str
+        "cycles" (covariance of cycles at equal times) or "domains" (best flexible basis).
+    """
+
+    share: float
+    t_value: float
+    how: str
+
+
+def hats(values: Floats, knots: Floats) -> Floats:
+    """Linear interpolation weights of values on knots.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+        Covariate.
+    knots : array of shape (k,)
+        Ascending; values beyond the ends take the end's weight.
+
+    Returns
+    -------
+    array of shape (n, k)
+        Rows sum to one.
+    """
+    weights = np.zeros((values.size, knots.size))
+    if knots.size == 1:
+        weights[:, 0] = 1.0
+        return weights
+    inside = np.clip(values, knots[0], knots[-1])
+    left = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
+    share = (inside - knots[left]) / (knots[left + 1] - knots[left])
+    rows = np.arange(values.size)
+    weights[rows, left] = 1 - share
+    weights[rows, left + 1] = share
+    return weights
+
+
+def _knots(values: Floats, count: int) -> Floats:
+    found: Floats = np.unique(np.quantile(values, np.linspace(0.005, 0.995, count)))
+    return found
+
+
+def _even(values: Floats, count: int) -> Floats:
+    return np.linspace(float(values.min()), float(values.max()), count)
+
+
+def flexible_bases(track: Track, rows: np.ndarray) -> dict[str, Floats]:
+    """Bases of all domains that a track has, on the given samples.
+
+    Parameters
+    ----------
+    track : Track
+        With fitted load.
+    rows : bool array of shape (n,)
+        Samples wanted.
+
+    Returns
+    -------
+    dict of str to array of shape (m, k)
+    """
+    sign = track.sign[rows]
+    forward = (sign > 0)[:, None]
+    speed = np.abs(track.velocity[rows])
+    position = track.position_rad[rows]
+    time = track.time_s[rows]
+    velocity = track.velocity[rows]
+
+    def both_ways(weights: Floats) -> Floats:
+        return np.concatenate([weights * forward, weights * ~forward], axis=1)
+
+    bases = {
+        "velocity": both_ways(hats(speed, _knots(speed, 9))),
+        "joint-angle": both_ways(hats(position, _even(position, 25))),
+        "acceleration": hats(track.acceleration[rows], _knots(track.acceleration[rows], 12)),
+        "time": np.concatenate(
+            [
+                hats(time, _even(time, 5)) * velocity[:, None],
+                hats(time, _even(time, 5)) * sign[:, None],
+                hats(time, _even(time, 5)),
+            ],
+            axis=1,
+        ),
+    }
+    load = np.abs(track.load_a[rows])
+    if load.size and load.std() > 0:
+        bases["load"] = both_ways(hats(load, _knots(load, 7)))
+    if track.temperature_c is not None:
+        degrees = track.temperature_c[rows]
+        if np.ptp(degrees) > 0.3:
+            weights = hats(degrees, _even(degrees, 4))
+            bases["temperature"] = np.concatenate(
+                [weights * velocity[:, None], weights * sign[:, None]], axis=1
+            )
+    return bases
+
+
+def structures(fit: Fit) -> list[Structure]:
+    """Held-out gain of every domain's flexible basis, and the lines of the periodic domains.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+
+    Returns
+    -------
+    list of Structure
+        Largest gain first; motor-angle and frequency hold the share of their significant lines.
+    """
+    session = fit.session
+    grid = session.coarse
+    rows = grid.fit
+    residual = residual_on(fit, fine=False)[rows]
+    blocks = [session.columns(term, fine=False)[rows] for term in fit.terms]
+    width = sum(block.shape[1] for block in blocks)
+    found = []
+    for domain, basis in flexible_bases(grid.track, rows).items():
+        design = np.concatenate([*blocks, basis], axis=1)
+        normal = normal_equations(design, residual, grid.slices)
+        before = held_out_error(normal.taken(list(range(width))))
+        falls = before - held_out_error(normal, ridged=basis.shape[1])
+        found.append(_structure(domain, falls, before))
+    found += _line_structures(fit)
+    return sorted(found, key=lambda structure: -structure.gain)
+
+
+def _structure(domain: str, falls: Floats, before: Floats) -> Structure:
+    spread = float(np.std(falls, ddof=1)) if falls.size > 1 else 0.0
+    t_value = float(falls.mean() / (spread / np.sqrt(falls.size))) if spread > 0 else 0.0
+    return Structure(domain, float(falls.sum() / max(before.sum(), 1e-300)), t_value)
+
+
+def _line_structures(fit: Fit) -> list[Structure]:
+    view = prepare(fit, fine=True)
+    track = view.grid.track
+    found = []
+    orders, power, classes = order_spectrum(track, view.residual)
+    first = int(
+        np.searchsorted(orders, max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track)))
+    )
+    if orders.size - first > 8:
+        trials = (orders.size - first) / OVERSAMPLING
+        height = float(power[first:].max())
+        if height > gamma.isf(1e-4 / trials, classes):
+            share = 2 * height / classes / max(int(view.valid.sum()), 1) * classes
+            found.append(Structure("motor-angle", min(share, 1.0), float(np.sqrt(height))))
+    frequencies, lines = frequency_lines(view.residual, track.rate_hz)
+    upper = frequencies > 5.0
+    if upper.any():
+        height = float(lines[upper].max())
+        if height > gamma.isf(1e-4 / upper.sum(), 1):
+            share = 2 * height / max(int(view.valid.sum()), 1)
+            found.append(Structure("frequency", min(share, 1.0), float(np.sqrt(height))))
+    return found
+
+
+def ceiling(fit: Fit, seen: list[Structure]) -> Ceiling:
+    """Share of the residual's mean square that repeats from cycle to cycle.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    seen : list of Structure
+        From `structures`, for motions that do not repeat.
+
+    Returns
+    -------
+    Ceiling
+        The larger of the cycles' covariance at equal times (unbiased: no cycle is compared with
+        itself) and the best flexible basis.
+    """
+    best = max(seen, key=lambda structure: structure.gain, default=Structure("", 0.0, 0.0))
+    by_domain = Ceiling(max(best.gain, 0.0), best.t_value, "domains")
+    by_cycle = _cycle_ceiling(fit)
+    if by_cycle is None or by_cycle.share < by_domain.share:
+        return by_domain
+    return by_cycle
+
+
+def _cycle_ceiling(fit: Fit) -> Ceiling | None:
+    grid = fit.session.fine
+    period = grid.track.period_samples
+    if period is None:
+        return None
+    curves, masks = [], []
+    for start, stop in grid.track.bounds:
+        for begin in range(start, stop - period + 1, period):
+            mask = grid.fit[begin : begin + period]
+            if mask.any():
+                curves.append(np.where(mask, fit.residual_a[begin : begin + period], 0.0))
+                masks.append(mask)
+    if len(curves) < 2:
+        return None
+    values = np.stack(curves)
+    valid = np.stack(masks).astype(float)
+    products = []
+    energy = float((values**2).sum() / max(valid.sum(), 1.0))
+    total, total_mask = values.sum(axis=0), valid.sum(axis=0)
+    for curve, mask in zip(values, valid, strict=True):
+        others = np.where(total_mask - mask > 0, (total - curve), 0.0)
+        count = np.maximum(total_mask - mask, 1.0)
+        overlap = float((mask * (total_mask - mask > 0)).sum())
+        products.append(float((curve * others / count).sum()) / max(overlap, 1.0))
+    shares = np.array(products) / max(energy, 1e-300)
+    spread = float(np.std(shares, ddof=1))
+    t_value = float(shares.mean() / (spread / np.sqrt(shares.size))) if spread > 0 else 0.0
+    return Ceiling(max(float(shares.mean()), 0.0), t_value, "cycles")

@@ -1,0 +1,1 @@
+"""The vocabulary: one effect per file."""

@@ -1,0 +1,23 @@
+"""Friction that differs between the directions."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class AsymmetricFriction(Effect):
+    """Dry and lubricant friction of one direction against the other."""
+
+    name = "asymmetric_friction"
+    domain = "velocity"
+    meaning = "friction differs between directions: check bearing preload and seal lips"
+    needs = ("position",)
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Half the difference of dry (a constant) and of lubricant friction."""
+        return stack(np.ones(track.size), np.abs(track.velocity))
+
+    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
+        """The difference may lie in the slope or in the dry friction alone."""
+        return [(parameters | {"dry": 0.0}, (1,)), (parameters | {"slope": 0.0}, (0,))]

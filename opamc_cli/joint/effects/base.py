@@ -1,0 +1,92 @@
+"""What every effect in the library says of itself."""
+
+from typing import ClassVar
+
+import numpy as np
+
+from opamc_cli.joint.track import Floats, Track
+
+Parameters = dict[str, float]
+
+CHANNEL_REASONS = {
+    "position": "no position, and the phases give no angle",
+    "scale": "the joint angle's scale is unknown: log the position, or give gear_ratio and "
+    "pole_pairs",
+    "temperature": "no temperature channel",
+    "electrical": "no phase currents, and no pole_pairs to tell the electrical angle",
+}
+
+
+class Effect:
+    """One thing that adds to a joint's motor current.
+
+    A subclass in a file of its own is a complete effect: name, domain, meaning to a maintainer,
+    what it needs, and its regressors. A user's effect is the same.
+    """
+
+    name: ClassVar[str] = ""
+    domain: ClassVar[str] = ""
+    meaning: ClassVar[str] = ""
+    needs: ClassVar[tuple[str, ...]] = ()
+    fast: ClassVar[bool] = False
+    """True where the regressors change too fast for a decimated grid."""
+    several: ClassVar[bool] = False
+    """True where a joint can have the effect more than once (several ripple orders)."""
+    static: ClassVar[bool] = True
+    """True where the effect takes part in the load or friction that other effects scale."""
+    carries_load: ClassVar[bool] = False
+    """True where the effect is load: what gravity, inertia and springs ask of the motor."""
+
+    def untestable(self, track: Track) -> str | None:
+        """Why the recording cannot show this effect, or None where it can."""
+        for channel in self.needs:
+            if channel not in track.channels:
+                return CHANNEL_REASONS.get(channel, f"no {channel}")
+        return None
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Non-linear parameters to start from; one empty guess where there are none.
+
+        Parameters
+        ----------
+        track : Track
+            The recording at the rate at which the effect is evaluated.
+        residual : array of shape (n,)
+            Whitened residual, zero where samples do not count.
+        """
+        return [{}]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Bounds of the non-linear parameters that may be refined."""
+        return {}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Regressors, shape (n, m), for given non-linear parameters."""
+        raise NotImplementedError
+
+    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
+        """Smaller forms of the effect: parameters and the columns that they keep."""
+        return []
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Tell whether coefficients have the sign that physics gives this effect."""
+        return True
+
+    def settled(self, parameters: Parameters, track: Track) -> Parameters:
+        """Parameters moved to a value with a meaning where the data cannot tell the difference."""
+        return parameters
+
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """What the effect with these parameters means to a maintainer."""
+        return self.meaning
+
+
+def stack(*columns: Floats) -> Floats:
+    """Put regressors side by side."""
+    stacked: Floats = np.stack(columns, axis=1)
+    return stacked
+
+
+def geometric(low: float, high: float, count: int) -> list[float]:
+    """Values from low to high at a constant ratio."""
+    return [float(value) for value in np.geomspace(low, high, count)]

@@ -1,0 +1,21 @@
+"""Dry friction."""
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class Coulomb(Effect):
+    """Friction that knows the direction but not the speed."""
+
+    name = "coulomb"
+    domain = "velocity"
+    meaning = "dry friction of bearings and seals: check the preload"
+    needs = ("position",)
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Direction of motion."""
+        return stack(track.sign)
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Friction resists."""
+        return bool(coefficients[0] > 0)

@@ -1,0 +1,39 @@
+"""Dead time of the inverter."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class DeadTime(Effect):
+    """Every phase loses a constant against its sign: six-fold per electrical revolution.
+
+    References
+    ----------
+    Jeong and Park, IEEE Transactions on Industrial Electronics 38, 1991.
+    """
+
+    name = "dead_time"
+    domain = "electrical"
+    meaning = "dead time of the inverter is not compensated: check the drive's setting"
+    needs = ("electrical",)
+    fast = True
+    electrical_order = 6
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """The six-step wave itself, and its first harmonic as the current loop leaves it."""
+        return [{"six_step": 1.0}, {"six_step": 0.0}]
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Torque part of three square waves, or the sixth harmonic alone."""
+        assert track.electrical_rad is not None
+        angle = track.electrical_rad
+        side = np.sign(track.model_a)
+        if parameters["six_step"]:
+            torque = np.zeros(track.size)
+            for phase in range(3):
+                phase_angle = np.cos(angle - 2 * np.pi * phase / 3)
+                torque += 2 / 3 * np.sign(phase_angle) * phase_angle
+            return stack(side * (torque - 4 / np.pi))
+        return stack(side * np.cos(6 * angle), side * np.sin(6 * angle))

@@ -1,0 +1,76 @@
+"""Friction that builds up over some travel after a reversal."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class Hysteresis(Effect):
+    """Dahl's presliding friction: the torque follows the direction over a length of travel.
+
+    References
+    ----------
+    Dahl, AIAA Journal 14, 1976.
+    """
+
+    name = "hysteresis"
+    domain = "joint-angle"
+    meaning = "torque lags behind after reversals: check gear preload and backlash"
+    needs = ("position",)
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Lengths from a hundredth to half of the travel."""
+        span = self._span(track)
+        return [{"length_rad": length} for length in geometric(span / 100, span / 2, 9)]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """From a two-hundredth of the travel to all of it."""
+        span = self._span(track)
+        return {"length_rad": (span / 200, span)}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """State of Dahl's model, +-1 where it has settled."""
+        state = np.empty(track.size)
+        for start, stop in track.bounds:
+            state[start:stop] = dahl_state(track.position_rad[start:stop], parameters["length_rad"])
+        return stack(state)
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Friction resists."""
+        return bool(coefficients[0] > 0)
+
+    @staticmethod
+    def _span(track: Track) -> float:
+        return float(np.ptp(track.position_rad[track.moving]))
+
+
+def dahl_state(position_rad: Floats, length_rad: float) -> Floats:
+    """Solve Dahl's equation ``dz/dq = (1 - z sgn(dq)) / length`` along a path.
+
+    Parameters
+    ----------
+    position_rad : array of shape (n,)
+        Path, in any order of directions.
+    length_rad : float
+        Travel over which the state settles, above 0.
+
+    Returns
+    -------
+    array of shape (n,)
+        State between -1 and 1, starting at 0; exact for a path that is monotone between samples.
+    """
+    steps = np.diff(position_rad, prepend=position_rad[:1])
+    direction = np.sign(steps)
+    # Stand-still keeps the direction of the last move, so that stretches are few.
+    index = np.maximum.accumulate(np.where(direction != 0, np.arange(steps.size), 0))
+    direction = direction[index]
+    edges = np.flatnonzero(np.diff(direction) != 0) + 1
+    state = np.zeros(position_rad.size)
+    before = 0.0
+    for start, stop in zip([0, *edges], [*edges, position_rad.size], strict=True):
+        travelled = np.cumsum(np.abs(steps[start:stop]))
+        target = direction[start]
+        state[start:stop] = target + (before - target) * np.exp(-travelled / length_rad)
+        before = state[stop - 1]
+    return state

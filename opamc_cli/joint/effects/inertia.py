@@ -1,0 +1,18 @@
+"""Torque that accelerates rotor and links."""
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class Inertia(Effect):
+    """Current in proportion to the acceleration."""
+
+    name = "inertia"
+    domain = "acceleration"
+    meaning = "mass that is accelerated; not a fault in itself"
+    needs = ("position",)
+    carries_load = True
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Acceleration."""
+        return stack(track.acceleration)

@@ -1,0 +1,43 @@
+"""A load that is not the same all the time."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class PayloadChange(Effect):
+    """Gravity and inertia that step at some time."""
+
+    name = "payload_change"
+    domain = "load"
+    meaning = "the payload has changed: check the tool, not the gear"
+    needs = ("scale",)
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """A step between any two groups, or at a sixteenth of the session."""
+        groups = track.group
+        edges = np.flatnonzero(np.diff(groups) != 0) + 1
+        times = {float(track.time_s[edge]) for edge in edges}
+        length = float(track.time_s[-1] - track.time_s[0])
+        inside = [t for t in sorted(times) if 0.05 < (t - track.time_s[0]) / length < 0.95]
+        if len(inside) > 40:
+            inside = inside[:: -(-len(inside) // 40)]
+        return [{"since_s": time} for time in inside]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Anywhere in the session."""
+        return {"since_s": (float(track.time_s[0]), float(track.time_s[-1]))}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Gravity's and inertia's regressors after the step."""
+        after = (track.time_s >= parameters["since_s"]).astype(float)
+        return stack(
+            after * np.sin(track.position_rad),
+            after * np.cos(track.position_rad),
+            after * track.acceleration,
+        )
+
+    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
+        """The inertia's step may be too small to see."""
+        return [(parameters | {"inertia": 0.0}, (0, 1))]

@@ -1,0 +1,48 @@
+"""Friction at one place of the joint's travel."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class PositionDrag(Effect):
+    """A dragging place of some width: friction that depends on the angle."""
+
+    name = "position_drag"
+    domain = "joint-angle"
+    meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
+    needs = ("position",)
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Places over the whole travel, widths from a sixtieth to a fifth of it."""
+        low, high = self._travel(track)
+        span = high - low
+        return [
+            {"place_rad": float(place), "width_rad": width, "flatness": 2.0}
+            for width in geometric(span / 60, span / 5, 5)
+            for place in np.arange(low, high + width / 2, max(0.8 * width, span / 50))
+        ]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Within the travel; not wider than a third of it, or it is not a place."""
+        low, high = self._travel(track)
+        return {
+            "place_rad": (low, high),
+            "width_rad": ((high - low) / 150, (high - low) / 3.5),
+            "flatness": (1.2, 8.0),
+        }
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Direction times a bell over the angle."""
+        away = np.abs(track.position_rad - parameters["place_rad"]) / parameters["width_rad"]
+        return stack(track.sign * np.exp(-0.5 * away ** parameters["flatness"]))
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Friction resists."""
+        return bool(coefficients[0] > 0)
+
+    @staticmethod
+    def _travel(track: Track) -> tuple[float, float]:
+        position = track.position_rad[track.moving]
+        return float(position.min()), float(position.max())

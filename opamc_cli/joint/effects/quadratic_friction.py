@@ -1,0 +1,23 @@
+"""Drag that grows with the square of the speed."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class QuadraticFriction(Effect):
+    """Churning and windage losses."""
+
+    name = "quadratic_friction"
+    domain = "velocity"
+    meaning = "churning losses: too much grease"
+    needs = ("position",)
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Signed square of the speed."""
+        return stack(track.velocity * np.abs(track.velocity))
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Drag resists."""
+        return bool(coefficients[0] > 0)

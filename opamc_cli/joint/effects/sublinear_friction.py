@@ -1,0 +1,32 @@
+"""Friction that grows more slowly than the speed."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class SublinearFriction(Effect):
+    """A power of the speed below one: shear-thinning grease."""
+
+    name = "sublinear_friction"
+    domain = "velocity"
+    meaning = "shear-thinning or starved lubricant: check the grease grade"
+    needs = ("position",)
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Exponents between a constant and a straight line."""
+        return [{"exponent": exponent} for exponent in (0.15, 0.3, 0.45, 0.6, 0.75)]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Neither a constant nor a straight line."""
+        return {"exponent": (0.1, 0.85)}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Signed power of the speed, relative to the top speed."""
+        ratio = np.abs(track.velocity) / track.speed_scale
+        return stack(track.sign * ratio ** parameters["exponent"])
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Friction resists."""
+        return bool(coefficients[0] > 0)

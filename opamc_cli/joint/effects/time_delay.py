@@ -1,0 +1,42 @@
+"""A current that comes later, or earlier, than the motion it belongs to."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class TimeDelay(Effect):
+    """The whole model's current, shifted in time."""
+
+    name = "time_delay"
+    domain = "time"
+    meaning = "current and motion are logged with a delay: check the logger's clocks"
+    needs = ("position",)
+    static = False
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Up to 60 ms either way."""
+        return [
+            {"delay_s": sign * delay}
+            for sign in (-1.0, 1.0)
+            for delay in (0.002, 0.005, 0.01, 0.02, 0.035, 0.06)
+        ]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Up to 120 ms either way."""
+        return {"delay_s": (-0.12, 0.12)}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Shifted model current less the model current."""
+        change = np.empty(track.size)
+        for start, stop in track.bounds:
+            model = track.model_a[start:stop]
+            times = np.arange(model.size) / track.rate_hz
+            shifted = np.interp(times - parameters["delay_s"], times, model)
+            change[start:stop] = shifted - model
+        return stack(change)
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """The model's current is moved, not multiplied."""
+        return bool(0.4 < coefficients[0] < 2.5)

@@ -1,0 +1,21 @@
+"""Lubricant friction."""
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.track import Floats, Track
+
+
+class Viscous(Effect):
+    """Friction in proportion to the speed, and the motor's own damping."""
+
+    name = "viscous"
+    domain = "velocity"
+    meaning = "lubricant friction: check grease amount and grade"
+    needs = ("position",)
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Speed."""
+        return stack(track.velocity)
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Friction resists."""
+        return bool(coefficients[0] > 0)

@@ -1,0 +1,312 @@
+"""From recordings to a track: motion by local polynomials, torque current with its sign."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from opamc_cli.joint.phases import PhaseAngle, follow_phases, torque_current
+from opamc_cli.joint.smoothing import derivatives, measurement_noise, smoothing_window
+from opamc_cli.joint.track import Bools, Floats, Joint, Track
+
+SLOWEST_SHARE = 0.02
+"""Samples below this share of the top speed do not count: their direction is not certain."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One joint's samples of one run, as they were logged.
+
+    Attributes
+    ----------
+    name : str
+        Name of the run.
+    rate_hz : float
+        Sampling rate.
+    current_a : array of shape (n,) or None
+        Reported torque current, signed.
+    phases_a : array of shape (n, 3) or None
+        Phase currents.
+    position_rad, velocity_rad_s, temperature_c : array of shape (n,) or None
+        Joint side.
+    started_s : float or None
+        Start of the run on a clock common to all runs.
+    """
+
+    name: str
+    rate_hz: float
+    current_a: Floats | None = None
+    phases_a: Floats | None = None
+    position_rad: Floats | None = None
+    velocity_rad_s: Floats | None = None
+    temperature_c: Floats | None = None
+    started_s: float | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        for values in (self.current_a, self.phases_a, self.position_rad):
+            if values is not None:
+                return int(values.shape[0])
+        return 0
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Smoothed motion of one recording and the window (samples) it was smoothed over."""
+
+    position_rad: Floats
+    velocity: Floats
+    acceleration: Floats
+    window: int
+
+
+def motion_from_position(
+    position_rad: Floats, velocity_rad_s: Floats | None, rate_hz: float
+) -> Motion:
+    """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
+
+    Parameters
+    ----------
+    position_rad : array of shape (n,)
+        Logged position.
+    velocity_rad_s : array of shape (n,) or None
+        Logged speed: used where it agrees with the position and is the cleaner of the two.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    Motion
+    """
+    window = smoothing_window(position_rad, rate_hz, derivative=2)
+    position = derivatives(position_rad, rate_hz, window, 0)
+    velocity = derivatives(position_rad, rate_hz, window, 1)
+    acceleration = derivatives(position_rad, rate_hz, window, 2)
+    if velocity_rad_s is not None and window > 5:
+        speed = velocity_rad_s
+        spread = float(np.std(velocity))
+        agrees = spread > 0 and float(np.std(speed - velocity)) < 0.1 * spread
+        own = smoothing_window(speed, rate_hz, derivative=1)
+        if agrees and own < window:
+            return Motion(
+                position,
+                derivatives(speed, rate_hz, own, 0),
+                derivatives(speed, rate_hz, own, 1),
+                own,
+            )
+    return Motion(position, velocity, acceleration, window)
+
+
+def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
+    """Position by the trapezoidal rule from zero, acceleration by a local polynomial."""
+    window = smoothing_window(velocity_rad_s, rate_hz, derivative=1)
+    velocity = derivatives(velocity_rad_s, rate_hz, window, 0)
+    acceleration = derivatives(velocity_rad_s, rate_hz, window, 1)
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) / rate_hz
+    return Motion(np.concatenate([[0.0], np.cumsum(steps)]), velocity, acceleration, window)
+
+
+def moving_samples(motion: Motion, usable: Bools) -> Bools:
+    """Samples in motion: fast enough, and half a smoothing window away from any reversal.
+
+    Parameters
+    ----------
+    motion : Motion
+        Smoothed motion.
+    usable : bool array of shape (n,)
+        Samples whose readings are finite.
+
+    Returns
+    -------
+    bool array of shape (n,)
+    """
+    velocity = motion.velocity
+    speeds = np.abs(velocity)
+    top = float(np.quantile(speeds, 0.98)) if speeds.size else 0.0
+    noise = measurement_noise(velocity)
+    moving = usable & (speeds > max(SLOWEST_SHARE * top, 4 * noise, 1e-9))
+    half = motion.window // 2
+    turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    for turn in turns if turns.size < velocity.size // 4 else []:
+        moving[max(turn - half, 0) : turn + half + 2] = False
+    moving[:half] = False
+    moving[velocity.size - half :] = False
+    return moving
+
+
+def filled(values: Floats) -> Floats:
+    """Values with gaps bridged by straight lines; unchanged if all are finite."""
+    values = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    indices = np.arange(values.size)
+    return np.interp(indices, indices[good], values[good])
+
+
+def build_track(recordings: list[Recording], joint: Joint) -> Track:
+    """Put recordings of one joint on one grid, with smoothed motion and torque current.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        All at the same rate; each with a signed current, or three phases.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+
+    Returns
+    -------
+    Track
+        Groups are not set yet (-1 everywhere).
+
+    Raises
+    ------
+    ValueError
+        If a recording holds neither three phases nor a current with position or speed.
+    """
+    rate = recordings[0].rate_hz
+    pieces = [_one(recording, joint) for recording in recordings]
+    with_phases = all("phases" in piece.channels for piece in pieces)
+    with_angle = all(piece.electrical_rad is not None for piece in pieces)
+    with_temperature = all(piece.temperature_c is not None for piece in pieces)
+    channels = frozenset.intersection(*(piece.channels for piece in pieces))
+    bounds = []
+    offset = 0
+    clock = 0.0
+    times = []
+    for recording, piece in zip(recordings, pieces, strict=True):
+        n = piece.size
+        bounds.append((offset, offset + n))
+        offset += n
+        first = recordings[0].started_s
+        if recording.started_s is not None and first is not None:
+            clock = max(recording.started_s - first, clock)
+        times.append(clock + np.arange(n) / rate)
+        clock += n / rate
+
+    def join(name: str) -> Floats:
+        return np.concatenate([getattr(piece, name) for piece in pieces])
+
+    n = offset
+    return Track(
+        rate_hz=rate,
+        bounds=tuple(bounds),
+        time_s=np.concatenate(times),
+        run_time_s=join("run_time_s"),
+        current_a=join("current_a"),
+        position_rad=join("position_rad"),
+        velocity=join("velocity"),
+        acceleration=join("acceleration"),
+        machine_angle_rad=join("machine_angle_rad"),
+        angle_kind=pieces[0].angle_kind,
+        moving=np.concatenate([piece.moving for piece in pieces]),
+        group=np.full(n, -1, dtype=np.int64),
+        load_a=np.zeros(n),
+        model_a=np.zeros(n),
+        joint=joint,
+        channels=channels,
+        temperature_c=join("temperature_c") if with_temperature else None,
+        current_d_a=join("current_d_a") if with_phases else None,
+        electrical_rad=join("electrical_rad") if with_angle else None,
+    )
+
+
+def _one(recording: Recording, joint: Joint) -> Track:
+    rate = recording.rate_hz
+    ratio, poles = joint.gear_ratio, joint.pole_pairs
+    channels: set[str] = set()
+    phase_angle: PhaseAngle | None = None
+    phases = recording.phases_a
+    usable = np.ones(recording.size, dtype=bool)
+    if phases is not None:
+        usable &= np.isfinite(phases).all(axis=1)
+        phases = np.stack([filled(phases[:, k]) for k in range(3)], axis=1)
+        phase_angle = follow_phases(phases, rate)
+        channels |= {"phases"}
+    if recording.position_rad is not None:
+        speed = recording.velocity_rad_s
+        usable &= np.isfinite(recording.position_rad)
+        motion = motion_from_position(
+            filled(recording.position_rad), None if speed is None else filled(speed), rate
+        )
+        channels |= {"position", "scale"}
+        kind = "joint"
+    elif recording.velocity_rad_s is not None:
+        usable &= np.isfinite(recording.velocity_rad_s)
+        motion = motion_from_velocity(filled(recording.velocity_rad_s), rate)
+        channels |= {"position", "scale"}
+        kind = "joint"
+    elif phase_angle is not None:
+        scale = 1.0
+        kind = "electrical"
+        if poles and ratio:
+            scale, kind = 1.0 / (poles * ratio), "joint"
+            channels |= {"scale"}
+        motion = _scaled(phase_angle, scale)
+        channels |= {"position"}
+    else:
+        msg = "a recording needs a position, a velocity or three phase currents"
+        raise ValueError(msg)
+
+    current_d = electrical = None
+    if phases is not None and phase_angle is not None:
+        if kind == "joint" and "scale" in channels and recording.size:
+            known = poles * ratio if poles and ratio else None
+            electrical = phase_angle.aligned_with(motion.position_rad, known)
+        else:
+            electrical = phase_angle.angle_rad
+        current, current_d = torque_current(phases, electrical, motion.velocity)
+        channels |= {"electrical"}
+    elif recording.current_a is not None:
+        usable &= np.isfinite(recording.current_a)
+        current = filled(recording.current_a)
+        if poles and ratio:
+            electrical = poles * ratio * motion.position_rad
+            channels |= {"electrical"}
+    else:
+        msg = "a recording needs a signed current or three phase currents"
+        raise ValueError(msg)
+
+    machine, angle_kind = motion.position_rad, kind
+    if kind == "joint" and ratio:
+        machine, angle_kind = ratio * motion.position_rad, "motor"
+    elif electrical is not None and poles:
+        machine, angle_kind = electrical / poles, "motor"
+    elif electrical is not None and phases is not None:
+        machine, angle_kind = electrical, "electrical"
+    temperature = recording.temperature_c
+    if temperature is not None and not np.isfinite(temperature).any():
+        temperature = None
+    if temperature is not None:
+        channels |= {"temperature"}
+    n = motion.velocity.size
+    return Track(
+        rate_hz=rate,
+        bounds=((0, n),),
+        time_s=np.arange(n) / rate,
+        run_time_s=np.arange(n) / rate,
+        current_a=current,
+        position_rad=motion.position_rad,
+        velocity=motion.velocity,
+        acceleration=motion.acceleration,
+        machine_angle_rad=machine,
+        angle_kind=angle_kind,
+        moving=moving_samples(motion, usable),
+        group=np.full(n, -1, dtype=np.int64),
+        load_a=np.zeros(n),
+        model_a=np.zeros(n),
+        joint=joint,
+        channels=frozenset(channels),
+        temperature_c=None if temperature is None else filled(temperature),
+        current_d_a=current_d,
+        electrical_rad=electrical,
+    )
+
+
+def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
+    return Motion(
+        phase_angle.angle_rad * scale,
+        phase_angle.velocity_rad_s * scale,
+        phase_angle.acceleration_rad_s2 * scale,
+        phase_angle.window,
+    )

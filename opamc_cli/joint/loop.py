@@ -1,0 +1,406 @@
+"""Close the loop: find what the model lacks, add it, and open the sealed data once."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
+from opamc_cli.joint.effects.base import Effect, Parameters
+from opamc_cli.joint.effects.library import Library
+from opamc_cli.joint.model import Fit, Session, Term, fit_terms
+from opamc_cli.joint.trace import (
+    Candidate,
+    Gate,
+    decoy_likelihood,
+    held_out,
+    prepare,
+    refusal,
+    search,
+)
+
+MOST_STEPS = 16
+TIE_LIKELIHOOD = 6.0
+TIE_SHARE = 0.05
+TIE_COLLINEARITY = 0.9
+STRUCTURE_GAIN = 0.02
+STRUCTURE_T = 3.0
+STRUCTURE_KEPT = 0.3
+CLOSED_SHARE = 0.9
+PRUNE_GAIN = 0.003
+
+
+@dataclass(frozen=True)
+class Step:
+    """An effect that was added, with what spoke for it."""
+
+    term: Term
+    interpretation: str
+    gain: float
+    p_value: float
+    decoy_gain: float
+    t_value: float
+    consistency: float
+    ties: tuple[str, ...]
+    rmse_before_a: float
+    rmse_after_a: float
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """The best form of an effect that was not added, and why."""
+
+    effect: str
+    domain: str
+    parameters: Parameters
+    gain: float
+    p_value: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Untestable:
+    """An effect that the recordings cannot show."""
+
+    effect: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What closing the loop found on one axis.
+
+    Attributes
+    ----------
+    before, after : Fit
+        The declared and the extended model, fitted to the open groups.
+    steps : tuple of Step
+        Effects added, in order.
+    candidates : tuple of Candidate
+        Every candidate of every round with its round, for the table.
+    rejected, untestable : tuples
+        What was not added, and what could not be tried.
+    remains : tuple of Structure
+        Domains in which the final residual is structured.
+    ceiling_before, ceiling_after : Ceiling
+        Reproducible share of the residual's mean square.
+    verdict : str
+        "nothing-missing", "closed", "partial" or "not-in-library".
+    """
+
+    before: Fit
+    after: Fit
+    steps: tuple[Step, ...]
+    candidates: tuple[tuple[int, Candidate], ...]
+    rejected: tuple[Rejected, ...]
+    untestable: tuple[Untestable, ...]
+    remains: tuple[Structure, ...]
+    ceiling_before: Ceiling
+    ceiling_after: Ceiling
+    verdict: str
+    rmse_before_a: float
+    rmse_after_a: float
+    r2_before: float
+    r2_after: float
+    floor_a: float
+    explained_share: float
+
+
+@dataclass
+class _Progress:
+    """What the rounds collect."""
+
+    steps: list[Step] = field(default_factory=list)
+    candidates: list[tuple[int, Candidate]] = field(default_factory=list)
+    rejected: dict[str, Rejected] = field(default_factory=dict)
+    untestable: dict[str, Untestable] = field(default_factory=dict)
+
+
+def close_loop(
+    session: Session,
+    declared: tuple[Effect, ...],
+    library: Library,
+    seed: int = 0,
+    gate: Gate | None = None,
+    most_steps: int = MOST_STEPS,
+) -> Loop:
+    """Find, trace and add what the declared model lacks, until the gate stays shut.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings with their groups; the sealed ones are looked at once, at the end.
+    declared : tuple of Effect
+        The model so far.
+    library : Library
+        Effects that may be added.
+    seed : int
+        For the decoys.
+    gate : Gate, optional
+        What a candidate must show.
+    most_steps : int
+        Effects added at most.
+
+    Returns
+    -------
+    Loop
+    """
+    gate = gate or Gate()
+    generator = np.random.default_rng(seed)
+    before = fit_terms(session, tuple(declared_term(effect, session) for effect in declared))
+    seen_before = structures(before)
+    progress = _Progress()
+    fitted = before
+    banned: set[str] = set()
+    while len(progress.steps) < most_steps:
+        step_fit = _round(fitted, library, gate, generator, progress, banned)
+        if step_fit is None:
+            break
+        fitted = step_fit
+    fitted, steps = _pruned(fitted, before, progress)
+    remains = structures(fitted)
+    fitted, steps, remains = _without_wrong_forms(
+        before, fitted, steps, seen_before, remains, progress
+    )
+    return _summary(before, fitted, tuple(steps), progress, seen_before, remains)
+
+
+def declared_term(effect: Effect, session: Session) -> Term:
+    """Return a declared effect as a term, with the first guess of its non-linear parameters."""
+    track = session.coarse.track
+    guesses = effect.guesses(track, np.zeros(track.size))
+    return Term(effect, guesses[len(guesses) // 2] if guesses else {})
+
+
+def _round(
+    fitted: Fit,
+    library: Library,
+    gate: Gate,
+    generator: np.random.Generator,
+    progress: _Progress,
+    banned: set[str],
+) -> Fit | None:
+    session = fitted.session
+    present = {term.effect.name for term in fitted.terms}
+    views = {False: prepare(fitted, fine=False)}
+    views[True] = views[False] if session.factor == 1 else prepare(fitted, fine=True)
+    found: list[Candidate] = []
+    trials = 0
+    for name, effect in library.items():
+        if (name in present and not effect.several) or name in banned:
+            continue
+        why = effect.untestable(session.fine.track)
+        if why is not None:
+            progress.untestable[name] = Untestable(name, why)
+            continue
+        candidate, _tried = search(session, views[effect.fast], effect)
+        trials += 1
+        if candidate is not None:
+            found.append(candidate)
+    found.sort(key=lambda candidate: -candidate.score)
+    number = len(progress.steps)
+    checked: list[Candidate] = []
+    for candidate in found:
+        tested = held_out(fitted, candidate)
+        why = refusal(tested, gate, max(trials, 1))
+        checked.append(replace(tested, why_not=why))
+    for i, candidate in enumerate(checked):
+        if candidate.why_not is not None:
+            continue
+        view = views[candidate.term.effect.fast]
+        decoy = decoy_likelihood(fitted, view, candidate.term.effect, generator, gate.decoys)
+        share = decoy / max(candidate.likelihood, 1e-300)
+        candidate = replace(candidate, decoy_gain=candidate.gain * share)
+        if candidate.likelihood < gate.decoy_ratio * decoy:
+            checked[i] = replace(candidate, why_not="a decoy of the same form does half as well")
+            continue
+        extended = fit_terms(session, (*fitted.terms, candidate.term))
+        ties = _ties(candidate, checked)
+        progress.steps.append(
+            Step(
+                term=candidate.term,
+                interpretation=candidate.term.effect.interpretation(
+                    candidate.term.parameters, session.fine.track
+                ),
+                gain=candidate.gain,
+                p_value=min(candidate.p_value * trials, 1.0),
+                decoy_gain=candidate.decoy_gain,
+                t_value=candidate.t_value,
+                consistency=candidate.consistency,
+                ties=ties,
+                rmse_before_a=fitted.rmse(sealed=False),
+                rmse_after_a=extended.rmse(sealed=False),
+            )
+        )
+        checked[i] = candidate
+        _collect(progress, number, checked, candidate)
+        return extended
+    _collect(progress, number, checked, None)
+    return None
+
+
+def _collect(
+    progress: _Progress, number: int, checked: list[Candidate], added: Candidate | None
+) -> None:
+    for candidate in checked:
+        effect = candidate.term.effect
+        progress.candidates.append((number, candidate))
+        if candidate is added:
+            progress.rejected.pop(effect.name, None)
+            continue
+        why = candidate.why_not or "another effect explains the residual better"
+        progress.rejected[effect.name] = Rejected(
+            effect.name,
+            effect.domain,
+            candidate.term.parameters,
+            candidate.gain,
+            min(candidate.p_value, 1.0),
+            why,
+        )
+
+
+def _ties(winner: Candidate, others: list[Candidate]) -> tuple[str, ...]:
+    """Names whose likelihood and contribution cannot be told from the winner's."""
+    names = []
+    margin = max(TIE_LIKELIHOOD, TIE_SHARE * winner.likelihood)
+    for other in others:
+        if other.term.effect.name == winner.term.effect.name:
+            continue
+        if other.likelihood < winner.likelihood - margin:
+            continue
+        if other.contribution.size == winner.contribution.size:
+            product = float(np.dot(other.contribution, winner.contribution))
+            length = np.linalg.norm(other.contribution) * np.linalg.norm(winner.contribution)
+            if product < TIE_COLLINEARITY * float(length):
+                continue
+        names.append(other.term.effect.name)
+    return tuple(names)
+
+
+def _pruned(fitted: Fit, before: Fit, progress: _Progress) -> tuple[Fit, list[Step]]:
+    """Remove, one after the other, added effects that later ones have made superfluous."""
+    steps = list(progress.steps)
+    while len(steps) > 1:
+        worth: list[tuple[float, int]] = []
+        for i in range(len(steps) - 1):
+            rest = (*before.terms, *(s.term for j, s in enumerate(steps) if j != i))
+            smaller = fit_terms(fitted.session, rest)
+            candidate = Candidate(
+                steps[i].term,
+                0.0,
+                0.0,
+                1.0,
+                np.zeros(0),
+                np.zeros(0),
+                fine=fitted.session.factor == 1 or steps[i].term.effect.fast,
+            )
+            worth.append((held_out(smaller, candidate).gain, i))
+        gain, index = min(worth, default=(1.0, -1))
+        if gain >= PRUNE_GAIN:
+            break
+        gone = steps.pop(index)
+        effect = gone.term.effect
+        progress.rejected[effect.name] = Rejected(
+            effect.name,
+            effect.domain,
+            gone.term.parameters,
+            gain,
+            1.0,
+            "superfluous once later effects were added",
+        )
+        fitted = fit_terms(fitted.session, (*before.terms, *(s.term for s in steps)))
+    return fitted, steps
+
+
+SHAPED_DOMAINS = ("velocity", "joint-angle", "acceleration", "load", "temperature", "time")
+
+
+def _without_wrong_forms(
+    before: Fit,
+    fitted: Fit,
+    steps: list[Step],
+    seen_before: list[Structure],
+    remains: list[Structure],
+    progress: _Progress,
+) -> tuple[Fit, list[Step], list[Structure]]:
+    """Take back effects that leave much of their own domain's structure: the form is wrong."""
+    scale = (fitted.rmse(sealed=False) / max(before.rmse(sealed=False), 1e-300)) ** 2
+    first = {structure.domain: structure.gain for structure in seen_before}
+    wrong = {
+        structure.domain
+        for structure in remains
+        if structure.domain in SHAPED_DOMAINS
+        and structure.gain > STRUCTURE_GAIN
+        and structure.t_value > STRUCTURE_T
+        and structure.gain * scale > STRUCTURE_KEPT * max(first.get(structure.domain, 0.0), 0.0)
+    }
+    kept = [step for step in steps if step.term.effect.domain not in wrong]
+    if len(kept) == len(steps):
+        return fitted, steps, remains
+    for step in steps:
+        effect = step.term.effect
+        if effect.domain in wrong:
+            progress.rejected[effect.name] = Rejected(
+                effect.name,
+                effect.domain,
+                step.term.parameters,
+                step.gain,
+                step.p_value,
+                f"leaves structure in the {effect.domain} domain: the form is another one",
+            )
+    smaller = fit_terms(fitted.session, (*before.terms, *(step.term for step in kept)))
+    return smaller, kept, structures(smaller)
+
+
+def _r2(fitted: Fit) -> float:
+    grid = fitted.session.fine
+    current = grid.track.current_a[grid.sealed]
+    power = float(np.sum((current - current.mean()) ** 2))
+    rest = float(np.sum(fitted.residual_a[grid.sealed] ** 2))
+    return 1.0 - rest / power if power > 0 else 0.0
+
+
+def _summary(
+    before: Fit,
+    after: Fit,
+    steps: tuple[Step, ...],
+    progress: _Progress,
+    seen_before: list[Structure],
+    remains: list[Structure],
+) -> Loop:
+    first, last = ceiling(before, seen_before), ceiling(after, remains)
+    structured = [
+        structure
+        for structure in remains
+        if structure.gain > STRUCTURE_GAIN and structure.t_value > STRUCTURE_T
+    ]
+    rest = last.share > STRUCTURE_GAIN and last.t_value > STRUCTURE_T
+    # Only now are the sealed groups looked at.
+    rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
+    floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))
+    reach = rmse_before**2 - floor**2
+    explained = (rmse_before**2 - rmse_after**2) / reach if reach > 1e-3 * rmse_before**2 else 1.0
+    explained = float(np.clip(explained, 0.0, 1.0))
+    if not steps:
+        verdict = "not-in-library" if rest or structured else "nothing-missing"
+    elif (rest or structured) and explained < CLOSED_SHARE:
+        verdict = "partial"
+    else:
+        verdict = "closed"
+    return Loop(
+        before=before,
+        after=after,
+        steps=steps,
+        candidates=tuple(progress.candidates),
+        rejected=tuple(progress.rejected.values()),
+        untestable=tuple(progress.untestable.values()),
+        remains=tuple(structured),
+        ceiling_before=first,
+        ceiling_after=last,
+        verdict=verdict,
+        rmse_before_a=rmse_before,
+        rmse_after_a=rmse_after,
+        r2_before=_r2(before),
+        r2_after=_r2(after),
+        floor_a=floor,
+        explained_share=explained,
+    )

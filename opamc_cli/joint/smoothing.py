@@ -1,0 +1,94 @@
+"""Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
+
+import numpy as np
+from scipy.signal import savgol_filter
+
+from opamc_cli.joint.track import Floats
+
+POLYNOMIAL_ORDER = 3
+SHORTEST_WINDOW = 5
+LONGEST_WINDOW_S = 0.2
+ALLOWED_NOISE_SHARE = 0.02
+
+
+def measurement_noise(path: Floats) -> float:
+    """Standard deviation of what is not smooth in a path, from its fourth differences.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Uniformly sampled path, n > 4.
+
+    Returns
+    -------
+    float
+        Robust estimate in the path's unit (median absolute difference; the sum of squares of
+        the fourth difference's weights 1, -4, 6, -4, 1 is 70).
+    """
+    differences = np.diff(path, 4)
+    changed = differences[differences != 0] if np.any(differences) else differences
+    return float(np.median(np.abs(changed)) / 0.6745 / np.sqrt(70.0)) if changed.size else 0.0
+
+
+def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
+    """Shortest odd window whose derivative noise is small against the derivative itself.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Position (derivative 2) or speed (derivative 1).
+    rate_hz : float
+        Sampling rate.
+    derivative : int
+        Derivative that must come out clean.
+
+    Returns
+    -------
+    int
+        Odd number of samples, 5 or more, at most 0.2 s.
+    """
+    longest = min(int(LONGEST_WINDOW_S * rate_hz) | 1, (path.size - 1) | 1)
+    noise = measurement_noise(path)
+    window = SHORTEST_WINDOW
+    while window < longest:
+        values = derivatives(path, rate_hz, window, derivative)
+        kernel = savgol_filter(
+            np.eye(1, 2 * window + 1, window)[0],
+            window,
+            POLYNOMIAL_ORDER,
+            deriv=derivative,
+            delta=1.0 / rate_hz,
+            mode="constant",
+        )
+        if noise * float(np.linalg.norm(kernel)) <= ALLOWED_NOISE_SHARE * float(np.std(values)):
+            break
+        window = int(window * 1.3 + 2) | 1
+    return max(min(window, longest), SHORTEST_WINDOW)
+
+
+def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:
+    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial).
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Uniformly sampled path, n >= window.
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples, at least 5.
+    derivative : int
+        0 for the smoothed path itself.
+
+    Returns
+    -------
+    array of shape (n,)
+
+    References
+    ----------
+    Savitzky and Golay, Analytical Chemistry 36, 1964.
+    """
+    smooth: Floats = savgol_filter(
+        path, window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz, mode="interp"
+    )
+    return smooth

@@ -1,0 +1,399 @@
+"""Trace a residual to its cause: candidates refitted with the model, gated, and compared."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import chi2
+
+from opamc_cli.joint.effects.base import Effect, Parameters
+from opamc_cli.joint.model import Fit, Grid, Session, Term
+from opamc_cli.joint.normal import held_out_error, normal_equations, solve
+from opamc_cli.joint.track import Bools, Floats, block_mean
+from opamc_cli.joint.whitening import autoregression, settled, whitened
+
+SCORE_PER_PARAMETER = 6.0
+"""What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
+
+
+@dataclass(frozen=True)
+class Gate:
+    """What a candidate must show before it is added."""
+
+    smallest_gain: float = 0.01
+    smallest_t: float = 2.0
+    smallest_consistency: float = 0.75
+    decoy_ratio: float = 2.0
+    largest_p: float = 1e-3
+    decoys: int = 3
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A term that might be added, and what speaks for it.
+
+    Attributes
+    ----------
+    term : Term
+        Effect, parameters, columns.
+    likelihood : float
+        Fall of the whitened sum of squares in units of the noise's variance.
+    score : float
+        Likelihood less six for every free parameter.
+    p_value : float
+        Chi-square of the likelihood, times the number of guesses.
+    gain, t_value, consistency : float
+        Held-out fall of the mean square (share), its t over groups, share of groups better.
+    contribution : array of shape (n,)
+        Whitened, projected contribution, for comparison with others.
+    """
+
+    term: Term
+    likelihood: float
+    score: float
+    p_value: float
+    coefficients: Floats
+    contribution: Floats
+    fine: bool
+    gain: float = 0.0
+    t_value: float = 0.0
+    consistency: float = 0.0
+    decoy_gain: float = 0.0
+    why_not: str | None = None
+
+
+@dataclass(frozen=True)
+class View:
+    """One grid prepared for a search: whitened residual and the model's whitened span."""
+
+    grid: Grid
+    fine: bool
+    taps: Floats
+    valid: Bools
+    base: Floats
+    span: Floats
+    residual: Floats
+    variance: float
+
+
+def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
+    """Estimate what does not repeat in a residual, with the samples where that is known.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    fine : bool
+        Which grid.
+    residual : array of shape (n,)
+        Residual on that grid.
+
+    Returns
+    -------
+    noise, valid : arrays of shape (n,)
+        Half the difference of successive cycles (scaled to the noise's own variance) where the
+        motion repeats; else the residual itself.
+    """
+    grid = fit.session.grid(fine)
+    period = grid.track.period_samples
+    if period is None:
+        return residual, grid.fit
+    noise = np.zeros_like(residual)
+    valid = np.zeros_like(grid.fit)
+    for start, stop in grid.track.bounds:
+        if stop - start <= period:
+            continue
+        noise[start : stop - period] = (
+            residual[start : stop - period] - residual[start + period : stop]
+        ) / np.sqrt(2)
+        valid[start : stop - period] = (
+            grid.fit[start : stop - period] & grid.fit[start + period : stop]
+        )
+    if valid.sum() < 0.2 * grid.fit.sum():
+        return residual, grid.fit
+    return noise, valid
+
+
+def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
+    """Whiten a fit's residual and regressors on one grid.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    fine : bool
+        Which grid.
+    residual : array of shape (n,), optional
+        Another residual on that grid, for decoys.
+    """
+    session = fit.session
+    grid = session.grid(fine)
+    own = residual_on(fit, fine)
+    noise, known = noise_of(fit, fine, own)
+    taps = autoregression(noise, known)
+    valid = grid.fit & settled(
+        grid.track.moving & (grid.track.group >= 0), grid.track.bounds, taps.size - 1
+    )
+    blocks = [session.columns(term, fine) for term in fit.terms]
+    base = (
+        np.concatenate([whitened(block, taps)[valid] for block in blocks], axis=1)
+        if blocks
+        else np.zeros((int(valid.sum()), 0))
+    )
+    span = _orthonormal(base)
+    signal = whitened(own if residual is None else residual, taps)
+    values = signal[valid]
+    values = values - span @ (span.T @ values)
+    full = np.zeros(grid.track.size)
+    full[valid] = values
+    variance = float(values @ values) / max(values.size - span.shape[1], 1)
+    return View(grid, fine, taps, valid, base, span, full, max(variance, 1e-300))
+
+
+def residual_on(fit: Fit, fine: bool) -> Floats:
+    """Residual of a fit on one of the session's grids."""
+    session = fit.session
+    if fine or session.factor == 1:
+        return fit.residual_a
+    return block_mean(fit.residual_a, session.fine.track.bounds, session.factor)
+
+
+def _orthonormal(columns: Floats) -> Floats:
+    if columns.shape[1] == 0:
+        return columns
+    scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", columns, columns), 1e-300))
+    unit = columns / scale
+    values, vectors = np.linalg.eigh(unit.T @ unit)
+    good = values > 1e-9 * values[-1]
+    span: Floats = unit @ (vectors[:, good] / np.sqrt(values[good]))
+    return span
+
+
+def _evaluate(
+    session: Session, view: View, effect: Effect, parameters: Parameters
+) -> list[tuple[float, Term, Floats, Floats]]:
+    """Score of an effect's full form and of its smaller forms, with given parameters."""
+    raw = session.columns(Term(effect, parameters), view.fine)
+    if not np.all(np.isfinite(raw)):
+        return []
+    columns = whitened(raw, view.taps)[view.valid]
+    before = np.einsum("ij,ij->j", columns, columns)
+    columns = columns - view.span @ (view.span.T @ columns)
+    gram = columns.T @ columns
+    moment = columns.T @ view.residual[view.valid]
+    forms: list[tuple[Parameters, tuple[int, ...]]] = [
+        (parameters, tuple(range(raw.shape[1]))),
+        *effect.variants(parameters),
+    ]
+    total = float(np.dot(view.residual, view.residual))
+    results = []
+    for form, keep in forms:
+        # A column that the model already spans leaves only rounding.
+        new = [k for k in keep if gram[k, k] > 1e-6 * before[k]]
+        if not new:
+            continue
+        index = np.asarray(new)
+        part = gram[np.ix_(index, index)]
+        solution = solve(part, moment[index])
+        fall = float(solution @ moment[index])
+        left = max(total - fall, 1e-12 * total)
+        likelihood = view.residual[view.valid].size * np.log(total / left)
+        coefficients = np.zeros(len(keep))
+        coefficients[[keep.index(k) for k in new]] = solution
+        whole = len(keep) == raw.shape[1]
+        plausible = effect.plausible(coefficients, form)
+        term = Term(effect, form, None if whole or effect.name == "ripple" else keep)
+        free = len(new) + len(effect.limits(view.grid.track))
+        score = likelihood - SCORE_PER_PARAMETER * free if plausible else -np.inf
+        results.append((float(score), term, coefficients, columns[:, index] @ solution))
+    return results
+
+
+def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | None, int]:
+    """Best form of an effect on a view, over its non-linear parameters.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings with the fitted model currents.
+    view : View
+        Whitened residual.
+    effect : Effect
+        What to try.
+
+    Returns
+    -------
+    candidate : Candidate or None
+        None where no form adds anything plausible.
+    tried : int
+        Number of guesses.
+    """
+    guesses = effect.guesses(view.grid.track, view.residual)
+    best: tuple[float, Term, Floats, Floats] | None = None
+    for guess in guesses:
+        for result in _evaluate(session, view, effect, guess):
+            if best is None or result[0] > best[0]:
+                best = result
+    if best is None or not np.isfinite(best[0]):
+        return None, len(guesses)
+    limits = effect.limits(view.grid.track)
+    if limits and effect.name != "ripple":
+        best = _refined(session, view, effect, best, limits, len(guesses))
+    settled_parameters = effect.settled(best[1].parameters, view.grid.track)
+    if settled_parameters != best[1].parameters:
+        for result in _evaluate(session, view, effect, settled_parameters):
+            if result[1].keep == best[1].keep and result[1].parameters == settled_parameters:
+                best = result
+    free = best[2].size + len(limits)
+    likelihood = best[0] + SCORE_PER_PARAMETER * free
+    tried = max(len(guesses), 1)
+    log_p = float(chi2.logsf(max(likelihood, 0.0), free)) + np.log(tried)
+    p_value = float(np.exp(np.clip(log_p, -700.0, 0.0)))
+    candidate = Candidate(best[1], likelihood, best[0], p_value, best[2], best[3], view.fine)
+    return candidate, tried
+
+
+def _refined(
+    session: Session,
+    view: View,
+    effect: Effect,
+    best: tuple[float, Term, Floats, Floats],
+    limits: dict[str, tuple[float, float]],
+    guesses: int,
+) -> tuple[float, Term, Floats, Floats]:
+    names = [name for name in limits if name in best[1].parameters]
+    start = np.array([best[1].parameters[name] for name in names])
+    low = np.array([limits[name][0] for name in names])
+    high = np.array([limits[name][1] for name in names])
+    champion = best
+    keep = best[1].keep
+
+    def cost(values: Floats) -> float:
+        nonlocal champion
+        inside = np.clip(values, low, high)
+        parameters = best[1].parameters | dict(zip(names, inside.tolist(), strict=True))
+        top = -np.inf
+        for result in _evaluate(session, view, effect, parameters):
+            if result[1].keep != keep:
+                continue
+            top = max(top, result[0])
+            if result[0] > champion[0]:
+                champion = result
+        penalty = float(np.sum(np.abs(values - inside) / (high - low)))
+        return -top + 1e3 * penalty if np.isfinite(top) else 1e12
+
+    simplex = np.tile(start, (len(names) + 1, 1))
+    for i, name in enumerate(names):
+        step = 0.15 * abs(start[i]) if name.endswith(("_speed", "_s", "_rad", "damping")) else 0.0
+        if name == "frequency_hz":
+            length = float(np.ptp(view.grid.track.time_s)) + 1e-9
+            step = 0.2 / length
+        elif name in ("place_rad",):
+            step = 0.3 * best[1].parameters.get("width_rad", high[i] - low[i])
+        elif name == "resonance_hz":
+            step = 0.06 * start[i]
+        step = step or 0.05 * (high[i] - low[i])
+        simplex[i + 1, i] += step if start[i] + step < high[i] else -step
+    minimize(
+        cost,
+        start,
+        method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": 14 + 12 * len(names), "fatol": 0.3},
+    )
+    return champion
+
+
+def held_out(fit: Fit, candidate: Candidate) -> Candidate:
+    """Refit a candidate jointly with the model, each group left out in turn.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    candidate : Candidate
+        Found by `search`.
+
+    Returns
+    -------
+    Candidate
+        With gain, t value and consistency: of groups in which the candidate is hardly excited
+        (a tenth of the mean energy) nothing is asked.
+    """
+    session = fit.session
+    grid = session.grid(candidate.fine)
+    blocks = [session.columns(term, candidate.fine)[grid.fit] for term in fit.terms]
+    base = sum(block.shape[1] for block in blocks)
+    own = session.columns(candidate.term, candidate.fine)[grid.fit]
+    current = residual_on(fit, candidate.fine)[grid.fit]
+    normal = normal_equations(np.concatenate([*blocks, own], axis=1), current, grid.slices)
+    before = held_out_error(normal.taken(list(range(base))))
+    after = held_out_error(normal)
+    falls = before - after
+    gain = float(falls.sum() / max(before.sum(), 1e-300))
+    count = falls.size
+    spread = float(np.std(falls, ddof=1)) if count > 1 else 0.0
+    t_value = float(falls.mean() / (spread / np.sqrt(count))) if spread > 0 else 0.0
+    energy = np.einsum("gii->gi", normal.gram)[:, base:].sum(axis=1)
+    excited = energy > 0.1 * energy.mean()
+    consistency = float(np.mean(falls[excited] > 0)) if excited.any() else 0.0
+    return replace(candidate, gain=gain, t_value=t_value, consistency=consistency)
+
+
+def decoy_likelihood(
+    fit: Fit, view: View, effect: Effect, generator: np.random.Generator, count: int
+) -> float:
+    """Best likelihood that the same search finds when the residual's signs are shuffled.
+
+    Every group is cut into four blocks whose signs are drawn at random: what is left has the
+    residual's size and colour, but nothing that follows a covariate.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model so far.
+    view : View
+        Whitened residual.
+    effect : Effect
+        Candidate's effect.
+    generator : numpy Generator
+        For the signs.
+    count : int
+        Decoys.
+
+    Returns
+    -------
+    float
+        Largest likelihood.
+    """
+    worst = 0.0
+    for _ in range(count):
+        signs = np.ones(view.grid.track.size)
+        groups = view.grid.track.group
+        for group in np.unique(groups[view.valid]):
+            members = np.flatnonzero((groups == group) & view.valid)
+            for block in np.array_split(members, 4):
+                signs[block] = generator.choice([-1.0, 1.0])
+        shuffled = view.residual * signs
+        values = shuffled[view.valid]
+        values = values - view.span @ (view.span.T @ values)
+        shuffled[view.valid] = values
+        found, _tried = search(fit.session, replace(view, residual=shuffled), effect)
+        if found is not None:
+            worst = max(worst, found.likelihood)
+    return worst
+
+
+def refusal(candidate: Candidate, gate: Gate, trials: int) -> str | None:
+    """Say why a candidate does not pass the gate, or None where it passes."""
+    if candidate.p_value * trials > gate.largest_p:
+        return f"p = {min(candidate.p_value * trials, 1.0):.2g}, above {gate.largest_p:g}"
+    if candidate.gain < gate.smallest_gain:
+        return f"held-out gain {candidate.gain:.2%}, below {gate.smallest_gain:.0%}"
+    if candidate.t_value < gate.smallest_t:
+        return f"t = {candidate.t_value:.1f} over groups, below {gate.smallest_t:g}"
+    if candidate.consistency < gate.smallest_consistency:
+        return (
+            f"better in {candidate.consistency:.0%} of the groups, below "
+            f"{gate.smallest_consistency:.0%}"
+        )
+    return None

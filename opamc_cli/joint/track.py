@@ -1,0 +1,177 @@
+"""A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Constants of the joint; None where nobody knows them."""
+
+    gear_ratio: float | None = None
+    pole_pairs: int | None = None
+
+
+@dataclass(frozen=True)
+class Track:
+    """All recordings of one joint, one after another on a uniform grid of samples.
+
+    Attributes
+    ----------
+    rate_hz : float
+        Sampling rate of the grid.
+    bounds : tuple of (int, int)
+        Half-open (start, stop) of each recording on the grid.
+    time_s, run_time_s : array of shape (n,)
+        Seconds since the first recording began, and since the sample's own recording began.
+    current_a : array of shape (n,)
+        Torque-producing motor current with its sign.
+    position_rad, velocity, acceleration : array of shape (n,)
+        Smoothed motion: joint side where the scale is known, else of the angle that is known.
+    machine_angle_rad : array of shape (n,)
+        Angle whose orders are searched: motor, joint or electrical, as `angle_kind` says.
+    angle_kind : {"motor", "joint", "electrical"}
+        What one revolution of `machine_angle_rad` is.
+    moving : bool array of shape (n,)
+        Samples that count: the joint moves and its direction is certain.
+    group : int array of shape (n,)
+        Cycle, recording or block that is left out as one; -1 outside all of them.
+    load_a, model_a : array of shape (n,)
+        Current that carries the load, and the whole fitted current (zero before a fit).
+    temperature_c, current_d_a, electrical_rad : array of shape (n,) or None
+        Where known: temperature, current in the flux axis, electrical angle.
+    channels : frozenset of str
+        What was logged or follows from it: position, scale, temperature, phases, electrical.
+    period_samples : int or None
+        Length of a cycle, if the motion repeats.
+    """
+
+    rate_hz: float
+    bounds: tuple[tuple[int, int], ...]
+    time_s: Floats
+    run_time_s: Floats
+    current_a: Floats
+    position_rad: Floats
+    velocity: Floats
+    acceleration: Floats
+    machine_angle_rad: Floats
+    angle_kind: str
+    moving: Bools
+    group: Ints
+    load_a: Floats
+    model_a: Floats
+    joint: Joint
+    channels: frozenset[str]
+    temperature_c: Floats | None = None
+    current_d_a: Floats | None = None
+    electrical_rad: Floats | None = None
+    period_samples: int | None = None
+    groups_are_cycles: bool = False
+
+    @property
+    def size(self) -> int:
+        """Number of samples on the grid."""
+        return int(self.time_s.size)
+
+    @property
+    def sign(self) -> Floats:
+        """Direction of motion, -1, 0 or 1."""
+        return np.sign(self.velocity)
+
+    @property
+    def speed_scale(self) -> float:
+        """Speed that moving samples reach at their 95th percentile."""
+        speeds = np.abs(self.velocity[self.moving])
+        return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
+
+    def with_model(self, load_a: Floats, model_a: Floats) -> "Track":
+        """Return the same track with the fitted load and model currents."""
+        return replace(self, load_a=load_a, model_a=model_a)
+
+
+def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
+    """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
+
+    Parameters
+    ----------
+    values : array of shape (n,) or (n, m)
+        Samples on the grid of a track.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    factor : int
+        Samples per block, at least 1.
+
+    Returns
+    -------
+    array of shape (n // factor per recording,) or with m columns
+    """
+    if factor == 1:
+        return values
+    parts = []
+    for start, stop in bounds:
+        blocks = (stop - start) // factor
+        part = values[start : start + blocks * factor]
+        parts.append(part.reshape((blocks, factor) + values.shape[1:]).mean(axis=1))
+    return np.concatenate(parts)
+
+
+def coarsen(track: Track, factor: int) -> Track:
+    """Average a track over blocks of samples; a block moves if all of its samples move.
+
+    Parameters
+    ----------
+    track : Track
+        Track at the full rate.
+    factor : int
+        Samples per block.
+
+    Returns
+    -------
+    Track
+        Track at ``rate_hz / factor``.
+    """
+    if factor == 1:
+        return track
+
+    def mean(values: Floats) -> Floats:
+        return block_mean(values, track.bounds, factor)
+
+    def optional(values: Floats | None) -> Floats | None:
+        return None if values is None else mean(values)
+
+    bounds = []
+    offset = 0
+    for start, stop in track.bounds:
+        blocks = (stop - start) // factor
+        bounds.append((offset, offset + blocks))
+        offset += blocks
+    group = mean(track.group.astype(float))
+    whole = group == np.round(group)
+    moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
+    period = track.period_samples
+    return replace(
+        track,
+        rate_hz=track.rate_hz / factor,
+        bounds=tuple(bounds),
+        time_s=mean(track.time_s),
+        run_time_s=mean(track.run_time_s),
+        current_a=mean(track.current_a),
+        position_rad=mean(track.position_rad),
+        velocity=mean(track.velocity),
+        acceleration=mean(track.acceleration),
+        machine_angle_rad=mean(track.machine_angle_rad),
+        moving=moving,
+        group=np.where(whole, group, -1).astype(np.int64),
+        load_a=mean(track.load_a),
+        model_a=mean(track.model_a),
+        temperature_c=optional(track.temperature_c),
+        current_d_a=optional(track.current_d_a),
+        electrical_rad=optional(track.electrical_rad),
+        period_samples=None if period is None else round(period / factor),
+    )

@@ -1,0 +1,93 @@
+"""What is left when the noise's colour is taken out: an autoregressive whitening filter."""
+
+import numpy as np
+from scipy.linalg import solve_toeplitz
+from scipy.signal import lfilter
+
+from opamc_cli.joint.track import Bools, Floats
+
+AR_ORDER = 10
+
+
+def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats:
+    """Whitening filter of a noise with gaps, by the Yule-Walker equations.
+
+    Parameters
+    ----------
+    noise : array of shape (n,)
+        Residual; samples that are not valid do not count.
+    valid : bool array of shape (n,)
+        Samples that count.
+    order : int
+        Number of past samples that predict the present one.
+
+    Returns
+    -------
+    array of shape (order + 1,)
+        Taps 1, -a_1, ..., -a_order; [1] where there are too few samples.
+
+    References
+    ----------
+    Walker, Proceedings of the Royal Society A 131, 1931.
+    """
+    values = np.where(valid, noise, 0.0)
+    weight = valid.astype(float)
+    covariance = np.zeros(order + 1)
+    for lag in range(order + 1):
+        pairs = float(np.dot(weight[lag:], weight[: weight.size - lag]))
+        if pairs < 10 * (order + 1):
+            return np.ones(1)
+        covariance[lag] = float(np.dot(values[lag:], values[: values.size - lag])) / pairs
+    if covariance[0] <= 0:
+        return np.ones(1)
+    covariance[0] *= 1 + 1e-6
+    coefficients = solve_toeplitz(covariance[:-1], covariance[1:])
+    taps: Floats = np.concatenate([[1.0], -coefficients])
+    return taps
+
+
+def whitened(values: Floats, taps: Floats) -> Floats:
+    """Apply a whitening filter along the first axis.
+
+    Parameters
+    ----------
+    values : array of shape (n,) or (n, m)
+        Signals.
+    taps : array of shape (p + 1,)
+        From `autoregression`.
+
+    Returns
+    -------
+    array of the same shape
+        The first p samples (and the first p after a gap) are not usable: see `settled`.
+    """
+    if taps.size == 1:
+        return values
+    filtered: Floats = lfilter(taps, [1.0], values, axis=0)
+    return filtered
+
+
+def settled(valid: Bools, bounds: tuple[tuple[int, int], ...], past: int) -> Bools:
+    """Samples whose `past` predecessors in the same recording are all valid too.
+
+    Parameters
+    ----------
+    valid : bool array of shape (n,)
+        Samples that count.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    past : int
+        Taps of the whitening filter less one.
+
+    Returns
+    -------
+    bool array of shape (n,)
+    """
+    result = np.zeros_like(valid)
+    for start, stop in bounds:
+        run = np.concatenate([[0], np.cumsum(valid[start:stop])])
+        whole = np.zeros(stop - start, dtype=bool)
+        if stop - start > past:
+            whole[past:] = run[past + 1 :] - run[: run.size - past - 1] == past + 1
+        result[start:stop] = whole
+    return result
