@@ -4,12 +4,13 @@ from collections.abc import Callable
 
 import typer
 
-from opamc_cli.commands import config, identify, ingest, patterns, simulate
+from opamc_cli.commands import config, identify, ingest, patterns, score, simulate
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "ingest": ingest.ingest,
     "identify": identify.identify,
     "patterns": patterns.patterns,
+    "score": score.score,
     "simulate": simulate.simulate,
 }
 """Subcommands by name, in the order of the chain."""

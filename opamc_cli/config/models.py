@@ -98,6 +98,25 @@ class ScoreConfig(Section):
     base: Positive = Field(
         2.0, gt=1, description="Base of the logarithm in the Jensen-Shannon divergence."
     )
+    false_alarm_rate: Annotated[float, Field(gt=0, lt=0.5)] = Field(
+        0.01,
+        description="Largest accepted probability of any false alarm over all joints of one "
+        "diagnosis.",
+    )
+    minimum_effect: Fraction = Field(
+        0.1,
+        description="Least relative change of the pattern probabilities (root mean square) that "
+        "is reported, however certain it is.",
+    )
+    fault_effect: Fraction = Field(
+        0.3, description="Relative change from which a change of unknown cause is called a fault."
+    )
+    permutations: Annotated[int, Field(ge=100)] = Field(
+        1000, description="Most ways of exchanging sessions or cycles that are evaluated."
+    )
+    seed: Annotated[int, Field(ge=0)] = Field(
+        0, description="Seed of the draw where there are more ways."
+    )
 
 
 class ReportConfig(Section):

@@ -1,0 +1,197 @@
+"""Why a joint is judged as it is, in a maintainer's words."""
+
+import math
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.stats.decision import Judgement, effect_by_cell
+from opamc_cli.stats.sessions import Cell
+from opamc_cli.storage.sources import RunSource
+
+INSPECT = (
+    "Inspect the joint's strain wave gear first: backlash by hand with the motor held, flexspline "
+    "and circular spline teeth, wave generator bearing, grease; then brake, motor connector and "
+    "current sensor."
+)
+CANNOT_TELL = (
+    "The patterns say that the torque's course has changed, not what changed it: another payload, "
+    "program, controller gain or temperature changes it too. Repeat the recording under the "
+    "baseline's conditions before taking the joint apart."
+)
+
+
+def reasons(
+    judgement: Judgement,
+    cells: Sequence[Cell],
+    motions: Sequence[Mapping[str, Any]],
+    sources: Mapping[str, Sequence[RunSource]],
+    cause: Mapping[str, Any] | None = None,
+) -> list[str]:
+    """Sentences that explain one joint's state.
+
+    Parameters
+    ----------
+    judgement
+        The decision.
+    cells
+        What it was made from.
+    motions
+        Entries `motions` of the verdict.
+    sources
+        Recordings of "baseline" and "target" in which the axis moves.
+    cause
+        The cause found for the change, if any.
+
+    Returns
+    -------
+    list of str
+        What changed and by how much, how sure that is, against what, what to inspect, and what
+        it cannot tell.
+    """
+    if judgement.state == "insufficient-data":
+        return [*_missing(judgement, cells), *_short(cells)]
+    unhealthy = judgement.state != "healthy"
+    sentences = [
+        _change(judgement, cells, motions),
+        _certainty(judgement),
+        _rest(judgement, sources),
+        *_siblings(judgement),
+    ]
+    if cause is not None and cause.get("interpretation"):
+        sentences.append(f"Likely cause: {cause['interpretation']}.")
+    if unhealthy:
+        sentences += [INSPECT, CANNOT_TELL]
+    return [*sentences, *_short(cells)]
+
+
+def _change(
+    judgement: Judgement, cells: Sequence[Cell], motions: Sequence[Mapping[str, Any]]
+) -> str:
+    worst = cells[int(np.nanargmax(effect_by_cell(cells)))]
+    entry = next(
+        row
+        for row in motions
+        if (row["motion"], row["order"], row["tau"]) == (worst.motion, worst.order, worst.tau)
+    )
+    baseline, target = (
+        f"{np.mean(entry[side]):.3g}" if entry[side] else "unknown"
+        for side in ("jsd_baseline", "jsd_target")
+    )
+    place = (
+        f"motion {worst.motion}: mean divergence {target} against {baseline} of the baseline "
+        f"(order {worst.order}, delay {worst.tau} samples)"
+    )
+    ratio = f"{judgement.divergence_ratio:.3g} times what healthy sessions show"
+    if judgement.state == "healthy":
+        return f"No change that matters: divergence {ratio}, most in {place}."
+    return (
+        f"The course of the torque has changed: divergence {ratio}, most in {place}; pattern "
+        f"probabilities changed by {judgement.effect:.0%} (root mean square)."
+    )
+
+
+def _certainty(judgement: Judgement) -> str:
+    own = f"A healthy joint shows this or more with probability {_p(judgement.p_value)}"
+    if judgement.p_adjusted != judgement.p_value:
+        own += f", {_p(judgement.p_adjusted)} after correction for the number of joints"
+    how = {
+        "sessions": "held against each baseline session left out in turn",
+        "relabelled-sessions": "by exchanging whole sessions between baseline and target",
+        "one-session": "by the allowance for a single baseline session",
+        "none": "",
+    }[judgement.method]
+    return f"{own}, {how}."
+
+
+def _rest(judgement: Judgement, sources: Mapping[str, Sequence[RunSource]]) -> str:
+    text = (
+        f"Compared with {_count(judgement.n_baseline_sessions, 'baseline session')} of "
+        f"{_count(judgement.n_baseline_cycles, 'cycle')}{_age(sources)}; target: "
+        f"{_count(judgement.n_target_sessions, 'session')} of "
+        f"{_count(judgement.n_target_cycles, 'cycle')}."
+    )
+    if judgement.n_baseline_sessions == 1:
+        text += (
+            " With one baseline session the variation between sessions is unknown, so the limits "
+            "are widened to that of published healthy joints and of this robot's other joints; "
+            "a few more healthy recordings on other days make the verdict sharper."
+        )
+    elif judgement.n_baseline_sessions < 4:
+        text += " So few sessions say little of how much healthy ones vary; the limits are widened."
+    return text
+
+
+def _siblings(judgement: Judgement) -> list[str]:
+    factor = math.exp(judgement.common_log_ratio)
+    if factor < 1.5:
+        return []
+    text = f"The other joints' divergence has risen too, {factor:.3g} times in the middle"
+    if judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted:
+        return [
+            f"{text}: what moves all joints together (temperature, supply, logger, payload) is "
+            "not taken for a fault of one."
+        ]
+    return [f"{text}; this joint stands out from them (p = {_p(judgement.p_alone)})."]
+
+
+def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:
+    if not cells:
+        return [
+            "No motion of this joint occurs in both baseline and target; record both with the "
+            "same program."
+        ]
+    return [
+        f"{_count(judgement.n_baseline_cycles, 'baseline cycle')} and "
+        f"{_count(judgement.n_target_cycles, 'target cycle')} are too few: at least two cycles of "
+        "the baseline and one of the target are needed."
+    ]
+
+
+def _short(cells: Sequence[Cell]) -> list[str]:
+    short: dict[int, list[int]] = {}
+    for cell in cells:
+        if len(cell.cycles) and np.median(cell.cycles.sum(axis=1)) < cell.cycles.shape[1]:
+            short.setdefault(cell.order, []).append(cell.motion)
+    return [
+        f"Order {order} has {math.factorial(order)} patterns, more than motion"
+        f"{'s' if len(motions) > 1 else ''} {', '.join(map(str, motions))} give in a cycle: its "
+        "divergence is mostly chance; longer motions, a higher sampling rate or a lower order help."
+        for order, motions in sorted(short.items())
+    ]
+
+
+def _age(sources: Mapping[str, Sequence[RunSource]]) -> str:
+    started = {
+        role: sorted(time for source in runs if (time := _time(source)) is not None)
+        for role, runs in sources.items()
+    }
+    if not started.get("baseline"):
+        return " (of unknown age)"
+    first, last = started["baseline"][0], started["baseline"][-1]
+    span = f"recorded {first:%Y-%m-%d}" + (f" to {last:%Y-%m-%d}" if last != first else "")
+    if started.get("target"):
+        days = (started["target"][0] - last).total_seconds() / 86400
+        span += f", {abs(days):.0f} days {'before' if days >= 0 else 'after'} the target"
+    return f" ({span})"
+
+
+def _time(source: RunSource) -> datetime | None:
+    text = source.info.started_at
+    if not text:
+        return None
+    try:
+        time = datetime.fromisoformat(text)
+    except ValueError:
+        return None
+    return time if time.tzinfo else time.replace(tzinfo=UTC)
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
+def _p(value: float) -> str:
+    return f"{value:.2g}" if value >= 1e-4 else "below 0.0001"

@@ -1,0 +1,391 @@
+"""Stage `score`: patterns of baseline and target in, divergences and features out (thesis 4.3)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.errors import InputError
+from opamc_cli.stages.latent import LatentModels
+from opamc_cli.stats.divergence import (
+    chance_divergence,
+    divergences_from_pool,
+    leave_cycle_out_divergences,
+)
+from opamc_cli.stats.features import compare
+from opamc_cli.stats.sessions import inflation_within_sessions
+from opamc_cli.storage.sources import check_comparable, read_sources
+from opamc_cli.storage.tables import PATTERNS, read_table, table_input, write_table
+
+SCORES_NAME = "scores.parquet"
+FEATURES_NAME = "features.parquet"
+ALL_MOTIONS = -1
+
+SCORES = pa.schema(
+    [
+        ("role", pa.string()),
+        ("run", pa.string()),
+        ("axis", pa.int16()),
+        ("cycle", pa.int32()),
+        ("motion", pa.int32()),
+        ("segment", pa.int32()),
+        ("order", pa.int8()),
+        ("tau", pa.int32()),
+        ("n_patterns", pa.int64()),
+        ("n_pool", pa.int64()),
+        ("left_out", pa.string()),
+        ("jsd", pa.float64()),
+        ("chance", pa.float64()),
+        ("excess", pa.float64()),
+        ("base", pa.float64()),
+    ]
+)
+FEATURES = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("motion", pa.int32()),
+        ("order", pa.int8()),
+        ("delta_mu", pa.float64()),
+        ("delta_var", pa.float64()),
+        ("ks", pa.float64()),
+        ("n_baseline", pa.int64()),
+        ("n_target", pa.int64()),
+        ("f_max_hz", pa.float64()),
+        ("lda", pa.float64()),
+        ("base", pa.float64()),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class PatternRows:
+    """Identified rows of a pattern table that share axis, motion, order and delay.
+
+    Attributes
+    ----------
+    rows : dict of str to ndarray
+        The table's columns but `counts`.
+    counts : ndarray, shape (S, order!)
+        Pattern counts of each segment.
+    """
+
+    rows: Mapping[str, npt.NDArray[Any]]
+    counts: npt.NDArray[np.float64]
+
+    @property
+    def sessions(self) -> npt.NDArray[Any]:
+        """Name of the recording of each segment."""
+        return self.rows["run"]
+
+    @property
+    def cycles(self) -> npt.NDArray[Any]:
+        """Label of the cycle of each segment, unique over recordings."""
+        return np.array(
+            [f"{run}\n{c}" for run, c in zip(self.sessions, self.rows["cycle"], strict=True)]
+        )
+
+
+Key = tuple[int, int, int, int]
+"""Axis, motion, order, tau."""
+
+
+@dataclass(frozen=True)
+class ScoreOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    scores_path, features_path
+        The tables that were written.
+    scores, features
+        Their rows.
+    notes
+        What is worth knowing: conditions that differ, motions that one side lacks.
+    """
+
+    scores_path: Path
+    features_path: Path
+    scores: pa.Table
+    features: pa.Table
+    notes: tuple[str, ...]
+
+
+def run(
+    baseline: Path,
+    target: Path,
+    config: Config,
+    out: Path,
+    *,
+    models: LatentModels | None = None,
+) -> ScoreOutcome:
+    """Compare the target's patterns with the baseline's.
+
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `patterns`.
+    config
+        Section `score` is used.
+    out
+        Folder of the two tables.
+    models
+        Trained discriminants; None leaves the column `lda` empty.
+
+    Raises
+    ------
+    InputError
+        If a table cannot be used, the two cannot be compared, or a discriminant was trained
+        under other conditions.
+    """
+    parts = {"baseline": read_patterns(baseline), "target": read_patterns(target)}
+    notes = check_comparable(read_sources(baseline), read_sources(target))
+    common = common_keys(parts["baseline"], parts["target"])
+    if not common:
+        msg = (
+            f"{target}: has no axis, motion, order and delay in common with {baseline}; make both "
+            "with the same configuration and identify the target by the baseline's reference"
+        )
+        raise InputError(msg)
+    base = config.score.base
+    scores = score_table(parts["baseline"], parts["target"], base)
+    features = feature_table(scores, parts["target"], base, models)
+    inputs = [table_input(baseline), table_input(target)]
+    used = config.canonical("score")
+    for name, table in ((SCORES_NAME, scores), (FEATURES_NAME, features)):
+        write_table(out / name, table, stage="score", config=used, inputs=inputs)
+    missing = _missing_notes(parts["baseline"], parts["target"])
+    return ScoreOutcome(
+        out / SCORES_NAME, out / FEATURES_NAME, scores, features, (*notes, *missing)
+    )
+
+
+def read_patterns(path: Path) -> dict[Key, PatternRows]:
+    """Read the identified rows of a pattern table, by axis, motion, order and delay.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be used, or a row's counts do not fit its order.
+    """
+    return group_patterns(read_table(path, "patterns", PATTERNS), str(path))
+
+
+def group_patterns(table: pa.Table, name: str = "patterns") -> dict[Key, PatternRows]:
+    """Group the identified rows of a pattern table by axis, motion, order and delay.
+
+    Parameters
+    ----------
+    table
+        Table of stage `patterns`.
+    name
+        How an error calls it.
+
+    Raises
+    ------
+    InputError
+        If a row's counts do not fit its order.
+    """
+    columns = {
+        column: table[column].to_numpy(zero_copy_only=False)
+        for column in table.column_names
+        if column != "counts"
+    }
+    counts = table["counts"].to_pylist()
+    groups: dict[Key, list[int]] = {}
+    for row in np.flatnonzero((columns["motion"] >= 0) & (columns["n_patterns"] > 0)):
+        key = tuple(int(columns[part][row]) for part in ("axis", "motion", "order", "tau"))
+        groups.setdefault(key, []).append(int(row))  # type: ignore[arg-type]
+    result = {}
+    for key in sorted(groups):
+        rows = np.array(groups[key])
+        if len({len(counts[row]) for row in rows}) > 1:
+            msg = f"{name}: axis {key[0]}: counts of order {key[2]} differ in length; make it again"
+            raise InputError(msg)
+        result[key] = PatternRows(
+            {column: values[rows] for column, values in columns.items()},
+            np.array([counts[row] for row in rows], dtype=np.float64),
+        )
+    return result
+
+
+def common_keys(
+    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows]
+) -> list[Key]:
+    """Return the keys that both sides have, in ascending order."""
+    return sorted(set(baseline) & set(target))
+
+
+def score_table(
+    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows], base: float
+) -> pa.Table:
+    """Divergence of every segment from the baseline's pool.
+
+    A baseline segment meets the pool without its own session, or without its own cycle where
+    there is one session only; a target segment meets the whole pool. `chance` is what finite,
+    overlapping patterns would show by themselves, `excess` the rest.
+    """
+    tables = [SCORES.empty_table()]
+    for key in common_keys(baseline, target):
+        own, other = baseline[key], target[key]
+        several = len(np.unique(own.sessions)) > 1
+        label = own.sessions if several else own.cycles
+        pool = own.counts.sum(axis=0)
+        n_own = own.counts.sum(axis=1)
+        n_rest = pool.sum() - np.array([n_own[label == each].sum() for each in label])
+        cycles, session = cycle_counts(own)
+        inflation = inflation_within_sessions(cycles, session)
+        tables.append(
+            _score_rows(
+                "baseline",
+                own,
+                leave_cycle_out_divergences(own.counts, label, base),
+                n_rest,
+                "session" if several else "cycle",
+                _chance(pool, n_own, n_rest, inflation, base),
+                base,
+            )
+        )
+        n_other = other.counts.sum(axis=1)
+        tables.append(
+            _score_rows(
+                "target",
+                other,
+                divergences_from_pool(other.counts, pool, base),
+                np.full(len(n_other), pool.sum()),
+                "none",
+                _chance(pool, n_other, np.full(len(n_other), pool.sum()), inflation, base),
+                base,
+            )
+        )
+    return pa.concat_tables(tables).combine_chunks()
+
+
+def cycle_counts(
+    part: PatternRows,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
+    """Pool the segments of each cycle.
+
+    Returns
+    -------
+    counts : ndarray, shape (C, K)
+    session : ndarray, shape (C,)
+        Index of each cycle's recording among the sorted names.
+    """
+    labels, place = np.unique(part.cycles, return_inverse=True)
+    counts = np.zeros((len(labels), part.counts.shape[1]))
+    np.add.at(counts, place, part.counts)
+    _, session = np.unique(part.sessions, return_inverse=True)
+    of_cycle = np.zeros(len(labels), dtype=np.int64)
+    of_cycle[place] = session
+    return counts, of_cycle
+
+
+def feature_table(
+    scores: pa.Table,
+    target: Mapping[Key, PatternRows],
+    base: float,
+    models: LatentModels | None = None,
+) -> pa.Table:
+    """Δμ, Δσ² and KS of every axis and order: for each motion, and for all pooled (motion -1)."""
+    columns = {
+        name: scores[name].to_numpy(zero_copy_only=False)
+        for name in ("role", "axis", "motion", "order", "jsd")
+    }
+    speeds: dict[tuple[int, int], list[float]] = {}
+    for (axis, motion, _, _), part in target.items():
+        speeds.setdefault((axis, motion), []).append(float(np.median(part.rows["f_max_hz"])))
+    rows = []
+    for axis in np.unique(columns["axis"]).tolist():
+        of_axis = columns["axis"] == axis
+        for order in np.unique(columns["order"][of_axis]).tolist():
+            chosen = of_axis & (columns["order"] == order)
+            motions = np.unique(columns["motion"][chosen]).tolist()
+            for motion in [ALL_MOTIONS, *motions]:
+                mask = chosen & ((columns["motion"] == motion) | (motion == ALL_MOTIONS))
+                jsd = {
+                    role: columns["jsd"][mask & (columns["role"] == role)]
+                    for role in ("baseline", "target")
+                }
+                jsd = {role: values[np.isfinite(values)] for role, values in jsd.items()}
+                features = compare(jsd["baseline"], jsd["target"])
+                used = motions if motion == ALL_MOTIONS else [motion]
+                row: dict[str, Any] = {
+                    "axis": axis,
+                    "motion": motion,
+                    "order": order,
+                    "delta_mu": _known(features.delta_mu),
+                    "delta_var": _known(features.delta_var),
+                    "ks": _known(features.ks),
+                    "n_baseline": len(jsd["baseline"]),
+                    "n_target": len(jsd["target"]),
+                    "f_max_hz": max(max(speeds[axis, each]) for each in used),
+                    "lda": None,
+                    "base": base,
+                }
+                if models is not None and motion == ALL_MOTIONS:
+                    row["lda"] = models.project(row)
+                rows.append(row)
+    return pa.Table.from_pylist(rows, schema=FEATURES)
+
+
+def _score_rows(
+    role: str,
+    part: PatternRows,
+    jsd: npt.NDArray[np.float64],
+    n_pool: npt.NDArray[np.float64],
+    left_out: str,
+    chance: npt.NDArray[np.float64],
+    base: float,
+) -> pa.Table:
+    n = len(jsd)
+    columns: dict[str, Any] = {
+        "role": [role] * n,
+        **{
+            name: part.rows[name]
+            for name in ("run", "axis", "cycle", "motion", "segment", "order", "tau", "n_patterns")
+        },
+        "n_pool": n_pool.astype(np.int64),
+        "left_out": [left_out] * n,
+        "jsd": pa.array(jsd, from_pandas=True),
+        "chance": pa.array(chance, from_pandas=True),
+        "excess": pa.array(jsd - chance, from_pandas=True),
+        "base": np.full(n, base),
+    }
+    return pa.table(columns).select(SCORES.names).cast(SCORES)
+
+
+def _chance(
+    pool: npt.NDArray[np.float64],
+    n_segment: npt.NDArray[np.float64],
+    n_pool: npt.NDArray[np.float64],
+    inflation: float,
+    base: float,
+) -> npt.NDArray[np.float64]:
+    result = np.full(len(n_segment), np.nan)
+    known = n_pool > 0
+    if known.any():
+        result[known] = chance_divergence(
+            pool, n_segment[known] / inflation, n_pool[known] / inflation, base
+        )
+    return result
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _missing_notes(
+    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows]
+) -> Sequence[str]:
+    notes = []
+    have = {role: {key[:2] for key in side} for role, side in (("b", baseline), ("t", target))}
+    for axis, motion in sorted(have["b"] - have["t"]):
+        notes.append(f"axis {axis}: motion {motion} of the baseline does not occur in the target")
+    for axis, motion in sorted(have["t"] - have["b"]):
+        notes.append(f"axis {axis}: motion {motion} of the target does not occur in the baseline")
+    return notes

@@ -1,0 +1,221 @@
+"""Stage `verdict`: patterns, scores and features in, verdict.json out."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.cells import cells_by_axis
+from opamc_cli.stages.reasons import reasons
+from opamc_cli.stages.score import (
+    ALL_MOTIONS,
+    FEATURES,
+    SCORES,
+    Key,
+    PatternRows,
+    read_patterns,
+)
+from opamc_cli.stats.decision import Judgement, Policy, State, judge
+from opamc_cli.storage.atomic import write_text
+from opamc_cli.storage.sources import RunSource, read_sources
+from opamc_cli.storage.tables import read_table
+
+FILE_NAME = "verdict.json"
+
+OUTSIDE_THE_GEAR = frozenset(
+    {
+        "payload_change",
+        "thermal_viscous",
+        "warmup",
+        "time_delay",
+        "sensor_offset",
+        "sensor_gain",
+        "dead_time",
+        "mains_hum",
+    }
+)
+"""Causes that change the current without anything being worn."""
+
+
+@dataclass(frozen=True)
+class VerdictOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The file that was written.
+    verdict
+        Its content.
+    exit_code
+        What it ends with.
+    """
+
+    path: Path
+    verdict: dict[str, Any]
+    exit_code: ExitCode
+
+
+def run(
+    baseline: Path,
+    target: Path,
+    scores: Path,
+    features: Path,
+    config: Config,
+    out: Path,
+    *,
+    causes: Mapping[int, Mapping[str, Any]] | None = None,
+) -> VerdictOutcome:
+    """Decide about every joint and write the verdict.
+
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `patterns`.
+    scores, features
+        Tables of stage `score`, made from the same two.
+    config
+        Section `score` is used; the verdict carries the hash of the whole.
+    out
+        Folder of verdict.json.
+    causes
+        Cause of the change by axis, from closing the loop of the joint's model.
+
+    Raises
+    ------
+    InputError
+        If a table cannot be used.
+    """
+    verdict = decide(
+        (read_patterns(baseline), read_patterns(target)),
+        (read_sources(baseline), read_sources(target)),
+        read_table(scores, "score", SCORES),
+        read_table(features, "score", FEATURES),
+        config,
+        causes or {},
+    )
+    path = out / FILE_NAME
+    write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
+    return VerdictOutcome(path, verdict, exit_code(verdict))
+
+
+def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
+    """Return the exit code of a verdict: one unhealthy joint makes it 1, none judged 5."""
+    states = [axis["state"] for axis in verdict["axes"]]
+    if any(state in ("changed", "fault") for state in states):
+        return ExitCode.UNHEALTHY
+    return ExitCode.DONE if "healthy" in states else ExitCode.NOT_ENOUGH_DATA
+
+
+def decide(
+    patterns: tuple[Mapping[Key, PatternRows], Mapping[Key, PatternRows]],
+    sources: tuple[tuple[RunSource, ...], tuple[RunSource, ...]],
+    scores: pa.Table,
+    features: pa.Table,
+    config: Config,
+    causes: Mapping[int, Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return the content of verdict.json.
+
+    Parameters
+    ----------
+    patterns, sources
+        Of baseline and target.
+    scores, features
+        Tables of stage `score`.
+    config
+        Section `score` is used.
+    causes
+        Cause by axis.
+    """
+    cells = cells_by_axis(*patterns)
+    judgements = judge(cells, policy_of(config.score))
+    jsd = _divergences(scores)
+    pooled = _pooled_features(features)
+    axes = []
+    for axis, judgement in judgements.items():
+        cause = causes.get(axis)
+        decided = _with_cause(judgement, cause)
+        motions = [
+            {
+                "motion": cell.motion,
+                "order": cell.order,
+                "tau": cell.tau,
+                "jsd_baseline": jsd.get(("baseline", axis, cell.motion, cell.order, cell.tau), []),
+                "jsd_target": jsd.get(("target", axis, cell.motion, cell.order, cell.tau), []),
+            }
+            for cell in cells[axis]
+        ]
+        runs = {
+            role: [source for source in side if source.name in _runs_of(axis, part)]
+            for role, side, part in zip(("baseline", "target"), sources, patterns, strict=True)
+        }
+        axes.append(
+            {
+                "axis": axis,
+                "state": decided.state,
+                "health_index": _finite(decided.health_index),
+                "p_value": _finite(decided.p_value),
+                "p_adjusted": _finite(decided.p_adjusted),
+                "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
+                "motions": motions,
+                "cause": None if cause is None else dict(cause),
+                "reasons": reasons(decided, cells[axis], motions, runs, cause),
+            }
+        )
+    return {"axes": axes, "base": config.score.base, "config_hash": config.digest()}
+
+
+def policy_of(config: ScoreConfig) -> Policy:
+    """Return the decision's limits from the configuration."""
+    return Policy(
+        false_alarm_rate=config.false_alarm_rate,
+        minimum_effect=config.minimum_effect,
+        fault_effect=config.fault_effect,
+        permutations=config.permutations,
+        seed=config.seed,
+    )
+
+
+def _with_cause(judgement: Judgement, cause: Mapping[str, Any] | None) -> Judgement:
+    """Call a change of known cause a fault only if the cause lies in the joint."""
+    if cause is None or judgement.state not in ("changed", "fault"):
+        return judgement
+    state: State = "changed" if cause.get("effect") in OUTSIDE_THE_GEAR else "fault"
+    return replace(judgement, state=state)
+
+
+def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
+    return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.sessions}
+
+
+def _divergences(scores: pa.Table) -> dict[tuple[str, int, int, int, int], list[float]]:
+    found: dict[tuple[str, int, int, int, int], list[float]] = {}
+    names = ["role", "axis", "motion", "order", "tau", "jsd"]
+    for row in scores.select(names).to_pylist():
+        if row["jsd"] is not None and math.isfinite(row["jsd"]):
+            key = (row["role"], row["axis"], row["motion"], row["order"], row["tau"])
+            found.setdefault(key, []).append(row["jsd"])
+    return found
+
+
+def _pooled_features(features: pa.Table) -> dict[int, dict[str, float | None]]:
+    """Pick the features over all motions of the highest order, the thesis's better one (5.2)."""
+    pooled = [row for row in features.to_pylist() if row["motion"] == ALL_MOTIONS]
+    best = {row["axis"]: row for row in sorted(pooled, key=lambda row: row["order"])}
+    return {
+        axis: {name: _finite(row[name]) for name in ("delta_mu", "delta_var", "ks")}
+        for axis, row in best.items()
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and np.isfinite(value) else None

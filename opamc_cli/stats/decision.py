@@ -1,0 +1,388 @@
+"""Healthy, changed or at fault: from divergences between sessions to a state per joint."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opamc_cli.stats.divergence import chance_divergence, effect_size, jensen_shannon
+from opamc_cli.stats.multiplicity import holm
+from opamc_cli.stats.permutation import relabelled_p_value, relabellings
+from opamc_cli.stats.sessions import Cell, paired_log_divergences, pooled_divergence
+from opamc_cli.stats.spread import (
+    BETWEEN_SESSIONS,
+    Spread,
+    moderated_spread,
+    shared_prior,
+    spliced_p_value,
+    upper_tail,
+)
+
+FloatArray = NDArray[np.float64]
+State = Literal["healthy", "changed", "fault", "insufficient-data"]
+Method = Literal["sessions", "relabelled-sessions", "one-session", "none"]
+
+HEALTHY_SHIFT_BITS = 0.0075
+"""Divergence between two healthy sessions where only one is known.
+
+Geometric mean of Δμ of the thesis's healthy joints before and after reassembly, order 4, Tables
+5-3 and 5-6: 5.2, 10.1, 14.7, 8.6, 4.8 and 5.3 times 1e-3. Those of order 5 are larger because the
+thesis holds its baseline, not its target, against a pool that contains it; that bias is gone here.
+"""
+
+HEALTHY_SHIFT_SPREAD = Spread(0.45, 5.0)
+"""Spread of the logarithms of those six numbers."""
+
+
+@dataclass(frozen=True)
+class Policy:
+    """What it takes to call a joint changed or at fault.
+
+    Attributes
+    ----------
+    false_alarm_rate : float
+        Largest accepted probability of any false alarm over all joints of one diagnosis.
+    minimum_effect : float
+        Least relative change of the pattern probabilities (Cohen's w) that matters.
+    fault_effect : float
+        Relative change from which a change is called a fault.
+    permutations : int
+        Most relabellings evaluated.
+    seed : int
+        Seed of the draw if there are more.
+    """
+
+    false_alarm_rate: float = 0.01
+    minimum_effect: float = 0.1
+    fault_effect: float = 0.3
+    permutations: int = 1000
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far the target's divergence lies from the baseline's.
+
+    Attributes
+    ----------
+    log_ratio : float
+        Log of the target's divergence over what a healthy session shows.
+    unit : float
+        Standard deviation of a healthy session's log divergence.
+    spread : Spread
+        Standard deviation of `log_ratio` if nothing has changed.
+    """
+
+    log_ratio: float
+    unit: float
+    spread: Spread
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """The decision about one joint.
+
+    Attributes
+    ----------
+    state : str
+        healthy, changed, fault or insufficient-data.
+    health_index : float
+        0 at the baseline's mean, in units of the baseline's own spread; larger is worse.
+    p_value : float
+        Probability of at least such a shift if the joint is healthy; NaN without data.
+    p_adjusted : float
+        Corrected for the number of joints (Holm).
+    p_alone : float
+        As `p_adjusted`, after what the siblings have in common is taken off.
+    common_log_ratio : float
+        What was taken off, not negative.
+    divergence_ratio : float
+        Target's divergence over what a healthy session shows.
+    effect : float
+        Relative change of the pattern probabilities beyond the baseline's own (Cohen's w), in
+        the motion and order where it is largest.
+    method : str
+        sessions, relabelled-sessions, one-session or none.
+    n_baseline_sessions, n_target_sessions, n_baseline_cycles, n_target_cycles : int
+        What it rests on.
+    """
+
+    state: State
+    health_index: float
+    p_value: float
+    p_adjusted: float
+    p_alone: float
+    common_log_ratio: float
+    divergence_ratio: float
+    effect: float
+    method: Method
+    n_baseline_sessions: int
+    n_target_sessions: int
+    n_baseline_cycles: int
+    n_target_cycles: int
+
+
+def judge(
+    cells_by_axis: Mapping[int, Sequence[Cell]],
+    policy: Policy = Policy(),
+) -> dict[int, Judgement]:
+    """Decide about every joint of a diagnosis.
+
+    Parameters
+    ----------
+    cells_by_axis : mapping of int to sequence of Cell
+        Motions and orders of each axis; an axis without any has insufficient data.
+    policy : Policy
+        Levels and limits.
+
+    Returns
+    -------
+    dict of int to Judgement
+        By axis, in ascending order.
+
+    Notes
+    -----
+    A joint is unhealthy if three things hold: the shift is improbable for a healthy joint, after
+    correction for the number of joints; it remains so after the shift that the siblings have in
+    common is taken off; and the pattern probabilities change by enough to matter.
+    """
+    axes = sorted(cells_by_axis)
+    methods = {axis: _method(cells_by_axis[axis]) for axis in axes}
+    pairs = {
+        axis: paired_log_divergences(cells_by_axis[axis])
+        for axis in axes
+        if methods[axis] in ("sessions", "relabelled-sessions")
+    }
+    shifts = _session_shifts(pairs)
+    lone = {
+        axis: one_session_log_ratio(cells_by_axis[axis])
+        for axis in axes
+        if methods[axis] == "one-session"
+    }
+    shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
+    common = {axis: common_log_ratio(shifts, axis) if axis in pairs else 0.0 for axis in axes}
+
+    def p_value(axis: int, taken_off: float) -> float:
+        if methods[axis] == "none":
+            return math.nan
+        shift = shifts[axis]
+        tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
+        if methods[axis] == "sessions":
+            own, target = pairs[axis]
+            distance = target[:, 0] - own
+            place = shift.log_ratio - distance
+            return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread)
+        cells = cells_by_axis[axis]
+        if methods[axis] == "one-session":
+            # Beyond what sessions may differ by, and beyond what cycles differ by.
+            return max(tail, _cycle_p_value(cells, policy))
+        n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
+        labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
+        values = pooled_divergence(cells, labels)
+        values[0] *= math.exp(-taken_off)
+        return relabelled_p_value(values[np.isfinite(values)], n_baseline + n_target)
+
+    p_values = {axis: p_value(axis, 0.0) for axis in axes}
+    p_alone = {
+        axis: max(p_values[axis], p_value(axis, common[axis])) if common[axis] else p_values[axis]
+        for axis in axes
+    }
+    adjusted = dict(zip(axes, holm([p_values[axis] for axis in axes]).tolist(), strict=True))
+    alone = dict(zip(axes, holm([p_alone[axis] for axis in axes]).tolist(), strict=True))
+    judgements = {}
+    for axis in axes:
+        cells = cells_by_axis[axis]
+        known = methods[axis] != "none"
+        shift = shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
+        effect = float(np.nanmax(effect_by_cell(cells))) if known else math.nan
+        judgements[axis] = Judgement(
+            state=_state(adjusted[axis], alone[axis], effect, policy),
+            health_index=math.expm1(min(shift.log_ratio, 100.0)) / shift.unit,
+            p_value=p_values[axis],
+            p_adjusted=adjusted[axis],
+            p_alone=alone[axis],
+            common_log_ratio=common[axis],
+            divergence_ratio=math.exp(min(shift.log_ratio, 100.0)),
+            effect=effect,
+            method=methods[axis],
+            n_baseline_sessions=_present(cells, "baseline"),
+            n_target_sessions=_present(cells, "target"),
+            n_baseline_cycles=max((len(cell.cycles) for cell in cells), default=0),
+            n_target_cycles=max((len(cell.target_cycles) for cell in cells), default=0),
+        )
+    return judgements
+
+
+def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:
+    """Relative change of the pattern probabilities in each motion and order.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Motions and orders of one axis.
+
+    Returns
+    -------
+    ndarray, shape (len(cells),)
+        Cohen's w of the divergence of the target's sessions, pooled, beyond that of the
+        baseline's own; NaN where either has no counts.
+    """
+    effects = np.full(len(cells), np.nan)
+    for j, cell in enumerate(cells):
+        pool, target = cell.baseline.sum(axis=0), cell.target.sum(axis=0)
+        if pool.sum() == 0 or target.sum() == 0:
+            continue
+        usual = float(
+            chance_divergence(pool, target.sum() / cell.inflation, pool.sum() / cell.inflation)
+        )
+        present = cell.baseline[cell.baseline.sum(axis=1) > 0]
+        if len(present) > 1:
+            usual = max(usual, float(np.mean(jensen_shannon(present, pool - present))))
+        effects[j] = float(effect_size(float(jensen_shannon(target, pool)) - usual))
+    return effects
+
+
+def one_session_log_ratio(cells: Sequence[Cell]) -> float:
+    """Log of the target's divergence over what healthy sessions are allowed.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Motions and orders of an axis with a single baseline session.
+
+    Returns
+    -------
+    float
+        0 if the divergence equals chance plus `HEALTHY_SHIFT_BITS`.
+    """
+    ratios = []
+    for cell in cells:
+        pool = cell.baseline.sum(axis=0)
+        sessions = cell.target[cell.target.sum(axis=1) > 0]
+        if pool.sum() == 0 or not len(sessions):
+            continue
+        n = sessions.sum(axis=1) / cell.inflation
+        chance = chance_divergence(pool, n, pool.sum() / cell.inflation)
+        ratio = jensen_shannon(sessions, pool) / (chance + HEALTHY_SHIFT_BITS)
+        ratios.append(float(np.mean(ratio)))
+    return math.log(max(float(np.mean(ratios)), 1e-6)) if ratios else math.nan
+
+
+def one_session_shift(log_ratios: Mapping[int, float], axis: int) -> Shift:
+    """Place a joint among its siblings where the variation between sessions is unknown.
+
+    Parameters
+    ----------
+    log_ratios : mapping of int to float
+        `one_session_log_ratio` of each joint.
+    axis : int
+        The joint in question.
+
+    Returns
+    -------
+    Shift
+        Relative to the median of the siblings and of published healthy joints, with a spread
+        blended from both.
+
+    Notes
+    -----
+    The siblings went through the same two sessions and most of them are healthy: what they show
+    is the variation between sessions. Median and median absolute deviation let less than half of
+    them be at fault.
+    """
+    others = [value for key, value in log_ratios.items() if key != axis and math.isfinite(value)]
+    prior = HEALTHY_SHIFT_SPREAD
+    if len(others) < 2:
+        scale = prior.scale * math.sqrt(1 + 1 / (prior.dof + 1))
+        return Shift(log_ratios[axis], prior.scale, Spread(scale, prior.dof))
+    values = np.array([0.0, *others])
+    centre = float(np.median(values))
+    deviation = 1.4826 * float(np.median(np.abs(values - centre)))
+    # a median absolute deviation is worth about 0.4 of the values it is made of
+    blended = moderated_spread(deviation**2, 0.4 * len(others), prior)
+    scale = blended.scale * math.sqrt(1 + 1 / len(values))
+    return Shift(log_ratios[axis] - centre, blended.scale, Spread(scale, blended.dof))
+
+
+def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
+    """Shift that the siblings of a joint have in common.
+
+    Parameters
+    ----------
+    shifts : mapping of int to Shift
+        All joints of the session.
+    axis : int
+        The joint in question.
+
+    Returns
+    -------
+    float
+        Median over the siblings, as a log ratio, or in units of each joint's own spread if that
+        is more; 0 if negative or with fewer than two siblings.
+    """
+    others = [shift for key, shift in shifts.items() if key != axis]
+    if len(others) < 2:
+        return 0.0
+    plain = float(np.median([shift.log_ratio for shift in others]))
+    scaled = float(np.median([shift.log_ratio / shift.spread.scale for shift in others]))
+    return max(0.0, plain, scaled * shifts[axis].spread.scale)
+
+
+def _session_shifts(pairs: Mapping[int, tuple[FloatArray, FloatArray]]) -> dict[int, Shift]:
+    variances = {
+        axis: float(own.var(ddof=1)) if len(own) > 2 else math.nan
+        for axis, (own, _) in pairs.items()
+    }
+    shifts = {}
+    for axis, (own, target) in pairs.items():
+        # Two sessions have the same divergence from each other: no spread can be had from them.
+        dof = len(own) - 1 if len(own) > 2 else 0
+        siblings = [variance for key, variance in variances.items() if key != axis]
+        prior = shared_prior(siblings, dof)
+        unit = moderated_spread(variances[axis], dof, prior)
+        scale = unit.scale * math.sqrt(1 / len(own) + 1 / target.shape[1])
+        log_ratio = float(np.mean(target) - np.mean(own))
+        shifts[axis] = Shift(log_ratio, unit.scale, Spread(scale, unit.dof))
+    return shifts
+
+
+def _cycle_p_value(cells: Sequence[Cell], policy: Policy) -> float:
+    n_baseline = max(len(cell.cycles) for cell in cells)
+    n_target = max(len(cell.target_cycles) for cell in cells)
+    by_cycle = [
+        cell.with_units(cell.cycles, cell.target_cycles)
+        for cell in cells
+        if len(cell.cycles) == n_baseline and len(cell.target_cycles) == n_target
+    ]
+    if not by_cycle:
+        return 1.0
+    labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
+    return relabelled_p_value(pooled_divergence(by_cycle, labels), n_baseline + n_target)
+
+
+def _method(cells: Sequence[Cell]) -> Method:
+    n_baseline, n_target = _present(cells, "baseline"), _present(cells, "target")
+    n_cycles = max((len(cell.cycles) for cell in cells), default=0)
+    if not n_target or n_cycles < 2:
+        return "none"
+    if n_baseline == 1:
+        return "one-session"
+    return "sessions" if n_target == 1 else "relabelled-sessions"
+
+
+def _present(cells: Sequence[Cell], side: Literal["baseline", "target"]) -> int:
+    """Return in how many sessions of one side the axis moves at all."""
+    counts = [getattr(cell, side).sum(axis=1) > 0 for cell in cells]
+    return int(np.any(counts, axis=0).sum()) if counts else 0
+
+
+def _state(p_adjusted: float, p_alone: float, effect: float, policy: Policy) -> State:
+    if not math.isfinite(p_adjusted):
+        return "insufficient-data"
+    level = policy.false_alarm_rate
+    if p_adjusted > level or p_alone > level or effect < policy.minimum_effect:
+        return "healthy"
+    return "fault" if effect >= policy.fault_effect else "changed"
