@@ -63,9 +63,11 @@ def ingest(
 
 def _account(stamps: "StampAccount", rate_hz: float) -> str:
     if stamps.even:
+        drifts = abs(stamps.measured_rate_hz / rate_hz - 1) > 1e-6
         return (
             f"time stamps are even ({stamps.measured_rate_hz:.6g} Hz, steps within "
-            f"{stamps.jitter_s * 1e3:.3g} ms); samples kept as they are"
+            f"{stamps.jitter_s * 1e3:.3g} ms of it); samples kept as they are"
+            + (f" and taken as {rate_hz:g} Hz" if drifts else "")
         )
     dropped = [
         f"{count} {what}"

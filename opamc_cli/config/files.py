@@ -110,7 +110,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
+        # a misspelt key is also a missing one: its spelling is what helps
+        first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
         place = [str(part) for part in first["loc"]]
         key = ".".join(place)
         if first["type"] == "extra_forbidden":
@@ -118,6 +119,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
             close = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
             msg = f"{source}: unknown key {key!r}; {hint}"
+        elif first["type"] == "missing":
+            msg = f"{source}: {key} is missing; add it"
         else:
             value = first["input"]
             msg = f"{source}: {key} is {value!r}; {_lower_first(first['msg'])}"

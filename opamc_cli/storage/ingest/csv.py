@@ -152,12 +152,12 @@ class CsvSource:
             column, row, value = int(match[1]), int(match[2]), match[3]
             name = self._names[column] if column < len(self._names) else f"number {column}"
             return (
-                f"{self.path}: column {name} holds {value[:40]!r} in data row {row}, which is not "
+                f"{self.path}: column {name} holds {value[:40]!r} in line {row}, which is not "
                 f"a number with decimal {self._map.decimal!r}; check decimal and separator"
             )
         if match := _WIDTH.search(text):
             return (
-                f"{self.path}: data row {match[1]} has {match[3]} columns where the first has "
+                f"{self.path}: line {match[1]} has {match[3]} columns where the first has "
                 f"{match[2]}; check separator, skip_rows and whether the file is cut off"
             )
         return f"{self.path}: cannot be read as a text table ({first_line})"

@@ -153,21 +153,22 @@ def _even_clock(times_s: Seconds, declared_rate_hz: float | None) -> Clock | Non
     if period <= 0:
         return None
     coarse = resolution_s(times_s)
-    # where a stamp's step is nearly a sample, a missing sample would pass as rounding
-    rounding = coarse * (1 - 1e-9) if coarse < period / 2 else 0.0
-    allowed = max(2 * EVEN_WITHIN * period, rounding)
-    if _spread(times_s, period) > allowed:
-        return None
-    measured = 1.0 / period
-    if declared_rate_hz is None:
-        simple = float(f"{measured:.6g}")
-        rate = simple if _spread(times_s, 1.0 / simple) <= allowed else measured
-    elif abs(measured / declared_rate_hz - 1.0) <= DRIFT_WITHIN:
+    if declared_rate_hz is not None and _is_line(times_s, 1.0 / declared_rate_hz, coarse):
         rate = declared_rate_hz
     else:
-        return None
+        # a line that is free to tilt would pass off a missing sample as rounding to whole samples
+        rounding = coarse if coarse < period / 2 else 0.0
+        if not _is_line(times_s, period, rounding):
+            return None
+        if declared_rate_hz is None:
+            simple = float(f"{1.0 / period:.6g}")
+            rate = simple if _is_line(times_s, 1.0 / simple, rounding) else 1.0 / period
+        elif abs(1.0 / period / declared_rate_hz - 1.0) <= DRIFT_WITHIN:
+            rate = declared_rate_hz
+        else:
+            return None
     jitter = max(float(np.abs(step - period).max()) for step in _steps(times_s))
-    account = StampAccount(True, measured, jitter, 0, 0, 0.0, 0, 0, 0)
+    account = StampAccount(True, 1.0 / period, jitter, 0, 0, 0.0, 0, 0, 0)
     return Clock(rate, len(times_s), float(times_s[0]), None, 0.0, account)
 
 
@@ -242,13 +243,19 @@ def _fitted_period(times_s: Seconds) -> float:
     return total * 12 / (n * (n * n - 1.0))
 
 
-def _spread(times_s: Seconds, period: float) -> float:
-    """Return the range of the stamps' deviations from evenly spaced ones."""
+def _is_line(times_s: Seconds, period: float, rounding_s: float) -> bool:
+    """Return whether the stamps are evenly spaced, to 1 % of a sample or to their rounding.
+
+    A period of whole rounding steps is not rounded at all: a step more is a missing sample.
+    """
+    steps = period / rounding_s if rounding_s > 0 else 1.0
+    if abs(steps - round(steps)) < 1e-6 and steps > 0.5:
+        rounding_s = 0.0
     low, high = np.inf, -np.inf
     for a, b in _chunks(len(times_s)):
         deviation = times_s[a:b] - times_s[0] - np.arange(a, b) * period
         low, high = min(low, float(deviation.min())), max(high, float(deviation.max()))
-    return high - low
+    return high - low <= max(2 * EVEN_WITHIN * period, rounding_s * (1 + 1e-9))
 
 
 def _steps(times_s: Seconds) -> Iterator[Seconds]:

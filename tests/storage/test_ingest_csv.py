@@ -1,0 +1,263 @@
+import gzip
+import json
+
+import numpy as np
+import pytest
+
+from opamc_cli.errors import ConfigError, InputError, UsageError
+from opamc_cli.stages import ingest
+from opamc_cli.storage.ingest.map import load_map
+from opamc_cli.storage.runs import Run, file_sha256
+
+
+def run_map(tmp_path, text, files, out="out"):
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    return ingest.run(files, load_map(path), tmp_path / out)
+
+
+def only_run(outcome):
+    assert not outcome.errors, outcome.errors
+    (item,) = outcome.results
+    return Run(item.run)
+
+
+def refusal(outcome):
+    assert not outcome.results
+    (error,) = outcome.errors
+    assert isinstance(error, InputError)
+    return str(error)
+
+
+CURRENTS = np.array([[1.5, -2.25, 0.75], [0.0, 3e-3, -1.0], [2.0, 1.0, -3.0], [4.0, 5.0, 6.0]])
+
+
+def write_table(path, separator=",", decimal=".", top="", trailing="", newline="\n", encoding=None):
+    rows = [separator.join(repr(float(v)) for v in row).replace(".", decimal) for row in CURRENTS]
+    text = top + "".join(row + trailing + newline for row in rows)
+    path.write_bytes(text.encode(encoding or "utf-8"))
+    return path
+
+
+def phases(first="0", second="1", third="2", unit="A"):
+    sources = zip("abc", (first, second, third), strict=True)
+    return "columns:\n" + "".join(
+        f"  axis1_{p}: {{source: {s}, unit: {unit}}}\n" for p, s in sources
+    )
+
+
+def check_currents(run, factor=1.0):
+    data = run.read(["axis1_a", "axis1_b", "axis1_c"])
+    for column, values in zip(CURRENTS.T, data.values(), strict=True):
+        assert values.dtype == np.float32
+        np.testing.assert_array_equal(values, (column * factor).astype(np.float32))
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", "|", " ", "::", ", "])
+def test_any_separator(tmp_path, separator):
+    file = write_table(tmp_path / "r.csv", separator)
+    text = f"header: false\nseparator: {json.dumps(separator)}\nsampling_rate_hz: 2048\n"
+    check_currents(only_run(run_map(tmp_path, text + phases(), [file])))
+
+
+def test_whitespace_is_any_run_of_blanks(tmp_path):
+    file = tmp_path / "r.txt"
+    file.write_text("".join("  " + " \t ".join(map(str, row)) + "  \n" for row in CURRENTS))
+    text = "header: false\nseparator: whitespace\nsampling_rate_hz: 2048\n"
+    check_currents(only_run(run_map(tmp_path, text + phases(), [file])))
+
+
+def test_decimal_comma_latin1_header_units_row_and_empty_columns(tmp_path):
+    top = "logger 7;µ-meter\n\nStröm;b ;c;;\n[mA];[mA];[mA];;\n"
+    file = write_table(tmp_path / "r.csv", ";", ",", top, ";;", "\r\n", "latin-1")
+    text = (
+        'separator: ";"\ndecimal: ","\nencoding: latin-1\nskip_rows: 2\nunits_rows: 1\n'
+        "sampling_rate_hz: 500\n" + phases("Ström", "b", "c", "mA")
+    )
+    run = only_run(run_map(tmp_path, text, [file]))
+    assert run.sampling_rate_hz == 500
+    check_currents(run, 1e-3)
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n", "\r"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_line_ends_and_byte_order_marks(tmp_path, newline, encoding):
+    top = f"a,b,c{newline}"
+    file = write_table(tmp_path / "r.csv", top=top, newline=newline, encoding=encoding)
+    declared = "utf-16" if encoding == "utf-16" else "utf-8"
+    text = f"encoding: {declared}\nsampling_rate_hz: 10\n" + phases("a", "b", "c")
+    check_currents(only_run(run_map(tmp_path, text, [file])))
+
+
+def test_gzip_is_read_through(tmp_path):
+    plain = write_table(tmp_path / "r.csv")
+    packed = tmp_path / "packed.csv.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    outcome = run_map(tmp_path, "header: false\nsampling_rate_hz: 10\n" + phases(), [packed])
+    check_currents(only_run(outcome))
+    assert outcome.results[0].run.name == "packed.parquet"
+
+
+def test_empty_cells_are_missing_and_counted(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("a,b\n1,2\n,3\nNaN,\n4,5\n")
+    text = (
+        "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: a, unit: A}, "
+        "axis1_b: {source: b, unit: A}}"
+    )
+    outcome = run_map(tmp_path, text, [file])
+    assert outcome.results[0].missing == {"axis1_a": 2, "axis1_b": 1}
+    np.testing.assert_array_equal(
+        only_run(outcome).read(["axis1_a"])["axis1_a"], [1, np.nan, np.nan, 4]
+    )
+
+
+def test_scale_and_offset_come_before_the_unit(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("v\n2.5\n3.5\n")
+    text = (
+        "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: v, unit: mA, scale: 200, offset: -500}}"
+    )
+    values = only_run(run_map(tmp_path, text, [file])).read(["axis1_a"])["axis1_a"]
+    np.testing.assert_allclose(values, [0.0, 0.2])
+
+
+def test_metadata_values_and_values_from_columns(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("i,when,kg\n1,2022-10-26T10:17:21.5+02:00,1.5\n2,2022-10-26T10:17:22+02:00,9\n")
+    text = (
+        "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: i, unit: A}}\n"
+        "metadata: {robot: R1, program: pick, speed_percent: 50, payload_kg: {source: kg}, "
+        "started_at: {source: when}}"
+    )
+    info = only_run(run_map(tmp_path, text, [file])).info
+    assert (info.robot, info.program, info.speed_percent, info.payload_kg) == (
+        "R1",
+        "pick",
+        50,
+        1.5,
+    )
+    assert info.started_at == "2022-10-26T08:17:21.500000Z"
+    assert info.source_sha256 == file_sha256(file)
+
+
+def test_a_large_file_is_the_same_as_its_rows(tmp_path):
+    rng = np.random.default_rng(5)
+    values = rng.normal(size=300_000).round(6)
+    file = tmp_path / "r.csv"
+    file.write_text("x\n" + "\n".join(map(repr, values.tolist())) + "\n")
+    text = "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: x, unit: A}}"
+    run = only_run(run_map(tmp_path, text, [file]))
+    np.testing.assert_array_equal(run.read(["axis1_a"])["axis1_a"], values.astype(np.float32))
+    assert [start for start, _ in run.blocks(["axis1_a"])] == [0, 1 << 18]
+
+
+@pytest.mark.parametrize(
+    ("content", "expected"),
+    [
+        (b"", "empty"),
+        (b"a,b\n", "no data rows"),
+        (b"a,b\n1,x7\n", "column b holds 'x7' in line 2"),
+        (b"a,b\n1,2\n3\n", "line 3 has 1 columns where the first has 2"),
+        (b"a,b\n1,2\n3,4,5\n", "line 3 has 3 columns"),
+        (b"b,b\n1,2\n", "2 columns are called 'b'; name one by its number: 0, 1"),
+        (b"a,c\n1,2\n", "no channel 'b'; the file has a, c"),
+        (b"a,b\n1,\n3,\n", "column axis1_a (source 'b') has no value in 2 rows"),
+        (b"a,b,\xff\n1,2,3\n", "is not text in utf-8"),
+        (b'a,b\n"1,2\n3,4\n', "r.csv"),
+        (b"\x00\x01\x02\x03" * 50, "r.csv"),
+    ],
+)
+def test_unusable_tables_are_refused(tmp_path, content, expected):
+    file = tmp_path / "r.csv"
+    file.write_bytes(content)
+    text = "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: b, unit: A}}"
+    message = refusal(run_map(tmp_path, text, [file]))
+    assert expected in message
+    assert message.startswith(str(file))
+    assert "\n" not in message
+    assert not list((tmp_path / "out").glob("*.par*"))
+
+
+def test_decimal_commas_read_with_points_are_refused(tmp_path):
+    file = write_table(tmp_path / "r.csv", ";", ",")
+    text = 'header: false\nseparator: ";"\nsampling_rate_hz: 10\n' + phases()
+    assert "holds '1,5' in line 1" in refusal(run_map(tmp_path, text, [file]))
+
+
+def test_the_wrong_separator_is_told_by_the_missing_column(tmp_path):
+    file = write_table(tmp_path / "r.csv", ";")
+    text = "header: false\nsampling_rate_hz: 10\n" + phases()
+    assert "no channel 1; the file has 0..0" in refusal(run_map(tmp_path, text, [file]))
+
+
+def test_one_bad_file_does_not_stop_the_others(tmp_path):
+    good = write_table(tmp_path / "good.csv")
+    bad = tmp_path / "bad.csv"
+    bad.write_text("1,2\nx\n")
+    outcome = run_map(tmp_path, "header: false\nsampling_rate_hz: 1\n" + phases(), [bad, good])
+    assert [item.run.name for item in outcome.results] == ["good.parquet"]
+    assert "bad.csv" in str(outcome.errors[0])
+
+
+def test_two_files_of_one_stem_are_refused_before_anything_is_written(tmp_path):
+    (tmp_path / "x").mkdir()
+    files = [write_table(tmp_path / "r.csv"), write_table(tmp_path / "x" / "r.csv")]
+    with pytest.raises(UsageError, match=r"would both become .*r\.parquet"):
+        run_map(tmp_path, "header: false\nsampling_rate_hz: 1\n" + phases(), files)
+    assert not (tmp_path / "out").exists()
+
+
+GOOD = "columns: {axis1_a: {source: 0, unit: A}}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (GOOD, "no sampling_rate_hz and no time column"),
+        ("sampling_rate_hz: 1\n", "columns is missing"),
+        ("sampling_rate_hz: 0\n" + GOOD, "sampling_rate_hz"),
+        ("sampling_rate: 1\n" + GOOD, "did you mean 'sampling_rate_hz'"),
+        ("sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unti: A}}", "did you mean 'unit'"),
+        (
+            "sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unit: Amp}}",
+            "columns.axis1_a.unit is 'Amp'; units of a current: A, mA, uA, kA",
+        ),
+        ("sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unit: deg}}", "units of a current"),
+        ("sampling_rate_hz: 1\ncolumns: {axis0_a: {source: 0, unit: A}}", "is not a column"),
+        ("sampling_rate_hz: 1\ncolumns: {axis1_d: {source: 0, unit: A}}", "is not a column"),
+        (
+            "sampling_rate_hz: 1\ncolumns: {axis1_position: {source: 0, unit: deg}}",
+            "names no current",
+        ),
+        (
+            "sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unit: A, unwrap: true}}",
+            "unwrap is for positions",
+        ),
+        ("time: {source: 1, unit: samples}\n" + GOOD, "time counts samples"),
+        ("time: {source: 1, unit: weeks}\n" + GOOD, "units of time: s, ms, us, ns"),
+        ("sampling_rate_hz: {source: fs, unit: A}\n" + GOOD, "a rate is in Hz or kHz"),
+        ("sampling_rate_hz: 1\nformat: mat\nheader: true\n" + GOOD, "header is for csv"),
+        ("sampling_rate_hz: 1\nencoding: klingon\n" + GOOD, "encoding is 'klingon'"),
+        ("sampling_rate_hz: 1\ndecimal: ','\n" + GOOD, "separator and decimal are both ','"),
+        (
+            "sampling_rate_hz: 1\nheader: false\ncolumns: {axis1_a: {source: x, unit: A}}",
+            "columns are numbered from 0",
+        ),
+    ],
+)
+def test_unusable_maps_are_refused(tmp_path, text, expected):
+    path = tmp_path / "map.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        load_map(path)
+    assert expected in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+def test_overrides_reach_into_the_map(tmp_path):
+    path = tmp_path / "map.yaml"
+    path.write_text("sampling_rate_hz: 1\n" + GOOD)
+    changed = load_map(path, ["sampling_rate_hz=2000", "columns.axis1_a.unit=mA"])
+    assert changed.sampling_rate_hz == 2000
+    assert changed.columns["axis1_a"].unit == "mA"
