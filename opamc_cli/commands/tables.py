@@ -40,7 +40,17 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
                 style="dim",
             )
         return title
-    table = _table("axis", "state", "health index", "p", "Δμ", "Δσ²", "KS", right=(0, 2, 3, 4, 5, 6))
+    table = _table(
+        "axis",
+        "state",
+        "health index",
+        "p",
+        "corrected",
+        "Δμ",
+        "Δσ²",
+        "KS",
+        right=(0, 2, 3, 4, 5, 6, 7),
+    )
     for entry in axes:
         features = entry.get("features") or {}
         state = str(entry.get("state"))
@@ -49,13 +59,16 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
             _state(state),
             wording.number(entry.get("health_index")),
             wording.p_value(entry.get("p_value")),
+            wording.p_value(entry.get("p_adjusted")),
             *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
-    lines = []
-    for entry in axes:
-        if entry.get("state") != "healthy":
-            lines.append(_explanation(entry))
-    return Group(title, table, *lines)
+    unhealthy = [entry for entry in axes if entry.get("state") != "healthy"]
+    shared = wording.shared_reasons(unhealthy)
+    lines = [_explanation(entry, set(shared)) for entry in unhealthy]
+    for reason, numbers in shared.items():
+        text = Text(f"{wording.axes_phrase(numbers)}: ", style="bold")
+        lines.append(text.append(printable(reason), style="not bold"))
+    return Group(title, Text(), table, Text(), *lines)
 
 
 def feature_table(inputs: "ReportInputs") -> "RenderableType":
@@ -104,7 +117,13 @@ def loop_table(loop: Mapping[str, Any]) -> "RenderableType":
         steps = entry.get("steps", ())
         if steps:
             table = _table(
-                "step", "effect", "meaning", "gain", "decoy", "A before", "A after",
+                "step",
+                "effect",
+                "meaning",
+                "gain",
+                "decoy",
+                "A before",
+                "A after",
                 right=(0, 3, 4, 5, 6),
             )
             for number, step in enumerate(steps, start=1):
@@ -126,19 +145,20 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "�" for c in text)
 
 
-def _explanation(entry: Mapping[str, Any]) -> "Text":
+def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "Text":
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
 
-    text = Text(f"axis {entry.get('axis')}: ", style="bold")
-    sentences = [printable(str(reason)) for reason in entry.get("reasons", ())]
+    text = Text(f"axis {entry.get('axis')}:", style="bold")
+    sentences = [str(r) for r in entry.get("reasons", ()) if str(r) not in said_below]
     if entry.get("cause"):
-        sentences.append("cause: " + printable(wording.cause_phrase(entry["cause"])))
-    text.append("; ".join(sentences), style="not bold")
+        sentences.append(f"cause: {wording.cause_phrase(entry['cause'])}")
     advice = wording.advice(entry)
     if advice:
-        text.append(("\n  " if sentences else "") + "→ " + printable(advice), style="not bold")
+        sentences.append(advice)
+    for sentence in sentences:
+        text.append(f"\n  {printable(sentence)}", style="not bold")
     return text
 
 

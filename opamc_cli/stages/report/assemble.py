@@ -122,21 +122,25 @@ def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:
         *evidence.omitted,
         *(line for loop in loops for line in loop["section"].omitted),
     ]
-    page = _environment().get_template("report.html.j2").render(
-        title=title,
-        styles=custom_properties() + "\n" + _resource("report.css"),
-        headline=_headline(inputs),
-        rows=[_axis_view(inputs, axis, focus) for axis in inputs.axes],
-        attention=[
-            _axis_view(inputs, axis, focus)
-            for axis in by_severity(inputs)
-            if inputs.state(axis) not in (None, "healthy")
-        ],
-        compared=_compared(inputs),
-        evidence=evidence,
-        loops=loops,
-        notes=notes,
-        provenance=_provenance(inputs),
+    page = (
+        _environment()
+        .get_template("report.html.j2")
+        .render(
+            title=title,
+            styles=custom_properties() + "\n" + _resource("report.css"),
+            headline=_headline(inputs),
+            rows=[_axis_view(inputs, axis, focus) for axis in inputs.axes],
+            attention=[
+                _axis_view(inputs, axis, focus)
+                for axis in by_severity(inputs)
+                if inputs.state(axis) not in (None, "healthy")
+            ],
+            compared=_compared(inputs),
+            evidence=evidence,
+            loops=loops,
+            notes=notes,
+            provenance=_provenance(inputs),
+        )
     )
     return page, tuple(omitted)
 
@@ -179,7 +183,11 @@ def _environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"number": wording.number, "p_value": wording.p_value}
+    environment.filters |= {
+        "number": wording.number,
+        "p_value": wording.p_value,
+        "moment": wording.moment,
+    }
     environment.globals |= {"sign": state_sign, "role": state_role}
     return environment
 
@@ -202,8 +210,10 @@ def _axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
         "state": entry.get("state", "not judged"),
         "health_index": entry.get("health_index"),
         "p_value": entry.get("p_value"),
+        "p_adjusted": entry.get("p_adjusted"),
         "features": features,
         "cause": wording.cause_phrase(entry.get("cause")),
+        "effect": wording.effect_phrase(entry["cause"]) if entry.get("cause") else "–",
         "reasons": [str(reason) for reason in entry.get("reasons", ())],
         "advice": wording.advice(entry),
         "since": _since(onset),
@@ -219,7 +229,7 @@ def _since(onset: Onset) -> str:
         return "No target segment lies above the baseline's highest of its motion."
     where = f"run {onset.first_run}"
     if onset.first_started_at:
-        where += f" (begun {onset.first_started_at})"
+        where += f" (begun {wording.moment(onset.first_started_at)})"
     if onset.first_cycle is not None and onset.first_cycle >= 0:
         where += f", cycle {onset.first_cycle}"
     return (
@@ -229,7 +239,7 @@ def _since(onset: Onset) -> str:
 
 
 def _compared(inputs: ReportInputs) -> list[dict[str, Any]]:
-    """What was compared with what: one row for each role."""
+    """Return what was compared with what, one row for each role."""
     rows = []
     for role in ROLES:
         mine = inputs.scores["role"] == role
@@ -247,7 +257,11 @@ def _compared(inputs: ReportInputs) -> list[dict[str, Any]]:
                 "role": role,
                 "runs": list(runs),
                 "cycles": len(cycles),
-                "when": " to ".join(dict.fromkeys((starts[0], starts[-1]))) if starts else None,
+                "when": " to ".join(
+                    dict.fromkeys(wording.moment(s) for s in (starts[0], starts[-1]))
+                )
+                if starts
+                else None,
                 "conditions": _conditions([s.info for s in sources]),
             }
         )
@@ -259,9 +273,9 @@ def _conditions(infos: Sequence[Any]) -> str:
     for key, label in (
         ("robot", "robot {}"),
         ("program", "program {}"),
-        ("speed_percent", "speed {} %"),
-        ("payload_kg", "payload {} kg"),
-        ("sampling_rate_hz", "{} Hz"),
+        ("speed_percent", "speed {}\u00a0%"),
+        ("payload_kg", "payload {}\u00a0kg"),
+        ("sampling_rate_hz", "{}\u00a0Hz"),
     ):
         values = sorted({getattr(i, key) for i in infos if getattr(i, key) is not None}, key=str)
         if values:
@@ -304,7 +318,7 @@ def _provenance(inputs: ReportInputs) -> dict[str, Any]:
 
 
 def _base(inputs: ReportInputs, config: Mapping[str, Any]) -> str:
-    base = config.get("score", {}).get("base")
+    base = (inputs.verdict or {}).get("base", config.get("score", {}).get("base"))
     if "base" in inputs.scores:
         base = float(np.asarray(inputs.scores["base"])[0])
     return f"{base:g}" if isinstance(base, int | float) else "not recorded"

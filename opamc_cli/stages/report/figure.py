@@ -2,7 +2,9 @@
 
 import io
 import re
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.axes import Axes
@@ -16,7 +18,7 @@ WIDTH_IN = 9.6
 MAX_TRACE_POINTS = 1600
 """Points of one trace: two for each pixel of a column of 800."""
 
-STYLE = {
+STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -72,10 +74,14 @@ class Figure:
     svg: str
 
 
-def style() -> "mpl.RcParams":  # type: ignore[name-defined]
-    """Return the context in which every figure is drawn: our style upon matplotlib's defaults."""
-    # a matplotlibrc of the user's must not change the report
-    return mpl.rc_context({**mpl.rcParamsDefault, **STYLE, "backend": "agg"})
+def style() -> AbstractContextManager[None]:
+    """Return the context in which every figure is drawn: our style upon matplotlib's defaults.
+
+    A matplotlibrc of the user's does not change the report.
+    """
+    defaults = {k: v for k, v in mpl.rcParamsDefault.items() if not k.startswith("backend")}
+    settings: Any = {**defaults, **STYLE}
+    return mpl.rc_context(settings)
 
 
 def canvas(height_in: float, width_in: float = WIDTH_IN) -> Canvas:
@@ -107,7 +113,7 @@ def to_svg(drawing: Canvas, name: str) -> str:
     text = re.sub(r" xmlns(:xlink)?=\"[^\"]*\"", "", text).replace("xlink:href", "href")
     text = re.sub(r"<svg[^>]*?(viewBox=\"[^\"]*\")[^>]*>", r'<svg \1 aria-hidden="true">', text)
     text = re.sub(r"<g id=\"[a-zA-Z0-9_.]+\"", "<g", text)
-    text = re.sub(r"(\d+\.\d{2})\d+", r"\1", text)
+    text = re.sub(r"<[^>]*>", lambda tag: re.sub(r"(\d+\.\d\d)\d+", r"\1", tag[0]), text)
     text = re.sub(r" transform=\"rotate\(-?0 [^\"]*\)\"", "", text)
     text = text.replace("font-family: 'DejaVu Sans'; ", "")
     for role, (light, _) in PALETTE.items():

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
@@ -41,6 +42,9 @@ def headline(verdict: Mapping[str, Any]) -> str:
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
     if not parts:
         return "No axis was judged"
+    healthy = len(states.get("healthy", ()))
+    if healthy > 1 and len(parts) > 1:
+        parts[-1] = f"the other {healthy} axes healthy"
     text = "; ".join(parts)
     return text[0].upper() + text[1:]
 
@@ -63,6 +67,17 @@ def p_value(value: object) -> str:
     return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
 
 
+def moment(iso: str) -> str:
+    """Return an ISO 8601 time as "2026-03-10 06:00 UTC", or as it is if it is not one."""
+    try:
+        parsed = datetime.fromisoformat(iso)
+    except ValueError:
+        return iso
+    if parsed.tzinfo is None:
+        return f"{parsed:%Y-%m-%d %H:%M}"
+    return f"{parsed.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+
+
 def cause_phrase(cause: Mapping[str, Any] | None) -> str:
     """Return a cause in one phrase: effect, its parameters, meaning and share."""
     if not cause:
@@ -80,7 +95,7 @@ def cause_phrase(cause: Mapping[str, Any] | None) -> str:
 
 
 def advice(entry: Mapping[str, Any]) -> str | None:
-    """Return what to do about an axis, or None where nothing is to be done.
+    """Return what to do about an axis where its reasons do not already say it.
 
     Parameters
     ----------
@@ -91,21 +106,28 @@ def advice(entry: Mapping[str, Any]) -> str | None:
     for key in ("inspect", "action", "advice"):
         if cause.get(key):
             return str(cause[key])
-    state = entry.get("state")
-    axis = entry.get("axis")
-    if state == "fault":
-        return (
-            f"Inspect the strain wave gear of axis {axis} (flexspline teeth, wave generator "
-            "bearing, lubricant); the current alone does not say which part."
-        )
-    if state == "changed":
-        return (
-            f"Check what differs on axis {axis} since the baseline: payload, program, "
-            "temperature, lubricant; record again, then judge."
-        )
-    if state == "insufficient-data":
-        return f"Record more cycles of axis {axis} and diagnose again."
-    return None
+    if entry.get("reasons"):
+        return None
+    return {
+        "fault": "Inspect the strain wave gear of this axis.",
+        "changed": "Check payload, program and temperature of this axis against the baseline's.",
+        "insufficient-data": "Record more cycles of this axis and diagnose again.",
+    }.get(str(entry.get("state")))
+
+
+def shared_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, list[int]]:
+    """Return the reasons that several axes have in common, with these axes, in their order.
+
+    Parameters
+    ----------
+    entries
+        Objects of the verdict's `axes`.
+    """
+    axes: dict[str, list[int]] = {}
+    for entry in entries:
+        for reason in entry.get("reasons", ()):
+            axes.setdefault(str(reason), []).append(int(entry["axis"]))
+    return {reason: found for reason, found in axes.items() if len(found) > 1}
 
 
 def loop_phrase(verdict: object) -> str:

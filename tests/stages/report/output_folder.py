@@ -12,9 +12,8 @@ from opamc_cli.signal.analytic import clarke, envelope
 from opamc_cli.signal.ordinal import ordinal_counts
 from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
 from opamc_cli.stats.features import compare
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs import Run, RunInfo, save_run
 from opamc_cli.storage.sources import RunSource, sources_record
-from opamc_cli.storage.runs import Run
 from opamc_cli.storage.tables import MOTIONS, PATTERNS, table_input, write_table
 
 RATE_HZ = 1024.0
@@ -51,8 +50,14 @@ def make(out: Path, plan: Plan = Plan(), seed: int = 0) -> Path:
             started = f"2026-0{1 if role == 'baseline' else 3}-1{index}T06:00:00+00:00"
             save_run(
                 path,
-                RunInfo(RATE_HZ, robot="cell 4", program="pick", speed_percent=50.0,
-                        payload_kg=1.0, started_at=started),
+                RunInfo(
+                    RATE_HZ,
+                    robot="cell 4",
+                    program="pick",
+                    speed_percent=50.0,
+                    payload_kg=1.0,
+                    started_at=started,
+                ),
                 columns,
             )
             with Run(path, run_name) as run:
@@ -122,9 +127,15 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
                 "before": {"rmse_a": 0.065, "r2": 0.91},
                 "steps": [
                     step,
-                    {**step, "parameters": {"order": 14.0}, "gain": 0.2, "ties": ["elasticity"],
-                     "interpretation": "unknown periodic source, order 14",
-                     "rmse_before_a": 0.031, "rmse_after_a": 0.021},
+                    {
+                        **step,
+                        "parameters": {"order": 14.0},
+                        "gain": 0.2,
+                        "ties": ["elasticity"],
+                        "interpretation": "unknown periodic source, order 14",
+                        "rmse_before_a": 0.031,
+                        "rmse_after_a": 0.021,
+                    },
                 ],
                 "after": {"rmse_a": 0.021, "r2": 0.99},
                 "floor_a": 0.02,
@@ -179,9 +190,16 @@ def _rows(
             start = PAUSE + segment * (MOVE + PAUSE)
             stop = start + MOVE
             shared = {
-                "run": run, "axis": axis, "segment": segment, "start": start, "stop": stop,
-                "cycle": cycle, "motion": motion, "f_max_hz": SPEEDS_HZ[motion],
-                "signal": "phases", "temperature_c": None,
+                "run": run,
+                "axis": axis,
+                "segment": segment,
+                "start": start,
+                "stop": stop,
+                "cycle": cycle,
+                "motion": motion,
+                "f_max_hz": SPEEDS_HZ[motion],
+                "signal": "phases",
+                "temperature_c": None,
             }
             motions.append(
                 shared
@@ -202,8 +220,12 @@ def _rows(
                 patterns.append(
                     shared
                     | {
-                        "order": order, "tau": TAU, "gamma": 2.0,
-                        "n_patterns": int(counts.sum()), "n_masked": 0, "counts": counts.tolist(),
+                        "order": order,
+                        "tau": TAU,
+                        "gamma": 2.0,
+                        "n_patterns": int(counts.sum()),
+                        "n_masked": 0,
+                        "counts": counts.tolist(),
                     }
                 )
 
@@ -219,7 +241,8 @@ def _score(patterns: dict[str, list[dict[str, Any]]], plan: Plan) -> tuple[Any, 
             for motion in range(N_MOTIONS):
                 rows = {
                     role: [
-                        r for r in patterns[role]
+                        r
+                        for r in patterns[role]
                         if (r["axis"], r["order"], r["motion"]) == (axis, order, motion)
                     ]
                     for role in pooled
@@ -240,7 +263,9 @@ def _score(patterns: dict[str, list[dict[str, Any]]], plan: Plan) -> tuple[Any, 
                 if order == max(ORDERS):
                     entry["motions"].append(
                         {
-                            "motion": motion, "order": order, "tau": TAU,
+                            "motion": motion,
+                            "order": order,
+                            "tau": TAU,
                             "jsd_baseline": jsd["baseline"].tolist(),
                             "jsd_target": jsd["target"].tolist(),
                         }
@@ -248,9 +273,15 @@ def _score(patterns: dict[str, list[dict[str, Any]]], plan: Plan) -> tuple[Any, 
             found = compare(pooled["baseline"], pooled["target"])
             values = {"delta_mu": found.delta_mu, "delta_var": found.delta_var, "ks": found.ks}
             features.append(
-                {"axis": axis, "motion": -1, "order": order, **values,
-                 "n_baseline": len(pooled["baseline"]), "n_target": len(pooled["target"]),
-                 "lda": None}
+                {
+                    "axis": axis,
+                    "motion": -1,
+                    "order": order,
+                    **values,
+                    "n_baseline": len(pooled["baseline"]),
+                    "n_target": len(pooled["target"]),
+                    "lda": None,
+                }
             )
             entry["features"] = values
             entry["health_index"] = values["delta_mu"] / float(np.std(pooled["baseline"]))
@@ -259,8 +290,12 @@ def _score(patterns: dict[str, list[dict[str, Any]]], plan: Plan) -> tuple[Any, 
             "state": "fault" if bad else "healthy",
             "p_value": 2.1e-5 if bad else 0.4,
             "cause": None,
-            "reasons": ["order 5: mean divergence 0.31 against 0.06 in the baseline",
-                        "all four motions changed"] if bad else [],
+            "reasons": [
+                "order 5: mean divergence 0.31 against 0.06 in the baseline",
+                "all four motions changed",
+            ]
+            if bad
+            else [],
         }
         if bad:
             entry["cause"] = {

@@ -38,7 +38,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
                     panel.stairs(share, edges, color=colour(role), linewidth=1.2, label=role)
             features = pooled_features(inputs, axis, focus.order[axis]) or {}
             ks = features.get("ks")
-            panel.set_title(f"Axis {axis}" + (f"   KS {ks:.2f}" if ks is not None else ""))
+            panel.set_title(f"Axis {axis}" + (f" · KS {ks:.2f}" if ks is not None else ""))
             words.append(f"Axis {axis}: KS {ks:.2f}." if ks is not None else f"Axis {axis}.")
             panel.set_xlabel("JSD")
             panel.set_xlim(left=0.0)

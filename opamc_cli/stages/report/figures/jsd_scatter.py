@@ -80,7 +80,7 @@ def _panel(panel: Axes, inputs: ReportInputs, axis: int, order: int) -> bool:
             panel.axhline(jsd.max(), color=colour("baseline"), linewidth=0.9, linestyle=":")
         start += jsd.size
     state = inputs.state(axis)
-    panel.set_title(f"Axis {axis}" + (f"  {state_sign(state)} {state}" if state else ""))
+    panel.set_title(f"Axis {axis}" + (f" · {state_sign(state)} {state}" if state else ""))
     panel.set_xlabel("segment")
     panel.set_xlim(-0.5, max(start, 1) - 0.5)
     return thinned

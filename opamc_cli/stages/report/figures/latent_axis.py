@@ -36,7 +36,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             line.plot([0.0, value], [place, place], color=mark, linewidth=1.6)
             line.plot([value], [place], "o", color=mark, markersize=7)
             line.annotate(
-                f"{value:.2f} {state_sign(state)} {state}",
+                f"{value:.2f} {state_sign(state)} {state}".replace("-", "−", 1),
                 (max(value, 0.0), place),
                 xytext=(8, 0),
                 textcoords="offset points",

@@ -1,11 +1,148 @@
 """S(t) over one cycle of the baseline with its segments (thesis Figure 3-3)."""
 
-from opamc_cli.stages.report.figure import Figure
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from opamc_cli.config.models import SegmentConfig
+from opamc_cli.signal.analytic import analytic_signal, clarke, temporal_fine_structure
+from opamc_cli.signal.motion import MotionBand, motion_frames
+from opamc_cli.signal.noise import noise_level
+from opamc_cli.signal.wavelet import Morse
+from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
+from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
 from opamc_cli.stages.report.focus import Focus
 from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
+from opamc_cli.stages.report.palette import colour
+from opamc_cli.storage.runs import Run
+
+MARGIN_S = 1.0
+"""Shown before and after the cycle."""
+
+MAX_WINDOWS = 6
+"""Of a recording that never stands still."""
+
+FRAMES_PER_S = 400.0
 
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
-    """Draw the current and its motion signal, segments shaded."""
-    msg = "not yet"
-    raise NothingToDrawError(msg)
+    """Draw the current and what the segments were found by, segments shaded."""
+    motions = inputs.roles["baseline"].motions
+    if motions is None:
+        msg = "baseline/motions.parquet and segments.parquet are absent"
+        raise NothingToDrawError(msg)
+    rows = _one_cycle(select(motions, motions["axis"] == focus.axis))
+    if not n_rows(rows):
+        msg = f"the baseline has no segment on axis {focus.axis}"
+        raise NothingToDrawError(msg)
+    name = str(rows["run"][0])
+    with inputs.roles["baseline"].open_run(name) as run:
+        margin = round(MARGIN_S * run.sampling_rate_hz)
+        start = max(0, int(rows["start"].min()) - margin)
+        stop = min(run.n_samples, int(rows["stop"].max()) + margin)
+        reported = rows["signal"][0] == "reported"
+        draw = _draw_reported if reported else _draw_phases
+        with style():
+            drawing = canvas(3.9)
+            panels = drawing.subplots(2, 1, sharex=True)
+            caption = draw(panels, inputs, run, focus.axis, start, stop)
+            for panel in panels:
+                _shade(panel, rows, run.sampling_rate_hz)
+                panel.margins(x=0.0)
+            _number(panels[0], rows, run.sampling_rate_hz)
+            panels[1].set_xlabel(f"time in run {name} (s)")
+            return finish(
+                drawing,
+                "motion-signal",
+                f"Motion signal of axis {focus.axis} over one cycle",
+                f"{caption} Shaded: the segments of one cycle, with the number of their motion.",
+                f"Current and motion signal of axis {focus.axis} over one cycle of run {name} "
+                f"with {n_rows(rows)} segments.",
+            )
+
+
+def _one_cycle(rows: Columns) -> Columns:
+    """Return the reference cycle, else the first cycle, else the first segments."""
+    if not n_rows(rows):
+        return rows
+    if "reference" in rows and rows["reference"].any():
+        rows = select(rows, rows["reference"].astype(bool))
+    elif "cycle" in rows and (rows["cycle"] >= 0).any():
+        first = int(np.flatnonzero(rows["cycle"] >= 0)[0])
+        same = (rows["run"] == rows["run"][first]) & (rows["cycle"] == rows["cycle"][first])
+        rows = select(rows, same)
+    rows = select(rows, rows["run"] == rows["run"][0])
+    return (
+        {name: values[:MAX_WINDOWS] for name, values in rows.items()}
+        if (rows["kind"][0] == "window")
+        else rows
+    )
+
+
+def _draw_phases(
+    panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
+) -> str:
+    config = SegmentConfig(**inputs.roles["baseline"].config.get("segment", {}))
+    names = run.channels(axis).phases
+    read = run.read(names, start, stop)
+    current = read[names[0]]
+    vector = clarke(*(read[n] for n in names)) if len(names) == 3 else analytic_signal(current)
+    rate = run.sampling_rate_hz
+    band = MotionBand(
+        f_max_hz=min(0.4 * rate, MotionBand.f_max_hz),
+        voices_per_octave=config.voices_per_octave,
+        wavelet=Morse(config.gamma, config.beta),
+    )
+    step = max(1, round(rate / FRAMES_PER_S))
+    tfs = temporal_fine_structure(vector, 3 * noise_level(vector))
+    frames = motion_frames(tfs, band, rate, step, config.engine)
+    _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
+    panels[0].set_ylabel("current (A)")
+    _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")
+    panels[1].set_ylim(0.0, 1.08)
+    panels[1].set_ylabel("S(t)")
+    return (
+        f"Above: current {names[0]}. Below: S(t), the largest modulus of the wavelet transform of "
+        "its fine structure, near 1 while the joint turns and 0 while it stands."
+    )
+
+
+def _draw_reported(
+    panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
+) -> str:
+    channels = run.channels(axis)
+    rate = run.sampling_rate_hz
+    motion = channels.velocity or channels.position
+    if channels.current is None or motion is None:
+        msg = f"run {run.name} has neither phase currents nor position or velocity of axis {axis}"
+        raise NothingToDrawError(msg)
+    read = run.read([channels.current, motion], start, stop)
+    _trace(panels[0], read[channels.current], start / rate, 1.0 / rate, "muted")
+    panels[0].set_ylabel("current (A)")
+    _trace(panels[1], read[motion], start / rate, 1.0 / rate, "baseline")
+    panels[1].set_ylabel("speed (rad/s)" if channels.velocity else "angle (rad)")
+    return "Above: reported current. Below: the joint's motion, by which the segments were found."
+
+
+def _trace(
+    panel: Axes, values: NDArray[np.floating], first_s: float, step_s: float, role: str
+) -> None:
+    x, y = extremes(first_s + step_s * np.arange(values.size), values, MAX_TRACE_POINTS)
+    panel.plot(x, y, color=colour(role), linewidth=0.8)
+
+
+def _shade(panel: Axes, rows: Columns, rate: float) -> None:
+    for index in range(n_rows(rows)):
+        span = (rows["start"][index] / rate, rows["stop"][index] / rate)
+        panel.axvspan(*span, color=colour("baseline"), alpha=0.13, linewidth=0)
+
+
+def _number(panel: Axes, rows: Columns, rate: float) -> None:
+    low, high = panel.get_ylim()
+    panel.set_ylim(low, high + 0.15 * (high - low))
+    for index in range(n_rows(rows)):
+        middle = 0.5 * (rows["start"][index] + rows["stop"][index]) / rate
+        number = int(rows["motion"][index]) if "motion" in rows else index
+        panel.text(middle, high + 0.02 * (high - low), str(number), ha="center", fontweight="bold")

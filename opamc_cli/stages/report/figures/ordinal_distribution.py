@@ -25,26 +25,30 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             raise NothingToDrawError(msg)
     drawn = []
     for axis in sorted(by_severity(inputs)[:MAX_AXES]):
-        shares = [_share(inputs, role, axis, focus) for role in ROLES]
-        if shares[0] is not None and shares[1] is not None:
-            drawn.append((axis, shares[0], shares[1]))
+        baseline, target = (_share(inputs, role, axis, focus) for role in ROLES)
+        if baseline is not None and target is not None:
+            drawn.append((axis, baseline, target))
     if not drawn:
         msg = "no motion has patterns in both baseline and target"
         raise NothingToDrawError(msg)
     with style():
         drawing = canvas(0.45 + 1.05 * len(drawn))
-        panels = drawing.subplots(len(drawn), 2, sharey="row", squeeze=False)
-        for row, (axis, *shares) in zip(panels, drawn, strict=True):
-            for panel, role, share in zip(row, ROLES, shares, strict=True):
+        panels = drawing.subplots(
+            len(drawn),
+            2,
+            sharex="col" if _same_order(drawn) else "none",
+            sharey="row",
+            squeeze=False,
+        )
+        for row, (axis, baseline, target) in zip(panels, drawn, strict=True):
+            for panel, role, share in zip(row, ROLES, (baseline, target), strict=True):
                 edges = np.arange(share.size + 1) - 0.5
                 panel.stairs(share, edges, fill=True, color=colour(role))
                 panel.axhline(1.0 / share.size, color=colour("muted"), linewidth=0.7, dashes=(3, 3))
                 panel.set_xlim(edges[0], edges[-1])
                 panel.grid(visible=False, axis="x")
-                jsd = axis_scores(
-                    inputs, axis, focus.order[axis], role, focus.motion[axis]
-                )["jsd"]
-                mean = f"   mean JSD {jsd.mean():.3f}" if jsd.size else ""
+                jsd = axis_scores(inputs, axis, focus.order[axis], role, focus.motion[axis])["jsd"]
+                mean = f" · mean JSD {jsd.mean():.3f}" if jsd.size else ""
                 panel.set_title(f"Axis {axis}, motion {focus.motion[axis]}, {role}{mean}")
             row[0].set_ylabel("share")
         for panel in panels[-1]:
@@ -61,9 +65,11 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         )
 
 
-def _share(
-    inputs: ReportInputs, role: str, axis: int, focus: Focus
-) -> NDArray[np.float64] | None:
+def _same_order(drawn: list[tuple[int, NDArray[np.float64], NDArray[np.float64]]]) -> bool:
+    return len({share.size for _, share, _ in drawn}) == 1
+
+
+def _share(inputs: ReportInputs, role: str, axis: int, focus: Focus) -> NDArray[np.float64] | None:
     table = inputs.roles[role].patterns or {}
     rows = select(
         table,
@@ -79,9 +85,7 @@ def _share(
     return pooled / total if total > 0 else None
 
 
-def _largest_changes(
-    axis: int, baseline: NDArray[np.float64], target: NDArray[np.float64]
-) -> str:
+def _largest_changes(axis: int, baseline: NDArray[np.float64], target: NDArray[np.float64]) -> str:
     order = next(n for n in range(2, 9) if np.prod(range(1, n + 1)) == baseline.size)
     change = target - baseline
     codes = np.argsort(-np.abs(change), kind="stable")[:N_NAMED]

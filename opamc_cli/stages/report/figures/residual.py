@@ -36,11 +36,11 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
         for place, (column, label) in enumerate(
             (("position_rad", "joint angle (rad)"), ("velocity_rad_s", "joint speed (rad/s)"))
         ):
-            panel = drawing.add_subplot(layout[1, place], sharey=None)
+            panel = drawing.add_subplot(layout[1, place])
             _over_quantity(panel, rows, column, label)
         rms = {name: _rms(rows[column]) for name, column, _ in SERIES}
         over_time.set_title(
-            f"Axis {axis}   RMS {rms['before']:.3g} A before, {rms['after']:.3g} A after"
+            f"Axis {axis} · RMS {rms['before']:.3g} A before, {rms['after']:.3g} A after"
         )
         return finish(
             drawing,
@@ -96,8 +96,9 @@ def _over_quantity(panel: Axes, rows: Columns, column: str, label: str) -> None:
         return
     low, high = np.quantile(x[known], [0.001, 0.999])
     edges = np.linspace(low, high, N_BINS + 1)
-    place = np.digitize(x, edges) - 1
-    for name, residual, role in SERIES:
+    # the last edge belongs to the last bin: a constant speed lies on it
+    place = np.where(x == high, N_BINS - 1, np.digitize(x, edges) - 1)
+    for _, residual, role in SERIES:
         values = rows[residual]
         usable = known & np.isfinite(values) & (place >= 0) & (place < N_BINS)
         count = np.bincount(place[usable], minlength=N_BINS)
@@ -105,7 +106,9 @@ def _over_quantity(panel: Axes, rows: Columns, column: str, label: str) -> None:
         rms = np.full(N_BINS, np.nan)
         enough = count >= MIN_PER_BIN
         rms[enough] = np.sqrt(power[enough] / count[enough])
-        panel.plot(0.5 * (edges[1:] + edges[:-1]), rms, color=colour(role), label=name)
+        panel.plot(
+            0.5 * (edges[1:] + edges[:-1]), rms, color=colour(role), marker=".", markersize=4
+        )
     panel.set_ylim(bottom=0.0)
 
 

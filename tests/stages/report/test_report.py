@@ -1,0 +1,230 @@
+import json
+import re
+import shutil
+from html.parser import HTMLParser
+from pathlib import Path
+
+import output_folder
+import pyarrow.parquet as pq
+import pytest
+from output_folder import Plan
+
+from opamc_cli.errors import InputError
+from opamc_cli.stages import report
+
+VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
+FIGURES = {
+    "jsd-scatter",
+    "jsd-histogram",
+    "ordinal-distribution",
+    "envelopes",
+    "feature-space",
+    "latent-axis",
+    "motion-signal",
+    "similarity",
+    "residual-3",
+    "order-spectrum-3",
+}
+
+
+class _Page(HTMLParser):
+    """Checks that tags are balanced and collects what the tests look at."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text: list[str] = []
+        self.feed(text)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text.append(data)
+
+    def figures(self) -> set[str | None]:
+        return {attrs.get("id") for tag, attrs in self.tags if tag == "figure"}
+
+    def words(self) -> str:
+        return " ".join(" ".join(self.text).split())
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("cell") / "out"
+    out.mkdir()
+    output_folder.make(out)
+    output_folder.add_loop(out)
+    return out
+
+
+@pytest.fixture
+def folder(made: Path, tmp_path: Path) -> Path:
+    shutil.copytree(made.parent, tmp_path / "cell")
+    return tmp_path / "cell" / "out"
+
+
+@pytest.fixture(scope="module")
+def page(made: Path) -> str:
+    return report.run(made).path.read_text(encoding="utf-8")
+
+
+def test_every_figure_is_drawn(made: Path, page: str) -> None:
+    assert _Page(page).figures() == FIGURES
+    assert report.run(made).omitted == ()
+
+
+def test_the_same_inputs_give_the_same_bytes(made: Path) -> None:
+    first = report.run(made).path.read_bytes()
+    assert report.run(made).path.read_bytes() == first
+
+
+def test_a_matplotlibrc_changes_nothing(made: Path, page: str) -> None:
+    import matplotlib as mpl
+
+    with mpl.rc_context({"lines.linewidth": 9.0, "font.size": 30.0, "svg.fonttype": "path"}):
+        assert report.run(made).path.read_text(encoding="utf-8") == page
+
+
+def test_nothing_is_loaded_from_elsewhere(page: str) -> None:
+    for tag, attrs in _Page(page).tags:
+        assert tag not in {"script", "link", "iframe", "img", "object"}
+        assert not {name for name in attrs if name in {"src", "data", "action"}}
+        assert not {name for name in attrs if name.startswith("on")}
+        if "href" in attrs:
+            assert (attrs["href"] or "").startswith("#")
+    assert "http" not in page
+    assert "@import" not in page
+    assert len(page.encode()) < 2_000_000
+
+
+def test_every_reference_inside_a_figure_has_its_target(page: str) -> None:
+    parsed = _Page(page)
+    ids = [attrs["id"] for _, attrs in parsed.tags if "id" in attrs]
+    assert len(ids) == len(set(ids))
+    used = {(attrs["href"] or "")[1:] for _, attrs in parsed.tags if "href" in attrs}
+    used |= set(re.findall(r"url\(#([^)]+)\)", page))
+    assert used <= set(ids)
+
+
+def test_every_figure_says_what_it_shows(page: str) -> None:
+    plots = [attrs for _, attrs in _Page(page).tags if attrs.get("class") == "plot"]
+    assert len(plots) == len(FIGURES)
+    assert all(attrs.get("role") == "img" and attrs.get("aria-label") for attrs in plots)
+
+
+def test_the_verdict_comes_first_and_says_where_why_and_what_to_do(page: str) -> None:
+    words = _Page(page).words()
+    expected = [
+        "Axis 3 at fault; the other 2 axes healthy",
+        "How sure p < 0.0001",
+        "Since when 24 of 24 target segments",
+        "the first in run fault-0 (begun 2026-03-10 06:00 UTC), cycle 0",
+        "order 5: mean divergence 0.31",
+        "explains 83 % of the change",
+        "Divergence of every segment",
+        "What the model of axis 3 lacked",
+        "Provenance",
+    ]
+    places = [
+        words.index(text, words.index("</style>") if "</style>" in words else 0)
+        for text in expected
+    ]
+    assert places == sorted(places)
+
+
+def test_provenance_holds_every_input(made: Path, page: str) -> None:
+    from opamc_cli.storage.runs import file_sha256
+
+    runs = made.parent.rglob("run*.parquet")
+    for path in [*made.rglob("*.parquet"), *made.rglob("*.json"), *runs]:
+        assert file_sha256(path) in page
+    assert str(made) not in page
+
+
+def test_names_from_files_stay_text(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    evil = '<script>alert("x")</script>$x_1$&'
+    output_folder.make(out, Plan(names=("normal", evil)))
+    verdict = json.loads((out / "verdict.json").read_text())
+    verdict["axes"][2]["reasons"] = ["<img src=x onerror=alert(1)>"]
+    verdict["axes"][2]["state"] = '"><svg onload=alert(1)>'
+    (out / "verdict.json").write_text(json.dumps(verdict))
+    text = report.run(out, title="<b>cell</b>").path.read_text(encoding="utf-8")
+    tags = [tag for tag, _ in _Page(text).tags]
+    assert not {"script", "img", "b"} & set(tags)
+    assert tags.count("svg") == text.count("<svg viewBox")
+    assert "&lt;script&gt;" in text
+
+
+def test_what_is_absent_is_left_out_with_a_reason(folder: Path) -> None:
+    for path in [
+        "verdict.json",
+        "loop.json",
+        "baseline/motions.parquet",
+        "target/patterns.parquet",
+    ]:
+        (folder / path).unlink()
+    outcome = report.run(folder)
+    text = outcome.path.read_text(encoding="utf-8")
+    assert _Page(text).figures() == {"jsd-scatter", "jsd-histogram", "feature-space"}
+    assert len(outcome.omitted) == 7
+    for line in outcome.omitted:
+        assert ": " in line
+    assert "verdict.json is absent" in text
+
+
+def test_runs_that_were_moved_are_found_again(folder: Path) -> None:
+    (folder.parent / "baseline").rename(folder.parent / "old")
+    reasons = " ".join(report.run(folder).omitted)
+    assert "the samples of run normal-0 are not there" in reasons
+    assert report.run(folder, baseline=[folder.parent / "old"]).omitted == ()
+
+
+@pytest.mark.parametrize("name", ["scores.parquet", "features.parquet"])
+def test_scores_and_features_are_needed(folder: Path, name: str) -> None:
+    (folder / name).unlink()
+    (folder / "report.html").unlink(missing_ok=True)
+    with pytest.raises(InputError, match=f"{name}: no such file; run `opamc score` first"):
+        report.run(folder)
+    assert not (folder / "report.html").exists()
+
+
+@pytest.mark.parametrize("name", ["verdict.json", "loop.json"])
+def test_damaged_json_is_named(folder: Path, name: str) -> None:
+    (folder / name).write_text('{"axes": [{"axis"')
+    with pytest.raises(InputError, match=f"{name}: cannot be read as JSON"):
+        report.run(folder)
+    (folder / name).write_text('{"axes": 3}')
+    with pytest.raises(InputError, match=f"{name}: holds no list 'axes'"):
+        report.run(folder)
+
+
+def test_a_table_without_a_needed_column_is_named(folder: Path) -> None:
+    path = folder / "order_spectrum.parquet"
+    table = pq.read_table(path)
+    pq.write_table(table.drop_columns(["after_a"]), path)
+    with pytest.raises(InputError, match="column after_a is missing"):
+        report.run(folder)
+
+
+def test_one_healthy_axis_alone(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    output_folder.make(out, Plan(n_axes=1, n_runs=1, n_cycles=2, faulty=None))
+    text = report.run(out).path.read_text(encoding="utf-8")
+    assert "Axis 1 healthy" in _Page(text).words()
+    assert 'class="card' not in text
