@@ -13,11 +13,12 @@ SMOOTHING_S = 0.004  # a quarter period at 60 Hz, faster than any carrier that j
 LEAST_TURN_RAD = 0.12  # the least turn that counts as leaving standstill
 # A smaller current at standstill may be the sensors' offset, which has an angle of its own.
 MIN_HOLDING_SHARE = 0.15
+STAY_S = 0.025  # a quarter period at 10 Hz
 CLEAR_TURN_RAD = 1.5  # the turn up to which the angle is followed
 
 
 def refine_boundaries(
-    z: NDArray[np.complexfloating],
+    current: NDArray[np.inexact],
     start: int,
     stop: int,
     fs_hz: float,
@@ -25,17 +26,21 @@ def refine_boundaries(
 ) -> tuple[int, int]:
     """Move coarse boundaries outwards to where the vector leaves and reaches standstill.
 
+    With one phase only there is no angle near standstill: there the boundary is where the
+    current leaves and reaches its standstill value, be it by rotation or by torque.
+
     Parameters
     ----------
-    z : array, shape (n,), A
-        Current vector of the motion with the standstill before and after it, up to the middle of
-        the gap to the neighbouring motions, or the recording's ends.
+    current : array, shape (n,), A
+        Current vector (complex), or a single phase current (real), of the motion with the
+        standstill before and after it, up to the middle of the gap to the neighbouring motions,
+        or the recording's ends.
     start, stop : int
-        Coarse boundaries within `z`, half-open; the joint turns at both.
+        Coarse boundaries within `current`, half-open; the joint turns at both.
     fs_hz : float
         Sampling rate, Hz.
     noise_a : float
-        Standard deviation of the noise in each component of `z`, A.
+        Standard deviation of the noise in each component of `current`, A.
 
     Returns
     -------
@@ -44,16 +49,37 @@ def refine_boundaries(
         boundary with too little standstill beside it to compare with is returned as it was.
     """
     middle = (start + stop) // 2
-    amplitude_a = float(np.median(np.abs(z[start:stop])))
-    refined_start = _onset(z[:middle], start, fs_hz, noise_a, amplitude_a)
+    amplitude_a = float(np.median(np.abs(current[start:stop])))
     # Backwards in time a stop is a start.
-    reverse = z[middle:][::-1]
-    refined_stop = z.size - _onset(reverse, z.size - stop, fs_hz, noise_a, amplitude_a)
-    return refined_start, refined_stop
+    before, after = current[:middle], current[middle:][::-1]
+    onset = _onset if np.iscomplexobj(current) else _departure
+    refined_start = onset(before, start, fs_hz, noise_a, amplitude_a)
+    n_after = onset(after, current.size - stop, fs_hz, noise_a, amplitude_a)
+    return refined_start, current.size - n_after
+
+
+def _departure(
+    x: NDArray[np.inexact], coarse: int, fs_hz: float, noise_a: float, amplitude_a: float
+) -> int:
+    """Sample at which a single current leaves its standstill value, at most `coarse`."""
+    width = max(1, round(SMOOTHING_S * fs_hz))
+    n_rest = int(0.4 * coarse)
+    if n_rest < 2 * width:
+        return coarse
+    smooth = _moving_mean(x[:coarse], width)
+    limit = max(5 * noise_a / np.sqrt(width), LEAST_TURN_RAD * amplitude_a)
+    away = np.abs(smooth - np.median(smooth[:n_rest])) > limit
+    # A current that oscillates passes its standstill value again and again, but does not stay.
+    n_stay = round(STAY_S * fs_hz)
+    if coarse < n_stay:
+        return coarse
+    stays = ~np.lib.stride_tricks.sliding_window_view(away, n_stay).any(axis=1)
+    ends = np.flatnonzero(stays) + n_stay
+    return int(ends[-1]) if ends.size else coarse
 
 
 def _onset(
-    z: NDArray[np.complexfloating],
+    z: NDArray[np.inexact],
     coarse: int,
     fs_hz: float,
     noise_a: float,
@@ -69,16 +95,16 @@ def _onset(
     noise = max(noise_a / np.sqrt(width), 1e-12)
 
     rest = smooth[:n_rest]
-    reference = np.mean(rest * rest)
-    if np.sqrt(np.abs(reference)) < max(3 * noise, MIN_HOLDING_SHARE * amplitude_a):
+    reference = complex(np.mean(rest * rest))
+    if np.sqrt(abs(reference)) < max(3 * noise, MIN_HOLDING_SHARE * amplitude_a):
         return _rise(smooth - np.mean(rest), coarse, noise)
     turned = _turn_since(smooth, reference, noise)
-    least = max(LEAST_TURN_RAD, 4 * noise / float(np.sqrt(np.abs(reference))))
+    least = max(LEAST_TURN_RAD, 4 * noise / float(np.sqrt(abs(reference))))
     return _extrapolate(turned, np.abs(smooth), least, coarse)
 
 
 def _turn_since(
-    smooth: NDArray[np.complexfloating], reference: np.complexfloating, noise: float
+    smooth: NDArray[np.inexact], reference: complex, noise: float
 ) -> NDArray[np.float64]:
     """Angle turned since standstill, rad, from the squared vector; positive on the whole."""
     doubled = np.angle(smooth * smooth * np.conj(reference))
@@ -88,7 +114,8 @@ def _turn_since(
         return np.zeros(smooth.size)
     followed = np.unwrap(doubled[known]) / 2
     turned = np.interp(np.arange(smooth.size), known, followed)
-    return turned * np.sign(turned[-1])
+    forward: NDArray[np.float64] = turned * np.sign(turned[-1])
+    return forward
 
 
 def _extrapolate(
@@ -118,12 +145,12 @@ def _extrapolate(
     return int(np.clip(round(best[1]), max(0, earliest), min(t_least, coarse)))
 
 
-def _rise(smooth: NDArray[np.complexfloating], coarse: int, noise: float) -> int:
+def _rise(smooth: NDArray[np.inexact], coarse: int, noise: float) -> int:
     """Without current at standstill the motion begins where the current does."""
     quiet = np.flatnonzero(np.abs(smooth[:coarse]) < 4 * noise)
     return int(quiet[-1]) + 1 if quiet.size else coarse
 
 
-def _moving_mean(x: NDArray[np.complexfloating], width: int) -> NDArray[np.complexfloating]:
+def _moving_mean(x: NDArray[np.inexact], width: int) -> NDArray[np.inexact]:
     kernel = np.full(width, 1 / width)
     return np.convolve(x, kernel, mode="same")

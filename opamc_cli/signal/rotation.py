@@ -11,42 +11,33 @@ from numpy.typing import NDArray
 class Rotation:
     """Rotation of a current vector within frames.
 
+    The sum over a frame of z[t]·conj(z[t-1]) has the angle by which the vector turns in a sample.
+    White noise adds nothing to its mean, a change of the torque's sign next to nothing, and
+    strong current counts more than weak.
+
     Attributes
     ----------
     turn : array of float32, shape (n,), A^2
-        Sum over a frame of Im(z[t]·conj(z[t-1])): positive where the vector turns forwards,
-        weighted with the power, so that noise at standstill counts little.
-    power : array of float32, shape (n,), A^2
-        Sum over a frame of abs(z[t]·z[t-1]). For a vector of constant frequency f the ratio
-        turn/power is sin(2π·f/fs); for noise it is near 0.
+        Imaginary part of the sum: positive where the vector turns forwards.
+    along : array of float32, shape (n,), A^2
+        Real part of the sum.
     """
 
     turn: NDArray[np.float32]
-    power: NDArray[np.float32]
+    along: NDArray[np.float32]
 
-    def direction(self, first: int, last: int) -> int:
-        """Sense of rotation over the frames first .. last-1: 1, -1, or 0 if it does not turn."""
-        return int(np.sign(self.turn[first:last].sum()))
+    def __getitem__(self, frames: slice) -> "Rotation":
+        """Rotation within some of the frames."""
+        return Rotation(self.turn[frames], self.along[frames])
 
-    def agrees_with(self, frequency_hz: NDArray[np.floating], fs_hz: float) -> NDArray[np.bool_]:
-        """Where the vector turns at least half as fast as a carrier of this frequency would.
+    def direction(self) -> int:
+        """Sense of rotation over all frames: 1, -1, or 0 if the vector does not turn."""
+        return int(np.sign(self.turn.sum()))
 
-        Noise has a ridge as well, but does not turn along with it.
-
-        Parameters
-        ----------
-        frequency_hz : array, shape (n,), Hz
-            Ridge of the carrier, for every frame.
-        fs_hz : float
-            Sampling rate, Hz.
-
-        Returns
-        -------
-        array of bool, shape (n,)
-        """
-        expected = np.sin(2 * np.pi * np.minimum(frequency_hz / fs_hz, 0.25))
-        agrees: NDArray[np.bool_] = np.abs(self.turn) >= 0.5 * expected * self.power
-        return agrees & (self.power > 0)
+    def frequency_hz(self, fs_hz: float) -> NDArray[np.float64]:
+        """Mean frequency within each frame, Hz; negative where the vector turns backwards."""
+        angle: NDArray[np.float64] = np.arctan2(self.turn, self.along).astype(np.float64)
+        return angle * fs_hz / (2 * np.pi)
 
 
 class RotationStream:
@@ -78,29 +69,29 @@ class RotationStream:
 
     def _rotation(self, z: NDArray[np.complexfloating], n: int) -> Rotation:
         turn = np.zeros(n, dtype=np.float32)
-        power = np.zeros(n, dtype=np.float32)
+        along = np.zeros(n, dtype=np.float32)
         if n:
             before = z.dtype.type(z[0] if self._last is None else self._last)
-            _accumulate(z.real, z.imag, before.real, before.imag, self._step, turn, power)
+            _accumulate(z.real, z.imag, before.real, before.imag, self._step, turn, along)
             self._last = complex(z[-1])
-        return Rotation(turn, power)
+        return Rotation(turn, along)
 
 
 def join_rotation(pieces: list[Rotation]) -> Rotation:
     """Frames of successive pieces as one."""
     return Rotation(
-        np.concatenate([p.turn for p in pieces]), np.concatenate([p.power for p in pieces])
+        np.concatenate([p.turn for p in pieces]), np.concatenate([p.along for p in pieces])
     )
 
 
 @njit(cache=True, nogil=True)
-def _accumulate(re, im, re_before, im_before, step, turn, power):  # type: ignore[no-untyped-def]
+def _accumulate(re, im, re_before, im_before, step, turn, along):  # type: ignore[no-untyped-def]
     for frame in range(turn.size):
         for t in range(frame * step, min(re.size, (frame + 1) * step)):
-            along = re[t] * re_before + im[t] * im_before
-            across = im[t] * re_before - re[t] * im_before
-            if along == along and across == across:
-                turn[frame] += across
-                power[frame] += np.sqrt(along * along + across * across)
+            real = re[t] * re_before + im[t] * im_before
+            imag = im[t] * re_before - re[t] * im_before
+            if real == real and imag == imag:
+                along[frame] += real
+                turn[frame] += imag
             re_before = re[t]
             im_before = im[t]

@@ -1,6 +1,8 @@
 """From the motion signal's frames to motions: thresholds, durations, dips, directions."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +11,11 @@ from opamc_cli.signal.motion import MotionFrames
 from opamc_cli.signal.rotation import Rotation
 
 MIN_CLEAR_FRAMES = 3
+# Largest ratio between the ridge's and the vector's frequency where the two agree: half way
+# to the sidebands of a torque ripple twice per motor turn with five pole pairs, 1 ± 2/5.
+AGREEMENT = 1.2
+# Share of a lobe's largest frequency that its ridge still has where a dip begins.
+FAST_SHARE = 0.7
 
 
 @dataclass(frozen=True)
@@ -18,7 +25,7 @@ class MotionRule:
     Attributes
     ----------
     on, off : float
-        Motion begins where S(t) rises above `on` and lasts while it stays above `off`; 0..1.
+        Motion begins where S(t) reaches `on` and lasts while it stays above `off`; 0..1.
     min_motion_s, min_still_s : float
         Shorter motions are dropped; shorter standstills belong to the motion around them, s.
     max_dip_s : float
@@ -35,7 +42,7 @@ class MotionRule:
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion at the resolution of frames: frames `first` .. `last`-1, half-open.
+    """A motion at the resolution of frames.
 
     Attributes
     ----------
@@ -53,9 +60,44 @@ class Motion:
     f_max_hz: float
 
 
-def hysteresis(
-    strength: NDArray[np.floating], on: float, off: float
-) -> list[tuple[int, int]]:
+@dataclass(frozen=True)
+class Evidence:
+    """What is known of one axis, frame by frame.
+
+    Attributes
+    ----------
+    frames : MotionFrames
+        Motion signal and ridge.
+    rotation : Rotation
+        Rotation of the analytic signal in the same frames.
+    has_direction : bool
+        Whether the rotation's sign means something: true for three phases, false for one.
+    fs_hz : float
+        Sampling rate, Hz.
+    noise_a : float
+        Standard deviation of the noise in each component of the analytic signal, A.
+    f_floor_hz : float
+        Lowest frequency of the motion signal's band, Hz.
+    """
+
+    frames: MotionFrames
+    rotation: Rotation
+    has_direction: bool
+    fs_hz: float
+    noise_a: float
+    f_floor_hz: float
+
+    @property
+    def frame_s(self) -> float:
+        """Time between frames, s."""
+        return self.frames.step / self.fs_hz
+
+    def direction(self, first: int, last: int) -> int:
+        """Sense of rotation over the frames first .. last-1."""
+        return self.rotation[first:last].direction() if self.has_direction else 0
+
+
+def hysteresis(strength: NDArray[np.floating], on: float, off: float) -> list[tuple[int, int]]:
     """Half-open intervals that stay above `off` and reach `on` somewhere.
 
     Parameters
@@ -63,7 +105,7 @@ def hysteresis(
     strength : array, shape (n,)
         Motion signal, or any other evidence of motion.
     on, off : float
-        Thresholds, off <= on; values equal to a threshold are above it.
+        Thresholds, off <= on; a value equal to a threshold counts as above it, NaN as below.
 
     Returns
     -------
@@ -79,63 +121,55 @@ def hysteresis(
     ]
 
 
-def find_motions(
-    frames: MotionFrames,
-    rotation: Rotation | None,
-    fs_hz: float,
-    rule: MotionRule,
-    f_floor_hz: float,
-) -> list[Motion]:
+def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     """Motions of one axis.
 
     Parameters
     ----------
-    frames : MotionFrames
-        Motion signal and ridge.
-    rotation : Rotation or None
-        Rotation of the current vector in the same frames; None for a single phase.
-    fs_hz : float
-        Sampling rate, Hz.
+    evidence : Evidence
+        Motion signal, ridge and rotation.
     rule : MotionRule
         Thresholds and durations.
-    f_floor_hz : float
-        Lowest frequency of the motion signal's band, Hz.
 
     Returns
     -------
     list of Motion
         In order, not overlapping.
     """
-    frame_s = frames.step / fs_hz
-    ridge_hz = frames.ridge_hz.astype(np.float64)
-    clear = frames.strength >= rule.on
-    if rotation is not None:
-        clear &= rotation.agrees_with(ridge_hz, fs_hz)
-    lobes = hysteresis(frames.strength, rule.on, rule.off)
-    if rotation is not None:
-        lobes = [p for lobe in lobes for p in _split_by_direction(lobe, rotation, rule, frame_s)]
-    # Noise may pass the threshold for a moment; a carrier is clear for a few frames at least.
-    lobes = [(a, b) for a, b in lobes if clear[a:b].sum() >= MIN_CLEAR_FRAMES]
+    ridge_hz = evidence.frames.ridge_hz.astype(np.float64)
+    clear = clear_motion(evidence, rule)
 
-    def speed_hz(first: int, last: int) -> float:
-        return largest_frequency(ridge_hz[first:last][clear[first:last]])
+    def speed_hz(lobe: tuple[int, int]) -> float:
+        inside = slice(*lobe)
+        return largest_frequency(ridge_hz[inside][clear[inside]])
 
     joined: list[tuple[int, int]] = []
-    for lobe in lobes:
-        if joined and _is_dip(joined[-1], lobe, rotation, rule, frame_s):
-            before, gap_s = joined[-1], (lobe[0] - joined[-1][1]) * frame_s
-            fastest = min(speed_hz(*before), speed_hz(*lobe))
-            left = float(np.median(ridge_hz[max(before[0], before[1] - 3) : before[1]]))
-            right = float(np.median(ridge_hz[lobe[0] : min(lobe[1], lobe[0] + 3)]))
-            if gap_s < rule.min_still_s or min(left, right) > max(0.5 * fastest, 2 * f_floor_hz):
-                joined[-1] = (before[0], lobe[1])
+    for lobe in hysteresis(evidence.frames.strength, rule.on, rule.off):
+        for part in _split_by_direction(lobe, evidence, rule):
+            # Noise may pass the threshold for a moment; a carrier is clear for a few frames.
+            if clear[slice(*part)].sum() < MIN_CLEAR_FRAMES:
                 continue
-        joined.append(lobe)
+            if joined and _is_one_motion(joined[-1], part, evidence, rule, speed_hz):
+                joined[-1] = (joined[-1][0], part[1])
+            else:
+                joined.append(part)
     return [
-        Motion(a, b, 0 if rotation is None else rotation.direction(a, b), speed_hz(a, b))
-        for a, b in joined
-        if (b - a) * frame_s >= rule.min_motion_s
+        Motion(*lobe, evidence.direction(*lobe), speed_hz(lobe))
+        for lobe in joined
+        if (lobe[1] - lobe[0]) * evidence.frame_s >= rule.min_motion_s
     ]
+
+
+def clear_motion(evidence: Evidence, rule: MotionRule) -> NDArray[np.bool_]:
+    """Frames where S(t) is high and the vector turns as fast as the ridge says.
+
+    Noise has a ridge as well, but does not turn along with it; and where the torque is near
+    zero, the ripple's sidebands outgrow the carrier, whose frequency the vector still shows.
+    """
+    ridge_hz = np.maximum(evidence.frames.ridge_hz, 1e-9)
+    ratio = np.abs(evidence.rotation.frequency_hz(evidence.fs_hz)) / ridge_hz
+    agrees = (ratio > 1 / AGREEMENT) & (ratio < AGREEMENT)
+    return agrees & (evidence.frames.strength >= rule.on)
 
 
 def largest_frequency(ridge_hz: NDArray[np.floating]) -> float:
@@ -156,44 +190,62 @@ def largest_frequency(ridge_hz: NDArray[np.floating]) -> float:
     """
     if not ridge_hz.size:
         return 0.0
-    width = min(5, ridge_hz.size)
-    windows = np.lib.stride_tricks.sliding_window_view(ridge_hz, width)
+    windows = np.lib.stride_tricks.sliding_window_view(ridge_hz, min(5, ridge_hz.size))
     return float(np.median(windows, axis=1).max())
 
 
-def _is_dip(
+def standing_time(evidence: Evidence, first: int, last: int) -> float:
+    """Time within the frames first .. last-1 for which a clear current does not turn, s.
+
+    A holding torque that stands still proves standstill; a current within the noise proves
+    nothing.
+    """
+    rotation = evidence.rotation[first:last]
+    clear = rotation.along > evidence.frames.step * 2 * (3 * evidence.noise_a) ** 2
+    stands = np.abs(rotation.frequency_hz(evidence.fs_hz)) < evidence.f_floor_hz
+    return float(np.sum(clear & stands) * evidence.frame_s)
+
+
+def _is_one_motion(
     before: tuple[int, int],
     after: tuple[int, int],
-    rotation: Rotation | None,
+    evidence: Evidence,
     rule: MotionRule,
-    frame_s: float,
+    speed_hz: Callable[[tuple[int, int]], float],
 ) -> bool:
-    turned_back = rotation is not None and rotation.direction(*before) != rotation.direction(*after)
-    return not turned_back and (after[0] - before[1]) * frame_s <= rule.max_dip_s
+    """Whether the gap between two lobes of S(t) is a dip inside one motion.
+
+    While braking the torque, and with it the current, passes zero, and where gravity drives the
+    joint it may stay near zero for long. No joint stops from speed at once: where the carrier is
+    fast on both sides of the gap it was fast within, unless a holding torque proves standstill.
+    """
+    if evidence.direction(*before) != evidence.direction(*after):
+        return False
+    gap_s = (after[0] - before[1]) * evidence.frame_s
+    if gap_s < rule.min_still_s:
+        return True
+    if gap_s > rule.max_dip_s or standing_time(evidence, before[1], after[0]) >= rule.min_still_s:
+        return False
+    ridge_hz = evidence.frames.ridge_hz
+    leaving = float(np.median(ridge_hz[max(before[0], before[1] - 3) : before[1]]))
+    arriving = float(np.median(ridge_hz[after[0] : min(after[1], after[0] + 3)]))
+    return leaving > FAST_SHARE * speed_hz(before) and arriving > FAST_SHARE * speed_hz(after)
 
 
 def _split_by_direction(
-    lobe: tuple[int, int], rotation: Rotation, rule: MotionRule, frame_s: float
+    lobe: tuple[int, int], evidence: Evidence, rule: MotionRule
 ) -> list[tuple[int, int]]:
     """Cut a lobe where the sense of rotation changes for good."""
+    if not evidence.has_direction:
+        return [lobe]
     first, last = lobe
-    n_least = max(1, round(rule.min_motion_s / frame_s))
-    smooth = np.convolve(rotation.turn[first:last], np.ones(n_least), mode="same")
-    sign = np.sign(smooth)
-    cuts = np.flatnonzero(sign[1:] != sign[:-1]) + 1
-    parts: list[tuple[int, int]] = []
-    begin = 0
-    for cut in [*cuts.tolist(), last - first]:
-        if parts and (cut - begin < n_least or _same_sense(sign, parts[-1], begin, first)):
-            parts[-1] = (parts[-1][0], first + cut)
-        else:
-            parts.append((first + begin, first + cut))
-        begin = cut
+    n_least = max(1, round(rule.min_motion_s / evidence.frame_s))
+    turn = evidence.rotation.turn[first:last]
+    sign = np.sign(np.convolve(turn, np.ones(min(n_least, turn.size)), mode="same"))
+    cuts = (np.flatnonzero(sign[1:] != sign[:-1]) + 1).tolist()
+    parts = [lobe]
+    for begin, end in pairwise([*cuts, last - first]):
+        turned_back = evidence.direction(parts[-1][0], first + begin) != sign[begin]
+        if turned_back and min(end - begin, first + begin - parts[-1][0]) >= n_least:
+            parts[-1:] = [(parts[-1][0], first + begin), (first + begin, last)]
     return parts
-
-
-def _same_sense(
-    sign: NDArray[np.floating], part: tuple[int, int], begin: int, first: int
-) -> bool:
-    return bool(sign[begin] == np.sign(sign[part[0] - first : part[1] - first].sum()))
-

@@ -1,0 +1,41 @@
+"""Signs that a channel cannot be trusted."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def clipped_share(x: NDArray[np.floating]) -> float:
+    """Share of the samples that sit at the channel's largest or smallest value, if it is clipped.
+
+    A clipped channel reaches its extreme value far more often than the next value inside; a
+    quantised crest does not.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one channel; NaN is passed over.
+
+    Returns
+    -------
+    float
+        0 for a channel that does not look clipped.
+    """
+    known = x[np.isfinite(x)]
+    if known.size < 2:
+        return 0.0
+    n_clipped = 0
+    for extreme in (known.max(), known.min()):
+        n_extreme = int(np.count_nonzero(known == extreme))
+        inside = known[known != extreme]
+        if n_extreme < max(10, known.size // 1000) or not inside.size:
+            continue
+        nearest = inside[np.argmin(np.abs(inside - extreme))]
+        if n_extreme > 5 * np.count_nonzero(known == nearest):
+            n_clipped += n_extreme
+    return float(n_clipped / known.size)
+
+
+def is_constant(x: NDArray[np.floating]) -> bool:
+    """Whether all known samples of a channel are equal (true if there are none)."""
+    known = x[np.isfinite(x)]
+    return not known.size or bool(known.min() == known.max())

@@ -1,0 +1,140 @@
+"""Motions told from a joint's velocity, where the drive reports torque current only."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import savgol_filter
+
+from opamc_cli.signal.noise import noise_level
+from opamc_cli.signal.segmentation import hysteresis
+
+ON_SHARE = 0.05  # of the largest speed
+OFF_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """A motion told from velocity.
+
+    Attributes
+    ----------
+    start, stop : int
+        Samples, half-open.
+    direction : int
+        Sign of the velocity, 1 or -1.
+    speed_rad_s : float
+        Largest speed of the joint that lasted, rad/s.
+    """
+
+    start: int
+    stop: int
+    direction: int
+    speed_rad_s: float
+
+
+def velocity_from_position(
+    position_rad: NDArray[np.floating], fs_hz: float, window_s: float = 0.05
+) -> NDArray[np.float64]:
+    """Velocity from position by local parabolas, since differences of quantised angles are noise.
+
+    Parameters
+    ----------
+    position_rad : array, shape (n,), rad
+        Joint angle; jumps by a whole turn are undone.
+    fs_hz : float
+        Sampling rate, Hz.
+    window_s : float
+        Length of the local fit, s.
+
+    Returns
+    -------
+    array, shape (n,), rad/s
+        Zero for fewer than three samples.
+
+    Notes
+    -----
+    Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
+    ends.
+    """
+    angle = np.unwrap(np.asarray(position_rad, dtype=np.float64))
+    window = min(max(3, round(window_s * fs_hz) | 1), angle.size - 1 + angle.size % 2)
+    if window < 3:
+        return np.zeros(angle.size)
+    velocity: NDArray[np.float64] = savgol_filter(angle, window, 2, deriv=1, delta=1 / fs_hz)
+    return velocity
+
+
+def find_joint_motions(
+    velocity_rad_s: NDArray[np.floating],
+    fs_hz: float,
+    min_motion_s: float,
+    min_still_s: float,
+    min_speed_rad_s: float = 0.01,
+) -> list[JointMotion]:
+    """Motions of a joint from its velocity, by hysteresis on each sign by itself.
+
+    A motion reaches 5 % of the largest speed of the recording and lasts while the speed stays
+    above 2 % of it, or above four standard deviations of the velocity's noise if that is more.
+
+    Parameters
+    ----------
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity; NaN counts as standstill.
+    fs_hz : float
+        Sampling rate, Hz.
+    min_motion_s, min_still_s : float
+        Shorter motions are dropped, shorter standstills between motions of the same direction
+        bridged, s.
+    min_speed_rad_s : float
+        A joint that never reaches this speed stands still: what is left is its controller's
+        quiver, rad/s.
+
+    Returns
+    -------
+    list of JointMotion
+        In order, not overlapping.
+    """
+    velocity = np.nan_to_num(np.asarray(velocity_rad_s, dtype=np.float64))
+    if not velocity.size:
+        return []
+    fastest = float(np.quantile(np.abs(velocity), 0.999))
+    if fastest < min_speed_rad_s:
+        return []
+    off = max(OFF_SHARE * fastest, 4 * noise_level(velocity))
+    on = max(ON_SHARE * fastest, 2 * off)
+    signed = sorted(
+        (start, stop, sign)
+        for sign in (1, -1)
+        for start, stop in hysteresis(sign * velocity, on, off)
+    )
+    joined: list[tuple[int, int, int]] = []
+    for start, stop, sign in signed:
+        if joined and sign == joined[-1][2] and start - joined[-1][1] < min_still_s * fs_hz:
+            joined[-1] = (joined[-1][0], stop, sign)
+        else:
+            joined.append((start, stop, sign))
+    return [
+        JointMotion(a, b, sign, float(np.quantile(np.abs(velocity[a:b]), 0.99)))
+        for a, b, sign in joined
+        if b - a >= min_motion_s * fs_hz
+    ]
+
+
+def motor_frequency(speed_rad_s: float, gear_ratio: float | None, pole_pairs: int | None) -> float:
+    """Frequency that takes the carrier's place for a reported current, Hz.
+
+    Parameters
+    ----------
+    speed_rad_s : float
+        Joint speed, rad/s.
+    gear_ratio, pole_pairs : number or None
+        Of the joint. With both, the result is the electrical frequency; without pole pairs, the
+        motor's revolutions; with neither, the joint's own revolutions per second.
+
+    Returns
+    -------
+    float
+        Hz.
+    """
+    return speed_rad_s / (2 * np.pi) * (gear_ratio or 1.0) * (pole_pairs or 1)
