@@ -4,13 +4,14 @@ from collections.abc import Callable
 
 import typer
 
-from opamc_cli.commands import config, identify, ingest, patterns, score, simulate
+from opamc_cli.commands import config, identify, ingest, patterns, report, score, simulate
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "ingest": ingest.ingest,
     "identify": identify.identify,
     "patterns": patterns.patterns,
     "score": score.score,
+    "report": report.report,
     "simulate": simulate.simulate,
 }
 """Subcommands by name, in the order of the chain."""

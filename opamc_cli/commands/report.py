@@ -29,6 +29,8 @@ def report(
     quiet: Quiet = False,
 ) -> None:
     """Write report.html from what a diagnosis, or score and model close, left in --out."""
+    from rich.text import Text
+
     from opamc_cli.commands.tables import feature_table, loop_table, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.errors import InputError
@@ -59,5 +61,5 @@ def report(
             "omitted": list(outcome.omitted),
         },
         *shown,
-        f"report: {outcome.path}",
+        Text(f"report: {outcome.path}"),
     )

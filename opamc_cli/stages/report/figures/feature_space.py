@@ -33,7 +33,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     with style():
         drawing = canvas(4.4, 6.4)
         drawing.set_layout_engine("none")
-        space: Any = drawing.add_axes((0.0, 0.0, 1.0, 0.95), projection="3d")
+        space: Any = drawing.add_axes((-0.04, 0.03, 1.0, 0.95), projection="3d")
         space.view_init(elev=18, azim=-58)
         for side in (space.xaxis, space.yaxis, space.zaxis):
             side.set_pane_color((0.0, 0.0, 0.0, 0.0))
@@ -57,11 +57,11 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         for axes, (x, y, z) in _labels(points, space.get_proj()):
             space.text(x, y, z + 0.05, axes_phrase(axes), ha="center", fontweight="bold")
         space.set_xlabel("Δμ of JSD (10⁻³)", labelpad=4)
-        space.set_ylabel("Δσ² of JSD (10⁻⁴)", labelpad=6)
+        space.set_ylabel("Δσ² of JSD (10⁻⁴)", labelpad=10)
         space.set_zlabel("KS", labelpad=2)
         space.locator_params(axis="x", nbins=5)
         space.locator_params(axis="y", nbins=5)
-        space.set_box_aspect((1.35, 1.0, 0.85), zoom=1.15)
+        space.set_box_aspect((1.35, 1.0, 0.85), zoom=1.05)
         drawing.legend(loc="upper left", ncols=4)
         words = "; ".join(
             f"axis {axis}: {x:.3g}e-3, {y:.3g}e-4, {z:.2f}" for axis, (x, y, z) in points.items()

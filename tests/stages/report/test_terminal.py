@@ -1,0 +1,109 @@
+import json
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import output_folder
+import pytest
+from rich.console import Console, RenderableType
+
+from opamc_cli import app
+from opamc_cli.commands.tables import loop_table, verdict_table
+
+
+def shown(item: RenderableType, width: int = 120) -> str:
+    console = Console(file=StringIO(), width=width)
+    console.print(item)
+    text = console.file.getvalue()  # type: ignore[attr-defined]
+    assert isinstance(text, str)
+    return text
+
+
+def axis(number: int, state: str, **more: Any) -> dict[str, Any]:
+    entry = {
+        "axis": number,
+        "state": state,
+        "health_index": 0.5 * number,
+        "p_value": 0.3,
+        "features": {"delta_mu": 0.01, "delta_var": None, "ks": 0.2},
+        "motions": [],
+        "cause": None,
+        "reasons": [],
+    }
+    return entry | more
+
+
+def test_all_healthy_is_one_line() -> None:
+    text = shown(verdict_table({"axes": [axis(n, "healthy") for n in range(1, 7)]}))
+    assert text == "Axes 1-6 healthy (largest health index 3, axis 6)\n"
+
+
+def test_an_unhealthy_axis_is_explained() -> None:
+    verdict = {
+        "axes": [
+            axis(1, "healthy", reasons=["nothing to see"]),
+            axis(3, "fault", p_value=1e-9, reasons=["worse than before"]),
+            axis(4, "insufficient-data", health_index=None, p_value=None),
+        ]
+    }
+    text = shown(verdict_table(verdict))
+    assert text.startswith("Axis 3 at fault; axis 4 not judged for want of data; axis 1 healthy\n")
+    assert "✕ fault" in text
+    assert "< 0.0001" in text
+    assert "axis 3:\n  worse than before\n" in text
+    assert "Record more cycles" in text
+    assert "nothing to see" not in text
+    assert "None" not in text
+    assert "nan" not in text
+
+
+def test_what_several_axes_share_is_said_once() -> None:
+    verdict = {
+        "axes": [axis(n, "fault", reasons=[f"only axis {n}", "inspect the gear"]) for n in (2, 5)]
+    }
+    text = shown(verdict_table(verdict))
+    assert text.count("inspect the gear") == 1
+    assert "axes 2 and 5: inspect the gear" in text
+    assert "only axis 5" in text
+
+
+def test_text_from_files_steers_no_terminal_and_is_no_markup() -> None:
+    evil = "[red]x[/red] [/nonsense] \x1b[2J\x07"
+    verdict = {"axes": [axis(1, "fault", reasons=[evil], cause={"effect": evil})]}
+    text = shown(verdict_table(verdict))
+    assert "\x1b" not in text
+    assert "\x07" not in text
+    assert text.count("[red]x[/red] [/nonsense]") == 2
+    step = {"effect": evil, "interpretation": evil}
+    text = shown(loop_table({"axes": [{"axis": 1, "verdict": evil, "steps": [step]}]}), 400)
+    assert "\x1b" not in text
+    assert text.count("[/nonsense]") == 3
+
+
+def test_report_command_prints_verdict_and_loop(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out"
+    out.mkdir()
+    output_folder.make(out)
+    output_folder.add_loop(out)
+    with pytest.raises(SystemExit) as ended:
+        app.main(["report", "--out", str(out)])
+    captured = capsys.readouterr()
+    assert ended.value.code == 0
+    assert "Axis 3 at fault" in captured.out
+    assert "Model of axis 3: closed, sealed error 0.065 A before, 0.021 A after" in captured.out
+    assert str(out / "report.html") in captured.out.replace("\n", "")
+    assert captured.err == ""
+    with pytest.raises(SystemExit):
+        app.main(["report", "--out", str(out), "--json"])
+    result = json.loads(capsys.readouterr().out)
+    assert result["verdict"]["axes"][2]["state"] == "fault"
+
+
+def test_report_of_no_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        app.main(["report", "--out", str(tmp_path / "nowhere")])
+    assert ended.value.code == 3
+    assert "nowhere: no such folder" in capsys.readouterr().err
+    assert not (tmp_path / "nowhere").exists()
