@@ -212,9 +212,12 @@ def table_record(path: Path, metadata: Mapping[bytes, bytes] | None) -> dict[str
         kind = "a run" if b"opamc" in (metadata or {}) else "a Parquet file of another program"
         msg = f"{path}: is {kind}, not a stage table of opamc"
         raise InputError(msg)
-    record = json.loads(raw)
+    try:
+        record = json.loads(raw)
+    except (UnicodeDecodeError, json.JSONDecodeError):
+        record = None
     if not isinstance(record, dict):
-        msg = f"{path}: its metadata key 'opamc_table' is not a JSON object"
+        msg = f"{path}: its metadata key 'opamc_table' is not a JSON object; make the table again"
         raise InputError(msg)
     return record
 

@@ -1,0 +1,137 @@
+import json
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from opamc_cli.config.models import digest
+from opamc_cli.errors import InputError
+from opamc_cli.storage.tables import (
+    SEGMENTS,
+    TABLE_KEY,
+    Provenance,
+    read_table,
+    table_input,
+    table_provenance,
+    write_table,
+)
+
+ROW = {
+    "run": "r",
+    "axis": 1,
+    "segment": 0,
+    "start": 10,
+    "stop": 90,
+    "sampling_rate_hz": 2048.0,
+    "f_max_hz": 157.0,
+    "direction": 1,
+    "variance": 0.5,
+    "edge": False,
+    "kind": "motion",
+    "signal": "phases",
+    "temperature_c": None,
+}
+TABLE = pa.Table.from_pylist([ROW, {**ROW, "segment": 1}], schema=SEGMENTS)
+
+
+def write(path, table=TABLE, **changes):
+    arguments = {"stage": "segment", "config": {"a": 1}, "inputs": []}
+    write_table(path, table, **{**arguments, **changes})
+    return path
+
+
+def test_a_table_reads_back_with_its_provenance(tmp_path):
+    source = tmp_path / "in" / "r.parquet"
+    source.parent.mkdir()
+    source.write_bytes(b"run")
+    path = write(tmp_path / "out" / "segments.parquet", inputs=[table_input(source)])
+    assert read_table(path, "segment", SEGMENTS).to_pylist() == TABLE.to_pylist()
+    sha256 = table_input(source)[1]
+    known = Provenance("segment", {"a": 1}, digest({"a": 1}), (("../in/r.parquet", sha256),))
+    assert table_provenance(path) == known
+
+
+def test_writing_twice_gives_the_same_bytes_wherever(tmp_path):
+    for folder in ("a", "b/c"):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / folder / "r.parquet").write_bytes(b"run")
+        inputs = [table_input(tmp_path / folder / "r.parquet")]
+        write(tmp_path / folder / "segments.parquet", inputs=inputs)
+    one, other = (tmp_path / f / "segments.parquet" for f in ("a", "b/c"))
+    assert one.read_bytes() == other.read_bytes()
+
+
+def test_a_changed_config_changes_the_record(tmp_path):
+    one = write(tmp_path / "a.parquet")
+    other = write(tmp_path / "b.parquet", config={"a": 2})
+    assert table_provenance(one).config_hash != table_provenance(other).config_hash
+
+
+def record(**changes):
+    values = {"stage": "segment", "schema_version": 1, **changes}
+    return {TABLE_KEY: json.dumps(values).encode()}
+
+
+@pytest.mark.parametrize(
+    ("metadata", "table", "expected"),
+    [
+        (None, TABLE, "a Parquet file of another program, not a stage table"),
+        ({"opamc": "{}"}, TABLE, "is a run, not a stage table"),
+        ({TABLE_KEY: b"[]"}, TABLE, "is not a JSON object"),
+        (record(stage="identify"), TABLE, "is a table of stage 'identify', 'segment' is needed"),
+        (record(schema_version=99), TABLE, "has schema version 99, this opamc reads 1"),
+        (record(), TABLE.drop_columns(["stop"]), "column stop is missing"),
+        (
+            record(),
+            TABLE.set_column(3, "start", pa.array([1.0, 2.0])),
+            "column start has type double, int64 is needed",
+        ),
+    ],
+)
+def test_other_tables_are_refused(tmp_path, metadata, table, expected):
+    path = tmp_path / "segments.parquet"
+    pq.write_table(table.replace_schema_metadata(metadata), path)
+    with pytest.raises(InputError) as caught:
+        read_table(path, "segment", SEGMENTS)
+    assert expected in str(caught.value)
+    assert str(caught.value).startswith(str(path))
+
+
+@pytest.mark.parametrize("content", [b"", b"PAR1", b"not a table" * 50])
+def test_files_that_are_not_parquet_are_refused(tmp_path, content):
+    path = tmp_path / "segments.parquet"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"cannot be read as Parquet .* `opamc segment` again"):
+        read_table(path, "segment", SEGMENTS)
+
+
+def test_metadata_that_is_not_json_is_refused(tmp_path):
+    path = tmp_path / "segments.parquet"
+    pq.write_table(TABLE.replace_schema_metadata({TABLE_KEY: b"{"}), path)
+    with pytest.raises(InputError, match="opamc_table"):
+        read_table(path, "segment", SEGMENTS)
+
+
+def test_a_missing_table_names_the_stage_that_makes_it(tmp_path):
+    with pytest.raises(InputError, match=r"no such file; run `opamc segment` first"):
+        read_table(tmp_path / "segments.parquet", "segment")
+
+
+def test_a_folder_is_refused(tmp_path):
+    with pytest.raises(InputError):
+        read_table(tmp_path, "segment")
+
+
+def test_every_flipped_byte_is_noticed(tmp_path):
+    path = write(tmp_path / "segments.parquet")
+    content = path.read_bytes()
+    damaged = tmp_path / "damaged.parquet"
+    for at in range(0, len(content), 23):
+        flipped = bytearray(content)
+        flipped[at] ^= 0x04
+        damaged.write_bytes(flipped)
+        try:
+            found = read_table(damaged, "segment", SEGMENTS)
+        except InputError:
+            continue
+        assert found.to_pylist() == TABLE.to_pylist(), f"byte {at} of {len(content)}"
