@@ -121,7 +121,7 @@ def to_svg(drawing: Canvas, name: str) -> str:
     return re.sub(r"\n\s*", "\n", text).strip()
 
 
-def to_png(drawing: Canvas, dots_per_inch: int = 110) -> bytes:
+def to_png(drawing: Canvas, dots_per_inch: int = 120) -> bytes:
     """Return a drawing as PNG on the light page's ground, for places that take no SVG."""
     buffer = io.BytesIO()
     FigureCanvasAgg(drawing)

@@ -178,5 +178,11 @@ def remains(entry: Mapping[str, Any]) -> str:
         parts.append(f"{number(floor)} A of it does not repeat and cannot be modelled")
     if isinstance(share, int | float):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
+    domains = [
+        str(item.get("domain", item)) if isinstance(item, Mapping) else str(item)
+        for item in entry.get("remains", ())
+    ]
+    if domains:
+        parts.append(f"what is left has structure over {', '.join(domains)}")
     text = "; ".join(parts) or "loop.json does not say"
     return text[0].upper() + text[1:] + "."

@@ -56,7 +56,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         space.set_zlim(0.0, 1.05)
         for axes, (x, y, z) in _labels(points, space.get_proj()):
             space.text(x, y, z + 0.05, axes_phrase(axes), ha="center", fontweight="bold")
-        space.set_xlabel("Δμ of JSD (10⁻³)", labelpad=4)
+        space.set_xlabel("Δμ of JSD (10⁻³)", labelpad=8)
         space.set_ylabel("Δσ² of JSD (10⁻⁴)", labelpad=10)
         space.set_zlabel("KS", labelpad=2)
         space.locator_params(axis="x", nbins=5)

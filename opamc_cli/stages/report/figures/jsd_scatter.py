@@ -2,6 +2,7 @@
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
 
 from opamc_cli.stages.report.columns import extremes
 from opamc_cli.stages.report.figure import (
@@ -11,8 +12,9 @@ from opamc_cli.stages.report.figure import (
     grid_shape,
     hide_surplus,
     style,
+    to_png,
 )
-from opamc_cli.stages.report.focus import Focus, axis_scores
+from opamc_cli.stages.report.focus import Focus, axis_scores, choose_focus
 from opamc_cli.stages.report.inputs import ROLES, ReportInputs, time_order
 from opamc_cli.stages.report.palette import colour, state_sign
 
@@ -24,22 +26,8 @@ MARKERS = {"baseline": "o", "target": "^"}
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     """Draw the divergences of all axes."""
-    axes = inputs.axes
-    rows, columns = grid_shape(len(axes))
     with style():
-        drawing = canvas(0.5 + 1.75 * rows)
-        panels = list(
-            np.atleast_1d(drawing.subplots(rows, columns, sharey=True, squeeze=False)).flat
-        )
-        thinned = False
-        for panel, axis in zip(panels, axes, strict=False):
-            thinned |= _panel(panel, inputs, axis, focus.order[axis])
-        for panel in panels[::columns]:
-            panel.set_ylabel("JSD")
-        panels[0].set_ylim(bottom=0.0)
-        hide_surplus(panels, len(axes))
-        handles, labels = panels[0].get_legend_handles_labels()
-        drawing.legend(handles, labels, loc="outside upper right", ncols=3)
+        drawing, thinned = draw(inputs, focus)
         caption = (
             "One point is one segment, runs in time order: baseline against the pool without its "
             "own cycle, then target against the whole baseline pool. The dotted line is the "
@@ -53,8 +41,33 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             "Divergence of every segment",
             caption,
             "Scatter plots of Jensen-Shannon divergence, one panel for each axis. "
-            + " ".join(_in_words(inputs, axis, focus.order[axis]) for axis in axes),
+            + " ".join(_in_words(inputs, axis, focus.order[axis]) for axis in inputs.axes),
         )
+
+
+def picture(inputs: ReportInputs) -> bytes:
+    """Return the figure as PNG on the light page's ground, for a README."""
+    with style():
+        return to_png(draw(inputs, choose_focus(inputs))[0])
+
+
+def draw(inputs: ReportInputs, focus: Focus) -> tuple[Canvas, bool]:
+    """Return the drawing, to be finished within `style`, and whether points were left out."""
+    axes = inputs.axes
+    rows, columns = grid_shape(len(axes))
+    drawing = canvas(0.5 + 1.75 * rows)
+    panels = list(drawing.subplots(rows, columns, sharey=True, squeeze=False).flat)
+    thinned = [
+        _panel(panel, inputs, axis, focus.order[axis])
+        for panel, axis in zip(panels, axes, strict=False)
+    ]
+    for panel in panels[::columns]:
+        panel.set_ylabel("JSD")
+    panels[0].set_ylim(bottom=0.0)
+    hide_surplus(panels, len(axes))
+    handles, labels = panels[0].get_legend_handles_labels()
+    drawing.legend(handles, labels, loc="outside upper right", ncols=3)
+    return drawing, any(thinned)
 
 
 def _panel(panel: Axes, inputs: ReportInputs, axis: int, order: int) -> bool:
