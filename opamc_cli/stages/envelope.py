@@ -1,6 +1,6 @@
-"""The envelope of one segment, from whichever current a run holds."""
+"""The current of one segment and its envelope, from whichever channels a run holds."""
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -67,17 +67,42 @@ def read_envelope(
     InputError
         If the axis lacks the current that is wanted.
     """
+    current = read_current(run, axis, start, stop, wanted)
+    return envelope(current) if np.iscomplexobj(current) else np.abs(current)
+
+
+def read_current(
+    run: Run, axis: int, start: int, stop: int, wanted: EnvelopeKind = "auto"
+) -> npt.NDArray[Any]:
+    """Read the current vector of an axis, or its signed reported current.
+
+    Parameters
+    ----------
+    run, axis, start, stop, wanted
+        As for `read_envelope`.
+
+    Returns
+    -------
+    array
+        Shape (stop - start,), A: the Clarke vector or analytic signal (complex) where phases
+        are known, the reported current (real) else.
+
+    Raises
+    ------
+    InputError
+        If the axis lacks the current that is wanted.
+    """
     start, stop = max(start, 0), min(stop, run.n_samples)
     channels = run.channels(axis)
     kind = envelope_kind(run.path, channels, wanted)
     if kind == "clarke":
         phases = run.read(channels.phases, start, stop)
-        return envelope(clarke(*(phases[name] for name in channels.phases)))
+        return clarke(*(phases[name] for name in channels.phases))
     if kind == "hilbert":
         guard = round(GUARD_S * run.sampling_rate_hz)
         first = max(start - guard, 0)
         name = channels.phases[0]
         current = run.read([name], first, stop + guard)[name]
-        return envelope(analytic_signal(current))[start - first : stop - first]
+        return analytic_signal(current)[start - first : stop - first]
     assert channels.current is not None
-    return np.abs(run.read([channels.current], start, stop)[channels.current])
+    return run.read([channels.current], start, stop)[channels.current]
