@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def ingest(
     files: Annotated[
-        list[Path], typer.Argument(metavar="FILE...", help="CSV, MAT, HDF5 or TDMS recordings.")
+        list[Path], typer.Argument(metavar="FILE", help="CSV, MAT, HDF5 or TDMS recordings.")
     ],
     map_file: Annotated[
         Path,
