@@ -4,7 +4,17 @@ from collections.abc import Callable
 
 import typer
 
-from opamc_cli.commands import config, identify, ingest, patterns, report, score, simulate
+from opamc_cli.commands import (
+    config,
+    diagnose,
+    identify,
+    ingest,
+    patterns,
+    report,
+    score,
+    simulate,
+    sweep,
+)
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "ingest": ingest.ingest,
@@ -12,6 +22,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "patterns": patterns.patterns,
     "score": score.score,
     "report": report.report,
+    "diagnose": diagnose.diagnose,
+    "sweep": sweep.sweep,
     "simulate": simulate.simulate,
 }
 """Subcommands by name, in the order of the chain."""

@@ -21,6 +21,8 @@ class ChainOutcome:
         Names of the runs that went through.
     errors
         One for each run, or axis of a run, that could not be used.
+    notes
+        What is worth knowing besides: segments that fit no motion of the reference.
     """
 
     segments: Path
@@ -28,6 +30,7 @@ class ChainOutcome:
     patterns: Path
     runs_done: tuple[str, ...]
     errors: tuple[OpamcError, ...]
+    notes: tuple[str, ...]
 
 
 def run_chain(
@@ -68,4 +71,9 @@ def run_chain(
         patterns=counted.path,
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
+        notes=tuple(
+            f"{name} axis {axis}: {unidentified} segments fit no motion of the reference cycle"
+            for (name, axis), (_, unidentified) in identified.cycles().items()
+            if unidentified
+        ),
     )

@@ -1,0 +1,77 @@
+"""`opamc diagnose`: which joint has changed against a baseline, how sure, and why."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.options import (
+    DEFAULT_OUT,
+    ConfigFile,
+    ExitZero,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.output import Output
+from opamc_cli.errors import ExitCode
+
+
+def diagnose(
+    baseline: Annotated[
+        list[Path],
+        typer.Option(
+            "--baseline", metavar="RUNS", help="Runs of the healthy state: files, folders."
+        ),
+    ],
+    target: Annotated[
+        list[Path], typer.Option("--target", metavar="RUNS", help="Runs to be judged.")
+    ],
+    model: Annotated[
+        Path | None,
+        typer.Option("--lda", metavar="FILE", help="Trained discriminant, from `score --learn`."),
+    ] = None,
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = 1,
+    exit_zero: ExitZero = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
+    from opamc_cli.commands.tables import verdict_table
+    from opamc_cli.config import load_config
+    from opamc_cli.stages import diagnose as stage
+    from opamc_cli.stages import latent
+    from opamc_cli.storage.lock import output_lock
+
+    output = Output(as_json, quiet)
+    effective = load_config(config, overrides or ())
+    with output_lock(out):
+        outcome = stage.run(
+            baseline,
+            target,
+            effective,
+            out,
+            models=latent.read_models(model) if model else None,
+            jobs=jobs,
+            progress=output.note,
+        )
+    for note in outcome.notes:
+        output.note(note)
+    output.result(
+        {
+            **outcome.verdict,
+            "verdict": str(outcome.verdict_path),
+            "report": str(outcome.report_path),
+        },
+        verdict_table(outcome.verdict),
+        f"report: {outcome.report_path}",
+    )
+    failed = output.failures([str(error) for error in outcome.errors], outcome.n_runs)
+    if outcome.exit_code is ExitCode.UNHEALTHY:
+        raise typer.Exit(ExitCode.DONE if exit_zero else ExitCode.UNHEALTHY)
+    raise typer.Exit(failed or outcome.exit_code)

@@ -1,0 +1,113 @@
+"""All stages in a row: from two sets of runs to a verdict and a report."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from opamc_cli.config import Config
+from opamc_cli.errors import ExitCode, OpamcError
+from opamc_cli.stages import report, score, verdict
+from opamc_cli.stages.chain import run_chain
+from opamc_cli.stages.latent import LatentModels
+from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.sources import RunSource, check_comparable
+
+
+@dataclass(frozen=True)
+class DiagnoseOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    verdict
+        Content of verdict.json.
+    verdict_path, report_path
+        The files that were written.
+    exit_code
+        What the verdict ends with.
+    n_runs
+        Runs that went through.
+    errors
+        One for each run, or axis of a run, that could not be used.
+    notes
+        What is worth knowing besides.
+    """
+
+    verdict: dict[str, Any]
+    verdict_path: Path
+    report_path: Path
+    exit_code: ExitCode
+    n_runs: int
+    errors: tuple[OpamcError, ...]
+    notes: tuple[str, ...]
+
+
+def run(
+    baseline: Sequence[Path],
+    target: Sequence[Path],
+    config: Config,
+    out: Path,
+    *,
+    models: LatentModels | None = None,
+    jobs: int = 1,
+    progress: Callable[[str], None] = lambda _: None,
+) -> DiagnoseOutcome:
+    """Compare target runs with baseline runs, joint by joint.
+
+    Parameters
+    ----------
+    baseline, target
+        Run files and folders of them.
+    config
+        All options.
+    out
+        Folder of all tables, verdict.json and report.html.
+    models
+        Trained discriminants, for the latent axis.
+    jobs
+        Worker processes.
+    progress
+        Called with the name of each step as it begins.
+
+    Raises
+    ------
+    OpamcError
+        If the runs cannot be compared, or no run of one side can be used.
+    """
+    _check_before(baseline, target)
+    progress("baseline: segment, identify, patterns")
+    normal = run_chain(baseline, config, out / "baseline", jobs=jobs)
+    progress("target: segment, identify, patterns")
+    other = run_chain(target, config, out / "target", reference=normal.motions, jobs=jobs)
+    progress("score")
+    scored = score.run(normal.patterns, other.patterns, config, out, models=models)
+    decided = verdict.run(
+        normal.patterns, other.patterns, scored.scores_path, scored.features_path, config, out
+    )
+    progress("report")
+    page = report.run(out, title=config.report.title)
+    return DiagnoseOutcome(
+        verdict=decided.verdict,
+        verdict_path=decided.path,
+        report_path=page.path,
+        exit_code=decided.exit_code,
+        n_runs=len(normal.runs_done) + len(other.runs_done),
+        errors=(*normal.errors, *other.errors),
+        notes=(*normal.notes, *other.notes, *scored.notes),
+    )
+
+
+def _check_before(baseline: Sequence[Path], target: Sequence[Path]) -> None:
+    """Refuse what cannot be compared before hours are spent on it."""
+    sides = []
+    for paths in (baseline, target):
+        sources = []
+        for name, path in find_runs(paths):
+            try:
+                with Run(path, name) as opened:
+                    sources.append(RunSource(name, path, "", opened.n_samples, opened.info))
+            except OpamcError:
+                continue  # reported with its reason when its turn comes
+        sides.append(sources)
+    check_comparable(*sides)
