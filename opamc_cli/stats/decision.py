@@ -37,6 +37,16 @@ HEALTHY_SHIFT_SPREAD = Spread(0.45, 5.0)
 """Spread of the logarithms of those six numbers."""
 
 
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
+
+MAD_EFFICIENCY = 0.37
+"""Share of the values that a median absolute deviation is worth (Huber, 1981)."""
+
+CYCLES_DIFFER = 0.05
+"""Level at which cycles of baseline and target count as different where one session is known."""
+
+
 @dataclass(frozen=True)
 class Policy:
     """What it takes to call a joint changed or at fault.
@@ -177,8 +187,10 @@ def judge(
             return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread)
         cells = cells_by_axis[axis]
         if methods[axis] == "one-session":
-            # Beyond what sessions may differ by, and beyond what cycles differ by.
-            return max(tail, _cycle_p_value(cells, policy))
+            # What exchanging cycles cannot tell from chance is no change, however large it looks.
+            # Beyond that the cycles say nothing: they cannot know how much sessions differ.
+            by_cycles = _cycle_p_value(cells, policy)
+            return tail if by_cycles <= CYCLES_DIFFER else max(tail, by_cycles)
         n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
         labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
         values = pooled_divergence(cells, labels)
@@ -300,9 +312,8 @@ def one_session_shift(log_ratios: Mapping[int, float], axis: int) -> Shift:
         return Shift(log_ratios[axis], prior.scale, Spread(scale, prior.dof))
     values = np.array([0.0, *others])
     centre = float(np.median(values))
-    deviation = 1.4826 * float(np.median(np.abs(values - centre)))
-    # a median absolute deviation is worth about 0.4 of the values it is made of
-    blended = moderated_spread(deviation**2, 0.4 * len(others), prior)
+    deviation = MAD_TO_SIGMA * float(np.median(np.abs(values - centre)))
+    blended = moderated_spread(deviation**2, MAD_EFFICIENCY * len(others), prior)
     scale = blended.scale * math.sqrt(1 + 1 / len(values))
     return Shift(log_ratios[axis] - centre, blended.scale, Spread(scale, blended.dof))
 
@@ -336,20 +347,30 @@ def _session_shifts(pairs: Mapping[int, tuple[FloatArray, FloatArray]]) -> dict[
         axis: float(own.var(ddof=1)) if len(own) > 2 else math.nan
         for axis, (own, _) in pairs.items()
     }
+    ratios = {axis: float(np.mean(target) - np.mean(own)) for axis, (own, target) in pairs.items()}
+    shares = {axis: 1 / len(own) + 1 / target.shape[1] for axis, (own, target) in pairs.items()}
     shifts = {}
-    for axis, (own, target) in pairs.items():
-        # Two sessions have the same divergence from each other: no spread can be had from them.
-        dof = len(own) - 1 if len(own) > 2 else 0
-        siblings = [variance for key, variance in variances.items() if key != axis]
-        prior = shared_prior(siblings, dof)
-        unit = moderated_spread(variances[axis], dof, prior)
-        scale = unit.scale * math.sqrt(1 / len(own) + 1 / target.shape[1])
-        log_ratio = float(np.mean(target) - np.mean(own))
-        shifts[axis] = Shift(log_ratio, unit.scale, Spread(scale, unit.dof))
+    for axis, (own, _) in pairs.items():
+        siblings = [key for key in pairs if key != axis]
+        if len(own) > 2:
+            dof = len(own) - 1
+            prior = shared_prior([variances[key] for key in siblings], dof)
+            unit = moderated_spread(variances[axis], dof, prior)
+        else:
+            # Two sessions have the same divergence from each other: no spread can be had from
+            # them. What the target's session did to the siblings stands in for it.
+            others = np.array([ratios[key] / math.sqrt(shares[key]) for key in siblings])
+            unit = BETWEEN_SESSIONS
+            if len(others) > 1:
+                deviation = MAD_TO_SIGMA * float(np.median(np.abs(others)))
+                unit = moderated_spread(deviation**2, MAD_EFFICIENCY * len(others), unit)
+        scale = unit.scale * math.sqrt(shares[axis])
+        shifts[axis] = Shift(ratios[axis], unit.scale, Spread(scale, unit.dof))
     return shifts
 
 
 def _cycle_p_value(cells: Sequence[Cell], policy: Policy) -> float:
+    """Exchange cycles between baseline and target; 0 if there are too few to show anything."""
     n_baseline = max(len(cell.cycles) for cell in cells)
     n_target = max(len(cell.target_cycles) for cell in cells)
     by_cycle = [
@@ -357,9 +378,9 @@ def _cycle_p_value(cells: Sequence[Cell], policy: Policy) -> float:
         for cell in cells
         if len(cell.cycles) == n_baseline and len(cell.target_cycles) == n_target
     ]
-    if not by_cycle:
-        return 1.0
     labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
+    if not by_cycle or len(labels) * CYCLES_DIFFER < 1:
+        return 0.0
     return relabelled_p_value(pooled_divergence(by_cycle, labels), n_baseline + n_target)
 
 
