@@ -1,7 +1,7 @@
 """The report: figures and tables put on one page that needs nothing else."""
 
 import json
-import logging
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -129,7 +129,7 @@ def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:
             title=title,
             styles=custom_properties() + "\n" + _resource("report.css"),
             headline=_headline(inputs),
-            rows=[_axis_view(inputs, axis, focus) for axis in inputs.axes],
+            rows=[_axis_view(inputs, axis, focus) for axis in inputs.all_axes],
             attention=[
                 _axis_view(inputs, axis, focus)
                 for axis in by_severity(inputs)
@@ -160,18 +160,14 @@ def _draw(
     call: Callable[[Callable[..., Figure]], Figure],
 ) -> Section:
     figures, omitted = [], []
-    # a name in a script that the font lacks is drawn by the browser, which has more fonts
-    fonts = logging.getLogger("matplotlib.font_manager")
-    level = fonts.level
-    fonts.setLevel(logging.ERROR)
-    try:
+    with warnings.catch_warnings():
+        # a sign that the font lacks is drawn by the browser, which has more fonts
+        warnings.filterwarnings("ignore", message="Glyph .* missing from font")
         for name, draw in parts:
             try:
                 figures.append(call(draw))
             except NothingToDrawError as reason:
                 omitted.append(f"{name}: {reason}")
-    finally:
-        fonts.setLevel(level)
     return Section(tuple(figures), tuple(omitted))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.stages.report.columns import Columns, select
-from opamc_cli.stages.report.inputs import ReportInputs
+from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
 
 SEVERITY = ("insufficient-data", "healthy", "changed", "fault")
 
@@ -33,14 +33,27 @@ class Focus:
 
 def choose_focus(inputs: ReportInputs) -> Focus:
     """Return the worst axis, and for every axis its worst motion and its order."""
-    orders = {axis: _order(inputs, axis) for axis in inputs.axes}
-    motions = {axis: _worst_motion(inputs.scores, axis, orders[axis]) for axis in inputs.axes}
+    orders = {axis: _order(inputs, axis) for axis in inputs.all_axes}
+    motions = {axis: _worst_motion(inputs.scores, axis, orders[axis]) for axis in inputs.all_axes}
     return Focus(max(inputs.axes, key=lambda axis: _rank(inputs, axis)), motions, orders)
 
 
+def need_divergences(inputs: ReportInputs) -> None:
+    """Check that there is a divergence to draw.
+
+    Raises
+    ------
+    NothingToDrawError
+        If all are unknown.
+    """
+    if not np.isfinite(inputs.scores["jsd"]).any():
+        msg = "scores.parquet holds no finite divergence"
+        raise NothingToDrawError(msg)
+
+
 def by_severity(inputs: ReportInputs) -> list[int]:
-    """Return the axes from the worst to the best."""
-    return sorted(inputs.axes, key=lambda axis: (_rank(inputs, axis), -axis), reverse=True)
+    """Return all axes from the worst to the best."""
+    return sorted(inputs.all_axes, key=lambda axis: (_rank(inputs, axis), -axis), reverse=True)
 
 
 def axis_scores(
@@ -84,7 +97,7 @@ def _order(inputs: ReportInputs, axis: int) -> int:
     if orders:
         return max(orders)
     scores = inputs.scores
-    return int(scores["order"][scores["axis"] == axis].max())
+    return int(scores["order"][scores["axis"] == axis].max(initial=0))
 
 
 def _worst_motion(scores: Columns, axis: int, order: int) -> int:
@@ -92,10 +105,12 @@ def _worst_motion(scores: Columns, axis: int, order: int) -> int:
     worst, rise = -1, -np.inf
     for motion in np.unique(mine["motion"]):
         jsd = {
-            role: mine["jsd"][(mine["motion"] == motion) & (mine["role"] == role)]
+            role: mine["jsd"][
+                (mine["motion"] == motion) & (mine["role"] == role) & np.isfinite(mine["jsd"])
+            ]
             for role in ("baseline", "target")
         }
-        means = {r: float(np.mean(v[np.isfinite(v)])) for r, v in jsd.items() if v.size}
+        means = {name: float(np.mean(values)) for name, values in jsd.items() if values.size}
         change = means.get("target", -np.inf) - means.get("baseline", 0.0)
         if change > rise or worst < 0:
             worst, rise = int(motion), change

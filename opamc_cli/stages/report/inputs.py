@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages.report.columns import Columns, to_columns
+from opamc_cli.stages.report.columns import Columns, n_rows, to_columns
 from opamc_cli.storage.runs import Run, file_sha256
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import TABLE_KEY, read_table, table_record
@@ -129,6 +129,12 @@ class ReportInputs:
         """Axes with scores, ascending."""
         return sorted({int(axis) for axis in self.scores["axis"]})
 
+    @property
+    def all_axes(self) -> list[int]:
+        """Axes with scores, and those that the verdict names without any, ascending."""
+        named = {int(entry["axis"]) for entry in (self.verdict or {}).get("axes", ())}
+        return sorted(named | set(self.axes))
+
     def axis_verdict(self, axis: int) -> Mapping[str, Any] | None:
         """Return what the verdict says of an axis, if anything."""
         for entry in (self.verdict or {}).get("axes", ()):
@@ -187,6 +193,9 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
         return _read_json(path)
 
     scores = stage_table("scores.parquet", SCORE_COLUMNS)
+    if not n_rows(scores):
+        msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
+        raise InputError(msg)
     features = stage_table("features.parquet", FEATURE_COLUMNS)
     verdict = optional_json("verdict.json")
     roles = {}

@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import output_folder
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from output_folder import Plan
@@ -157,7 +158,7 @@ def test_provenance_holds_every_input(made: Path, page: str) -> None:
 def test_names_from_files_stay_text(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    evil = '<script>alert("x")</script>$x_1$&'
+    evil = '<script>alert("x")</script>$x_1$&機械'
     output_folder.make(out, Plan(names=("normal", evil)))
     verdict = json.loads((out / "verdict.json").read_text())
     verdict["axes"][2]["reasons"] = ["<img src=x onerror=alert(1)>"]
@@ -228,3 +229,33 @@ def test_one_healthy_axis_alone(tmp_path: Path) -> None:
     text = report.run(out).path.read_text(encoding="utf-8")
     assert "Axis 1 healthy" in _Page(text).words()
     assert 'class="card' not in text
+
+
+def test_an_axis_without_scores_is_named_all_the_same(folder: Path) -> None:
+    verdict = json.loads((folder / "verdict.json").read_text())
+    missing = {"axis": 9, "state": "insufficient-data", "reasons": ["it never moves"]}
+    verdict["axes"].append(missing)
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+    words = _Page(report.run(folder).path.read_text(encoding="utf-8")).words()
+    assert "axis 9 not judged for want of data" in words
+    assert "it never moves" in words
+
+
+def test_numbers_that_are_not_known_are_dashes(folder: Path) -> None:
+    verdict = json.loads((folder / "verdict.json").read_text())
+    for entry in verdict["axes"]:
+        entry |= {"health_index": None, "p_value": None, "motions": []}
+        entry["features"] = dict.fromkeys(("delta_mu", "delta_var", "ks"))
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+    for name, columns in (("features", ("delta_mu", "delta_var", "ks")), ("scores", ("jsd",))):
+        path = folder / f"{name}.parquet"
+        table = pq.read_table(path)
+        for column in columns:
+            place = table.column_names.index(column)
+            table = table.set_column(place, column, pa.nulls(table.num_rows, pa.float64()))
+        pq.write_table(table, path)
+    outcome = report.run(folder)
+    page = _Page(outcome.path.read_text(encoding="utf-8"))
+    assert "feature-space" not in page.figures()
+    assert "ordinal-distribution" in page.figures()
+    assert not {"nan", "None", "inf"} & set(page.words().split())

@@ -10,7 +10,7 @@ from opamc_cli.stages.report.figure import (
     hide_surplus,
     style,
 )
-from opamc_cli.stages.report.focus import Focus, axis_scores, pooled_features
+from opamc_cli.stages.report.focus import Focus, axis_scores, need_divergences, pooled_features
 from opamc_cli.stages.report.inputs import ROLES, ReportInputs
 from opamc_cli.stages.report.palette import colour
 
@@ -19,6 +19,7 @@ MAX_BINS = 40
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     """Draw the histograms of baseline and target on common bins."""
+    need_divergences(inputs)
     axes = inputs.axes
     rows, columns = grid_shape(len(axes))
     with style():

@@ -14,7 +14,7 @@ from opamc_cli.stages.report.figure import (
     style,
     to_png,
 )
-from opamc_cli.stages.report.focus import Focus, axis_scores, choose_focus
+from opamc_cli.stages.report.focus import Focus, axis_scores, choose_focus, need_divergences
 from opamc_cli.stages.report.inputs import ROLES, ReportInputs, time_order
 from opamc_cli.stages.report.palette import colour, state_sign
 
@@ -26,6 +26,7 @@ MARKERS = {"baseline": "o", "target": "^"}
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     """Draw the divergences of all axes."""
+    need_divergences(inputs)
     with style():
         drawing, thinned = draw(inputs, focus)
         caption = (

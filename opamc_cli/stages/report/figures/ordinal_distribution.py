@@ -24,7 +24,8 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             msg = f"{role}/patterns.parquet is absent"
             raise NothingToDrawError(msg)
     drawn = []
-    for axis in sorted(by_severity(inputs)[:MAX_AXES]):
+    scored = [axis for axis in by_severity(inputs) if axis in inputs.axes]
+    for axis in sorted(scored[:MAX_AXES]):
         baseline, target = (_share(inputs, role, axis, focus) for role in ROLES)
         if baseline is not None and target is not None:
             drawn.append((axis, baseline, target))
