@@ -168,6 +168,9 @@ def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Ta
     if not path.exists():
         msg = f"{path}: no such file; run `opamc {stage}` first"
         raise InputError(msg)
+    if path.is_dir():
+        msg = f"{path}: is a folder where a table of `opamc {stage}` is needed; name the file"
+        raise InputError(msg)
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             table = file.read()
