@@ -12,12 +12,14 @@ from opamc_cli.commands import (
     patterns,
     report,
     score,
+    segment,
     simulate,
     sweep,
 )
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "ingest": ingest.ingest,
+    "segment": segment.segment,
     "identify": identify.identify,
     "patterns": patterns.patterns,
     "score": score.score,

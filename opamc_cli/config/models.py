@@ -45,7 +45,42 @@ class SegmentConfig(Section):
         "ssqueezepy's own default is 60.",
     )
     voices_per_octave: Annotated[int, Field(ge=2, le=64)] = Field(
-        8, description="Scales per octave of the wavelet transform."
+        16, description="Scales per octave of the wavelet transform."
+    )
+    f_min_hz: Positive = Field(
+        8.0, description="Slowest carrier that counts as motion, Hz; slower ones cost time."
+    )
+    f_max_hz: Positive | None = Field(
+        None,
+        description="Fastest carrier, Hz; null: 0.4 times the sampling rate, at most 1000.",
+    )
+    noise_floor: Positive = Field(
+        3.0,
+        description="Current below this many standard deviations of the noise has no carrier.",
+    )
+    threshold_on: Fraction = Field(0.5, description="A motion has to reach this value of S(t).")
+    threshold_off: Fraction = Field(
+        0.3, description="A motion lasts while S(t) stays above this value."
+    )
+    min_motion_s: Positive = Field(0.1, description="Shorter motions are dropped.")
+    min_still_s: Positive = Field(
+        0.06, description="Shorter standstills belong to the motion around them."
+    )
+    max_dip_s: Positive = Field(
+        2.0,
+        description="Longest dip of S(t) that is bridged because the joint is fast before and "
+        "after it, as while braking.",
+    )
+    min_speed_rad_s: Positive = Field(
+        0.01, description="A joint that never gets faster stands still (reported current only)."
+    )
+    windows: Annotated[int, Field(ge=1)] = Field(
+        4, description="Windows into which a recording that never stands still is cut."
+    )
+    min_window_samples: Annotated[int, Field(ge=10)] = Field(
+        1200,
+        description="Least samples of such a window: ten for each pattern of order 5; fewer "
+        "windows are made otherwise.",
     )
 
 

@@ -1,0 +1,52 @@
+"""`opamc segment`: when each joint moves, and how fast its carrier gets."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.options import (
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.output import Output
+
+
+def segment(
+    runs: Annotated[
+        list[Path], typer.Argument(metavar="RUN...", help="Run files and folders of them.")
+    ],
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = 1,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Cut runs into motions, axis by axis; writes segments.parquet."""
+    from opamc_cli.config import load_config
+    from opamc_cli.stages import segment as stage
+    from opamc_cli.storage.lock import output_lock
+
+    output = Output(as_json, quiet)
+    settings = load_config(config, overrides or ())
+    with output_lock(out):
+        outcome = stage.run(runs, settings, out, jobs=jobs)
+    found = outcome.by_axis()
+    for note in outcome.notes:
+        output.note(note)
+    output.result(
+        {"written": str(outcome.path), "axes": found, "notes": list(outcome.notes)},
+        *(
+            f"{f['run']} axis {f['axis']}: {f['segments']} {f['kind']}s, "
+            f"{f['in_motion_s']:.1f} s, up to {f['f_max_hz']:.1f} Hz"
+            for f in found
+        ),
+        str(outcome.path),
+    )
+    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(found)))

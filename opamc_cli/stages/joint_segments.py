@@ -1,0 +1,134 @@
+"""Segments of an axis whose drive reports torque current: by the joint's velocity."""
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.config.models import JointConfig, SegmentConfig
+from opamc_cli.errors import InputError
+from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.reported import (
+    JointMotion,
+    find_joint_motions,
+    motor_frequency,
+    velocity_from_position,
+)
+from opamc_cli.signal.windows import carrier_windows
+from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows
+from opamc_cli.storage.runs import AxisChannels, Run
+
+STILL_SHARE = 0.05
+"""A recording that stands still for less than this share never stands still."""
+
+
+def joint_segments(
+    run: Run, channels: AxisChannels, config: SegmentConfig, joint: JointConfig
+) -> AxisSegments:
+    """Find the motions of an axis from its velocity, or from its position if there is none.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    channels
+        Columns of the axis, with a reported current.
+    config, joint
+        Sections `segment` and `joint`.
+
+    Raises
+    ------
+    InputError
+        If there is neither velocity nor position, or the current holds no numbers.
+    """
+    name = channels.current
+    assert name is not None
+    velocity = _velocity(run, channels)
+    current = run.read([name])[name]
+    known = current[np.isfinite(current)]
+    if not known.size:
+        msg = (
+            f"{run.path}: column {name} holds no number in {run.n_samples} samples; "
+            "check the drive's log or leave the axis out"
+        )
+        raise InputError(msg)
+    motions = find_joint_motions(
+        velocity,
+        run.sampling_rate_hz,
+        config.min_motion_s,
+        config.min_still_s,
+        config.min_speed_rad_s,
+    )
+    if motions and known.min() == known.max():
+        msg = (
+            f"{run.path}: column {name} is constant at {known[0]:g} A while the joint moves; "
+            "check the drive's log or leave the axis out"
+        )
+        raise InputError(msg)
+    notes = []
+    if known.size < current.size:
+        notes.append(
+            f"{run.path}: column {name} has {current.size - known.size} samples that are no "
+            "numbers; patterns that touch them are left out"
+        )
+    share = clipped_share(current) if motions else 0.0
+    if share > 0:
+        notes.append(
+            f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
+        )
+    segments = _segments(run, motions, config, joint)
+    return AxisSegments(
+        run.name,
+        make_rows(run, channels, segments, [name], "reported"),
+        tuple(notes),
+        f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
+        f"{config.min_speed_rad_s:g} is motion",
+    )
+
+
+def _segments(
+    run: Run, motions: list[JointMotion], config: SegmentConfig, joint: JointConfig
+) -> list[Segment]:
+    def frequency(motion: JointMotion) -> float:
+        return motor_frequency(motion.speed_rad_s, joint.gear_ratio, joint.pole_pairs)
+
+    never_stands = (
+        len(motions) == 1
+        and motions[0].stop - motions[0].start >= (1 - STILL_SHARE) * run.n_samples
+    )
+    if not never_stands:
+        return [Segment(m.start, m.stop, frequency(m), m.direction) for m in motions]
+    only = motions[0]
+    # Whole revolutions of the motor where they are known and fit; else equal parts.
+    carriers = (frequency(only), run.sampling_rate_hz)
+    for carrier_hz in carriers:
+        spans = carrier_windows(
+            only.start,
+            only.stop,
+            carrier_hz,
+            run.sampling_rate_hz,
+            config.windows,
+            config.min_window_samples,
+        )
+        if spans:
+            break
+    return [Segment(a, b, frequency(only), only.direction, "window") for a, b in spans]
+
+
+def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
+    # One column at the drive's rate: 8 h at 1 kHz are 230 MB.
+    if channels.velocity is not None:
+        velocity = run.read([channels.velocity])[channels.velocity].astype(np.float64)
+    elif channels.position is not None:
+        position = run.read([channels.position])[channels.position]
+        velocity = velocity_from_position(position, run.sampling_rate_hz)
+    else:
+        axis = channels.axis
+        msg = (
+            f"{run.path}: axis {axis} has axis{axis}_current only; its motions need "
+            f"axis{axis}_velocity or axis{axis}_position, or phase currents axis{axis}_a, _b, _c"
+        )
+        raise InputError(msg)
+    if not np.isfinite(velocity).any():
+        column = channels.velocity or channels.position
+        msg = f"{run.path}: column {column} holds no number; check the drive's log"
+        raise InputError(msg)
+    return velocity
