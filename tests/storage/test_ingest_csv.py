@@ -1,5 +1,7 @@
 import gzip
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -261,3 +263,17 @@ def test_overrides_reach_into_the_map(tmp_path):
     changed = load_map(path, ["sampling_rate_hz=2000", "columns.axis1_a.unit=mA"])
     assert changed.sampling_rate_hz == 2000
     assert changed.columns["axis1_a"].unit == "mA"
+
+
+def test_the_maps_in_the_documentation_are_maps(tmp_path):
+    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    maps = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
+    assert maps
+    for content in maps:
+        (tmp_path / "map.yaml").write_text(content, encoding="utf-8")
+        load_map(tmp_path / "map.yaml")
+
+
+@pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs/maps").glob("*")))
+def test_shipped_maps_are_maps(path):
+    load_map(path)

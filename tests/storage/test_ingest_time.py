@@ -228,6 +228,18 @@ def test_dates_with_a_gap(tmp_path):
     assert item.stamps.n_gaps == 1
 
 
+def test_dates_with_a_decimal_comma(tmp_path):
+    rows = [(f'"2022-10-26T08:17:{s:02},250Z"', s) for s in range(20)]
+    item = ingested(tmp_path, rows, "{source: t, unit: iso8601}")
+    assert (item.sampling_rate_hz, item.n_samples, item.stamps.even) == (1, 20, True)
+    rows[5] = ("", 5)
+    item = ingested(tmp_path, rows, "{source: t, unit: iso8601}")
+    assert (item.n_samples, item.stamps.n_unreadable, item.stamps.n_bridged) == (20, 1, 1)
+    rows[5] = ('"2022-10-26,half past"', 5)
+    with pytest.raises(InputError, match=r"r\.csv: 't' is not ISO 8601"):
+        ingested(tmp_path, rows, "{source: t, unit: iso8601}")
+
+
 def test_text_that_is_no_date_is_refused(tmp_path):
     rows = [("2022-10-26T08:17:21Z", 1), ("yesterday", 2), ("2022-10-26T08:17:23Z", 3)]
     with pytest.raises(InputError, match=r"r\.csv: column t holds 'yesterday' in line 3"):

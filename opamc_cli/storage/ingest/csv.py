@@ -15,7 +15,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import timestamp_type
+from opamc_cli.storage.ingest.dates import parse_dates, timestamp_type
 from opamc_cli.storage.ingest.map import IngestMap, Name
 from opamc_cli.storage.ingest.source import Block, Selection, missing_channel
 
@@ -57,20 +57,29 @@ class CsvSource:
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected columns block by block."""
         position = {name: self._position(s.source) for name, s in selections.items()}
-        types = {}
-        for name, selection in selections.items():
-            at = f"c{position[name]}"
-            dates = timestamp_type(self._first_row[position[name]])
-            types[at] = dates if selection.dates else pa.float64()
+        types = {
+            f"c{position[name]}": self._date_type(position[name]) if s.dates else pa.float64()
+            for name, s in selections.items()
+        }
         for batch in self._batches(types):
-            yield {
-                name: _to_numpy(batch.column(f"c{position[name]}"), selection.dates)
-                for name, selection in selections.items()
-            }
+            block: Block = {}
+            for name, selection in selections.items():
+                column = batch.column(f"c{position[name]}")
+                if pa.types.is_string(column.type):
+                    texts = [text.replace(",", ".") for text in column.to_pylist()]
+                    block[name] = parse_dates(self.path, selection.source, texts)
+                else:
+                    block[name] = _to_numpy(column, selection.dates)
+            yield block
 
     def value(self, source: Name) -> object:
         """Return the value of a column in the first data row."""
         return self._first_row[self._position(source)].strip()
+
+    def _date_type(self, position: int) -> pa.DataType:
+        first = self._first_row[position]
+        # ISO 8601 allows a comma before the fraction of a second, the parser does not
+        return pa.string() if "," in first else timestamp_type(first)
 
     def _position(self, source: Name) -> int:
         if isinstance(source, int):

@@ -30,17 +30,19 @@ def timestamp_type(first: str) -> pa.DataType:
 
 
 def parse_dates(path: Path, source: Name, texts: Sequence[str]) -> Array:
-    """Return ISO 8601 texts as datetime64[us], UTC.
+    """Return ISO 8601 texts as datetime64[us], UTC; empty ones become NaT.
 
     Raises
     ------
     InputError
         If one is something else.
     """
-    if not texts:
-        return np.empty(0, dtype="datetime64[us]")
+    known = [text or None for text in texts]
+    first = next((text for text in known if text), None)
+    if first is None:
+        return np.full(len(texts), np.datetime64("NaT"), dtype="datetime64[us]")
     try:
-        parsed = pa.array(texts).cast(timestamp_type(texts[0]))
+        parsed = pa.array(known, pa.string()).cast(timestamp_type(first))
     except pa.ArrowException as error:
         msg = f"{path}: {source!r} is not ISO 8601 ({str(error).splitlines()[0]})"
         raise InputError(msg) from error
