@@ -102,7 +102,7 @@ def flexible_bases(track: Track, rows: np.ndarray) -> dict[str, Floats]:
     -------
     dict of str to array of shape (m, k)
     """
-    sign = track.sign[rows]
+    sign = track.direction[rows]
     forward = (sign > 0)[:, None]
     speed = np.abs(track.velocity[rows])
     position = track.position_rad[rows]

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.joint.phases import PhaseAngle, follow_phases, torque_current
-from opamc_cli.joint.smoothing import derivatives, measurement_noise, smoothing_window
+from opamc_cli.joint.smoothing import (
+    derivatives,
+    measurement_noise,
+    noise_gain,
+    smoothing_window,
+)
 from opamc_cli.joint.track import Bools, Floats, Joint, Track
 
 SLOWEST_SHARE = 0.02
@@ -52,12 +57,15 @@ class Recording:
 
 @dataclass(frozen=True)
 class Motion:
-    """Smoothed motion of one recording and the window (samples) it was smoothed over."""
+    """Smoothed motion of one recording, the window (samples) that it was smoothed over, and the
+    standard deviation of the speed's noise.
+    """
 
     position_rad: Floats
     velocity: Floats
     acceleration: Floats
     window: int
+    velocity_noise: float = 0.0
 
 
 def motion_from_position(
@@ -93,8 +101,10 @@ def motion_from_position(
                 derivatives(speed, rate_hz, own, 0),
                 derivatives(speed, rate_hz, own, 1),
                 own,
+                measurement_noise(speed) * noise_gain(rate_hz, own, 0),
             )
-    return Motion(position, velocity, acceleration, window)
+    noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -103,11 +113,20 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     velocity = derivatives(velocity_rad_s, rate_hz, window, 0)
     acceleration = derivatives(velocity_rad_s, rate_hz, window, 1)
     steps = 0.5 * (velocity[1:] + velocity[:-1]) / rate_hz
-    return Motion(np.concatenate([[0.0], np.cumsum(steps)]), velocity, acceleration, window)
+    noise = measurement_noise(velocity_rad_s) * noise_gain(rate_hz, window, 0)
+    position = np.concatenate([[0.0], np.cumsum(steps)])
+    return Motion(position, velocity, acceleration, window, noise)
+
+
+def direction_of(motion: Motion) -> Floats:
+    """Return the direction of motion: -1, 1, and 0 where noise or rest leave it open."""
+    speeds = np.abs(motion.velocity)
+    slowest = max(1e-3 * float(np.quantile(speeds, 0.98)), 5 * motion.velocity_noise, 1e-9)
+    return np.where(speeds > slowest, np.sign(motion.velocity), 0.0)
 
 
 def moving_samples(motion: Motion, usable: Bools) -> Bools:
-    """Samples in motion: fast enough, and half a smoothing window away from any reversal.
+    """Tell the samples in motion: fast enough, and half a smoothing window away from any reversal.
 
     Parameters
     ----------
@@ -122,9 +141,8 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     """
     velocity = motion.velocity
     speeds = np.abs(velocity)
-    top = float(np.quantile(speeds, 0.98)) if speeds.size else 0.0
-    noise = measurement_noise(velocity)
-    moving = usable & (speeds > max(SLOWEST_SHARE * top, 4 * noise, 1e-9))
+    moving = usable & (direction_of(motion) != 0)
+    moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     half = motion.window // 2
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
     for turn in turns if turns.size < velocity.size // 4 else []:
@@ -199,6 +217,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         acceleration=join("acceleration"),
         machine_angle_rad=join("machine_angle_rad"),
         angle_kind=pieces[0].angle_kind,
+        direction=join("direction"),
         moving=np.concatenate([piece.moving for piece in pieces]),
         group=np.full(n, -1, dtype=np.int64),
         load_a=np.zeros(n),
@@ -291,6 +310,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
         acceleration=motion.acceleration,
         machine_angle_rad=machine,
         angle_kind=angle_kind,
+        direction=direction_of(motion),
         moving=moving_samples(motion, usable),
         group=np.full(n, -1, dtype=np.int64),
         load_a=np.zeros(n),

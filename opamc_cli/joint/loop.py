@@ -20,7 +20,7 @@ from opamc_cli.joint.trace import (
 
 MOST_STEPS = 16
 TIE_LIKELIHOOD = 6.0
-TIE_SHARE = 0.05
+TIE_SHARE = 0.03
 TIE_COLLINEARITY = 0.9
 STRUCTURE_GAIN = 0.02
 STRUCTURE_T = 3.0
@@ -197,6 +197,7 @@ def _round(
         if candidate is not None:
             found.append(candidate)
     found.sort(key=lambda candidate: -candidate.score)
+    _simplest_first(found, library, session)
     number = len(progress.steps)
     checked: list[Candidate] = []
     for candidate in found:
@@ -207,7 +208,7 @@ def _round(
         if candidate.why_not is not None:
             continue
         view = views[candidate.term.effect.fast]
-        decoy = decoy_likelihood(fitted, view, candidate.term.effect, generator, gate.decoys)
+        decoy = decoy_likelihood(fitted, view, candidate, generator, gate.decoys)
         share = decoy / max(candidate.likelihood, 1e-300)
         candidate = replace(candidate, decoy_gain=candidate.gain * share)
         if candidate.likelihood < gate.decoy_ratio * decoy:
@@ -236,6 +237,24 @@ def _round(
         return extended
     _collect(progress, number, checked, None)
     return None
+
+
+def _simplest_first(found: list[Candidate], library: Library, session: Session) -> None:
+    """Put the simplest of those that tie with the best in front; then the library's order."""
+    if not found:
+        return
+    order = list(library)
+    tied = {found[0].term.effect.name, *_ties(found[0], found)}
+
+    def rank(candidate: Candidate) -> tuple[int, int]:
+        effect = candidate.term.effect
+        free = candidate.coefficients.size + len(effect.limits(session.fine.track))
+        return free, order.index(effect.name)
+
+    members = [candidate for candidate in found if candidate.term.effect.name in tied]
+    front = min(members, key=rank)
+    found.remove(front)
+    found.insert(0, front)
 
 
 def _collect(

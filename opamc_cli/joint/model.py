@@ -71,16 +71,18 @@ class Session:
         """Return the fine or the coarse grid."""
         return self.fine if fine else self.coarse
 
-    def with_model(self, load: Floats, model: Floats) -> "Session":
+    def with_model(self, load: Floats, model: Floats, static: Floats) -> "Session":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
         bounds = self.fine.track.bounds
-        fine = replace(self.fine, track=self.fine.track.with_model(load, model))
+        fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
         if self.factor == 1:
             return replace(self, fine=fine, coarse=fine)
         coarse = replace(
             self.coarse,
             track=self.coarse.track.with_model(
-                block_mean(load, bounds, self.factor), block_mean(model, bounds, self.factor)
+                block_mean(load, bounds, self.factor),
+                block_mean(model, bounds, self.factor),
+                block_mean(static, bounds, self.factor),
             ),
         )
         return replace(self, fine=fine, coarse=coarse)
@@ -100,7 +102,7 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     -------
     Session
     """
-    track = replace(track, group=grouping.group, groups_are_cycles=grouping.kind == "cycles")
+    track = replace(track, group=grouping.group)
     inside = int(np.count_nonzero(track.moving & (grouping.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
     factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
@@ -127,6 +129,7 @@ def _grid(track: Track, groups: list[int], sealed: list[int]) -> Grid:
     stops = np.cumsum([counts[g] for g in groups])
     starts = np.concatenate([[0], stops[:-1]])
     slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
+    track = replace(track, open_samples=fit)
     return Grid(track, fit, member & np.isin(track.group, sealed), slices)
 
 
@@ -202,11 +205,15 @@ def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
     total = np.zeros(grid.track.size)
     model = np.zeros(grid.track.size)
     load = np.zeros(grid.track.size)
+    static = [np.zeros((grid.track.size, 0))]
     for term, values in zip(terms, coefficients, strict=True):
-        part = term.columns(grid.track) @ values
+        columns = term.columns(grid.track)
+        part = columns @ values
         total += part
         if term.effect.static and not term.effect.fast:
             model += part
+            static.append(columns)
         if term.effect.carries_load:
             load += part
-    return Fit(terms, coefficients, session.with_model(load, model), current - total, normal)
+    session = session.with_model(load, model, np.concatenate(static, axis=1))
+    return Fit(terms, coefficients, session, current - total, normal)

@@ -1,7 +1,7 @@
 """Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
 
 import numpy as np
-from scipy.signal import savgol_filter
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from opamc_cli.joint.track import Floats
 
@@ -12,7 +12,7 @@ ALLOWED_NOISE_SHARE = 0.02
 
 
 def measurement_noise(path: Floats) -> float:
-    """Standard deviation of what is not smooth in a path, from its fourth differences.
+    """Estimate the standard deviation of what is not smooth in a path, from its fourth differences.
 
     Parameters
     ----------
@@ -52,18 +52,27 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     window = SHORTEST_WINDOW
     while window < longest:
         values = derivatives(path, rate_hz, window, derivative)
-        kernel = savgol_filter(
-            np.eye(1, 2 * window + 1, window)[0],
-            window,
-            POLYNOMIAL_ORDER,
-            deriv=derivative,
-            delta=1.0 / rate_hz,
-            mode="constant",
-        )
-        if noise * float(np.linalg.norm(kernel)) <= ALLOWED_NOISE_SHARE * float(np.std(values)):
+        own = noise * noise_gain(rate_hz, window, derivative)
+        if own <= ALLOWED_NOISE_SHARE * float(np.std(values)):
             break
         window = int(window * 1.3 + 2) | 1
     return max(min(window, longest), SHORTEST_WINDOW)
+
+
+def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
+    """Standard deviation of a derivative where the path carries white noise of unit deviation.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples.
+    derivative : int
+        Order of the derivative.
+    """
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    return float(np.linalg.norm(kernel))
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:

@@ -3,17 +3,20 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.model import Fit, Grid, Session, Term
-from opamc_cli.joint.normal import held_out_error, normal_equations, solve
+from opamc_cli.joint.normal import Normal, held_out_error, normal_equations, solve
 from opamc_cli.joint.track import Bools, Floats, block_mean
 from opamc_cli.joint.whitening import autoregression, settled, whitened
 
 SCORE_PER_PARAMETER = 6.0
 """What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
+
+BLOCKS_PER_GROUP = 8
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class Gate:
     smallest_t: float = 2.0
     smallest_consistency: float = 0.75
     decoy_ratio: float = 2.0
-    largest_p: float = 1e-3
+    largest_p: float = 5e-3
     decoys: int = 3
 
 
@@ -43,7 +46,7 @@ class Candidate:
     p_value : float
         Chi-square of the likelihood, times the number of guesses.
     gain, t_value, consistency : float
-        Held-out fall of the mean square (share), its t over groups, share of groups better.
+        Held-out fall of the mean square (share), t over blocks, share of groups better.
     contribution : array of shape (n,)
         Whitened, projected contribution, for comparison with others.
     """
@@ -249,7 +252,16 @@ def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | No
     tried = max(len(guesses), 1)
     log_p = float(chi2.logsf(max(likelihood, 0.0), free)) + np.log(tried)
     p_value = float(np.exp(np.clip(log_p, -700.0, 0.0)))
-    candidate = Candidate(best[1], likelihood, best[0], p_value, best[2], best[3], view.fine)
+    candidate = Candidate(
+        term=best[1],
+        likelihood=likelihood,
+        score=best[0],
+        p_value=p_value,
+        coefficients=best[2],
+        contribution=best[3],
+        fine=view.fine,
+        t_value=block_t_value(view, best[3]),
+    )
     return candidate, tried
 
 
@@ -316,8 +328,8 @@ def held_out(fit: Fit, candidate: Candidate) -> Candidate:
     Returns
     -------
     Candidate
-        With gain, t value and consistency: of groups in which the candidate is hardly excited
-        (a tenth of the mean energy) nothing is asked.
+        With gain, and with consistency: the share of groups that are better, every group counted
+        with the energy of what the candidate adds there.
     """
     session = fit.session
     grid = session.grid(candidate.fine)
@@ -330,22 +342,64 @@ def held_out(fit: Fit, candidate: Candidate) -> Candidate:
     after = held_out_error(normal)
     falls = before - after
     gain = float(falls.sum() / max(before.sum(), 1e-300))
-    count = falls.size
-    spread = float(np.std(falls, ddof=1)) if count > 1 else 0.0
-    t_value = float(falls.mean() / (spread / np.sqrt(count))) if spread > 0 else 0.0
-    energy = np.einsum("gii->gi", normal.gram)[:, base:].sum(axis=1)
-    excited = energy > 0.1 * energy.mean()
-    consistency = float(np.mean(falls[excited] > 0)) if excited.any() else 0.0
-    return replace(candidate, gain=gain, t_value=t_value, consistency=consistency)
+    energy = _excitation(normal, base)
+    consistency = float(np.sum(energy * (falls > 0)) / max(energy.sum(), 1e-300))
+    return replace(candidate, gain=gain, consistency=consistency)
+
+
+def _excitation(normal: Normal, base: int) -> Floats:
+    """Energy per group of the candidate's contribution that the model cannot make."""
+    gram = normal.gram.sum(axis=0)
+    whole = solve(gram, normal.moment.sum(axis=0))[base:]
+    inside = solve(
+        np.broadcast_to(gram[:base, :base], (1, base, base)),
+        (gram[:base, base:] @ whole)[None, :],
+    )[0]
+    direction = np.concatenate([-inside, whole])
+    return np.einsum("i,gij,j->g", direction, normal.gram, direction)
+
+
+def block_t_value(view: View, contribution: Floats) -> float:
+    """Compute the t value of a contribution's agreement with the residual over blocks of time.
+
+    Parameters
+    ----------
+    view : View
+        Whitened residual.
+    contribution : array of shape (m,)
+        Whitened contribution on the view's valid samples.
+
+    Returns
+    -------
+    float
+        Sum over blocks of the products, over the root of their sum of squares: one lucky block
+        gives 1, n equal ones the root of n. Eight blocks per group, so that effects that fade
+        or step, and live in few groups, can show themselves too.
+    """
+    products = contribution * view.residual[view.valid]
+    sums = np.array([products[block].sum() for block in _blocks_of(view)])
+    length = float(np.linalg.norm(sums))
+    return float(sums.sum() / length) if length > 0 else 0.0
+
+
+def _blocks_of(view: View) -> list[NDArray[np.int64]]:
+    """Positions among the valid samples, eight blocks per group."""
+    groups = view.grid.track.group[view.valid]
+    edges = np.flatnonzero(np.diff(groups) != 0) + 1
+    blocks: list[NDArray[np.int64]] = []
+    for members in np.split(np.arange(groups.size), edges):
+        blocks += [block for block in np.array_split(members, BLOCKS_PER_GROUP) if block.size]
+    return blocks
 
 
 def decoy_likelihood(
-    fit: Fit, view: View, effect: Effect, generator: np.random.Generator, count: int
+    fit: Fit, view: View, candidate: Candidate, generator: np.random.Generator, count: int
 ) -> float:
-    """Best likelihood that the same search finds when the residual's signs are shuffled.
+    """Best likelihood that the same search finds where the candidate's effect is not.
 
-    Every group is cut into four blocks whose signs are drawn at random: what is left has the
-    residual's size and colour, but nothing that follows a covariate.
+    The candidate's contribution is taken out of the residual, every group is cut into eight
+    blocks, and their signs are drawn at random: what is left has the noise's size and colour but
+    follows no covariate. A chance candidate takes out little, so its decoys do as well as it did.
 
     Parameters
     ----------
@@ -353,8 +407,8 @@ def decoy_likelihood(
         The model so far.
     view : View
         Whitened residual.
-    effect : Effect
-        Candidate's effect.
+    candidate : Candidate
+        Whose form is searched again.
     generator : numpy Generator
         For the signs.
     count : int
@@ -366,18 +420,17 @@ def decoy_likelihood(
         Largest likelihood.
     """
     worst = 0.0
+    rest = view.residual[view.valid] - candidate.contribution
+    blocks = _blocks_of(view)
     for _ in range(count):
-        signs = np.ones(view.grid.track.size)
-        groups = view.grid.track.group
-        for group in np.unique(groups[view.valid]):
-            members = np.flatnonzero((groups == group) & view.valid)
-            for block in np.array_split(members, 4):
-                signs[block] = generator.choice([-1.0, 1.0])
-        shuffled = view.residual * signs
-        values = shuffled[view.valid]
-        values = values - view.span @ (view.span.T @ values)
+        values = rest.copy()
+        for block in blocks:
+            values[block] *= generator.choice([-1.0, 1.0])
+        values -= view.span @ (view.span.T @ values)
+        shuffled = np.zeros_like(view.residual)
         shuffled[view.valid] = values
-        found, _tried = search(fit.session, replace(view, residual=shuffled), effect)
+        decoy = replace(view, residual=shuffled)
+        found, _tried = search(fit.session, decoy, candidate.term.effect)
         if found is not None:
             worst = max(worst, found.likelihood)
     return worst
@@ -390,7 +443,7 @@ def refusal(candidate: Candidate, gate: Gate, trials: int) -> str | None:
     if candidate.gain < gate.smallest_gain:
         return f"held-out gain {candidate.gain:.2%}, below {gate.smallest_gain:.0%}"
     if candidate.t_value < gate.smallest_t:
-        return f"t = {candidate.t_value:.1f} over groups, below {gate.smallest_t:g}"
+        return f"t = {candidate.t_value:.1f} over blocks, below {gate.smallest_t:g}"
     if candidate.consistency < gate.smallest_consistency:
         return (
             f"better in {candidate.consistency:.0%} of the groups, below "

@@ -38,6 +38,8 @@ class Track:
         Angle whose orders are searched: motor, joint or electrical, as `angle_kind` says.
     angle_kind : {"motor", "joint", "electrical"}
         What one revolution of `machine_angle_rad` is.
+    direction : array of shape (n,)
+        -1, 0 or 1; 0 where the joint is too slow to tell.
     moving : bool array of shape (n,)
         Samples that count: the joint moves and its direction is certain.
     group : int array of shape (n,)
@@ -46,6 +48,10 @@ class Track:
         Current that carries the load, and the whole fitted current (zero before a fit).
     temperature_c, current_d_a, electrical_rad : array of shape (n,) or None
         Where known: temperature, current in the flux axis, electrical angle.
+    static_columns : array of shape (n, k) or None
+        Regressors of the fitted terms that neither shift nor ripple.
+    open_samples : bool array of shape (n,) or None
+        Moving samples that a fit may look at: none that are sealed.
     channels : frozenset of str
         What was logged or follows from it: position, scale, temperature, phases, electrical.
     period_samples : int or None
@@ -62,6 +68,7 @@ class Track:
     acceleration: Floats
     machine_angle_rad: Floats
     angle_kind: str
+    direction: Floats
     moving: Bools
     group: Ints
     load_a: Floats
@@ -72,7 +79,8 @@ class Track:
     current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
     period_samples: int | None = None
-    groups_are_cycles: bool = False
+    static_columns: Floats | None = None
+    open_samples: Bools | None = None
 
     @property
     def size(self) -> int:
@@ -80,19 +88,14 @@ class Track:
         return int(self.time_s.size)
 
     @property
-    def sign(self) -> Floats:
-        """Direction of motion, -1, 0 or 1."""
-        return np.sign(self.velocity)
-
-    @property
     def speed_scale(self) -> float:
         """Speed that moving samples reach at their 95th percentile."""
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
 
-    def with_model(self, load_a: Floats, model_a: Floats) -> "Track":
+    def with_model(self, load_a: Floats, model_a: Floats, static_columns: Floats) -> "Track":
         """Return the same track with the fitted load and model currents."""
-        return replace(self, load_a=load_a, model_a=model_a)
+        return replace(self, load_a=load_a, model_a=model_a, static_columns=static_columns)
 
 
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
@@ -117,7 +120,7 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
     for start, stop in bounds:
         blocks = (stop - start) // factor
         part = values[start : start + blocks * factor]
-        parts.append(part.reshape((blocks, factor) + values.shape[1:]).mean(axis=1))
+        parts.append(part.reshape((blocks, factor, *values.shape[1:])).mean(axis=1))
     return np.concatenate(parts)
 
 
@@ -166,6 +169,7 @@ def coarsen(track: Track, factor: int) -> Track:
         velocity=mean(track.velocity),
         acceleration=mean(track.acceleration),
         machine_angle_rad=mean(track.machine_angle_rad),
+        direction=np.sign(mean(track.direction)),
         moving=moving,
         group=np.where(whole, group, -1).astype(np.int64),
         load_a=mean(track.load_a),

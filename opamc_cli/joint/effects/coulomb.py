@@ -14,7 +14,7 @@ class Coulomb(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction of motion."""
-        return stack(track.sign)
+        return stack(track.direction)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""

@@ -1,7 +1,7 @@
 """A joint that winds up and rings."""
 
 import numpy as np
-from scipy.signal import bilinear, lfilter
+from scipy.signal import bilinear, lfilter, lfilter_zi
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.track import Floats, Track
@@ -30,7 +30,7 @@ class Elasticity(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to a quarter of the sampling rate."""
-        return {"resonance_hz": (1.0, track.rate_hz / 3), "damping": (0.005, 0.7)}
+        return {"resonance_hz": (1.0, min(60.0, track.rate_hz / 3)), "damping": (0.005, 0.4)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
@@ -45,6 +45,8 @@ class Elasticity(Effect):
         change = np.empty(track.size)
         for start, stop in track.bounds:
             part = track.acceleration[start:stop]
-            excess[start:stop] = lfilter(*load, part)
-            change[start:stop] = lfilter(*rate, part)
+            # As if the first acceleration had lasted for ever: no ringing from the start itself.
+            for filtered, taps in ((excess, load), (change, rate)):
+                rest = lfilter_zi(*taps) * part[0]
+                filtered[start:stop] = lfilter(*taps, part, zi=rest)[0]
         return stack(excess, change)

@@ -23,7 +23,7 @@ class LoadFriction(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the magnitude of the fitted load current."""
-        return stack(track.sign * np.abs(track.load_a))
+        return stack(track.direction * np.abs(track.load_a))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""

@@ -36,7 +36,7 @@ class PositionDrag(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times a bell over the angle."""
         away = np.abs(track.position_rad - parameters["place_rad"]) / parameters["width_rad"]
-        return stack(track.sign * np.exp(-0.5 * away ** parameters["flatness"]))
+        return stack(track.direction * np.exp(-0.5 * away ** parameters["flatness"]))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""

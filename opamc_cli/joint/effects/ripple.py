@@ -39,7 +39,7 @@ class Ripple(Effect):
             scale = np.abs(track.velocity) / track.speed_scale - 0.5
             pairs += [scale * cosine, scale * sine]
         if parameters["direction"]:
-            pairs += [track.sign * cosine, track.sign * sine]
+            pairs += [track.direction * cosine, track.direction * sine]
         if parameters["load"]:
             side = np.sign(track.model_a)
             pairs += [side * cosine, side * sine]

@@ -35,7 +35,7 @@ class Stribeck(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the fall with speed."""
         ratio = np.abs(track.velocity) / parameters["stribeck_speed"]
-        return stack(track.sign * np.exp(-(ratio ** parameters["exponent"])))
+        return stack(track.direction * np.exp(-(ratio ** parameters["exponent"])))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction is higher, not lower, where the film is thin."""

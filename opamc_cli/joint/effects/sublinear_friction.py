@@ -25,7 +25,7 @@ class SublinearFriction(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Signed power of the speed, relative to the top speed."""
         ratio = np.abs(track.velocity) / track.speed_scale
-        return stack(track.sign * ratio ** parameters["exponent"])
+        return stack(track.direction * ratio ** parameters["exponent"])
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""

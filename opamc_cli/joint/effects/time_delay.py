@@ -3,6 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.normal import solve
 from opamc_cli.joint.track import Floats, Track
 
 
@@ -28,15 +29,24 @@ class TimeDelay(Effect):
         return {"delay_s": (-0.12, 0.12)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Shifted model current less the model current."""
-        change = np.empty(track.size)
+        """Shifted model current less the model current, by the coefficients that fit when shifted.
+
+        The coefficients of the unshifted fit would not do: they have already bent to the delay.
+        """
+        columns, rows = track.static_columns, track.open_samples
+        if columns is None or rows is None or columns.shape[1] == 0:
+            return np.zeros((track.size, 1))
+        shifted = np.empty_like(columns)
         for start, stop in track.bounds:
-            model = track.model_a[start:stop]
-            times = np.arange(model.size) / track.rate_hz
-            shifted = np.interp(times - parameters["delay_s"], times, model)
-            change[start:stop] = shifted - model
-        return stack(change)
+            times = np.arange(stop - start) / track.rate_hz
+            for k in range(columns.shape[1]):
+                shifted[start:stop, k] = np.interp(
+                    times - parameters["delay_s"], times, columns[start:stop, k]
+                )
+        part = shifted[rows]
+        coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
+        return stack((shifted - columns) @ coefficients)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """The model's current is moved, not multiplied."""
+        """Only a whole shift counts: the model's current is moved, not multiplied."""
         return bool(0.4 < coefficients[0] < 2.5)

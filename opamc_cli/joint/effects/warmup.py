@@ -33,7 +33,7 @@ class Warmup(Effect):
         """Decaying lubricant and dry friction."""
         clock = track.run_time_s if parameters["per_recording"] else track.time_s
         decay = np.exp(-clock / parameters["time_constant_s"])
-        return stack(track.velocity * decay, track.sign * decay)
+        return stack(track.velocity * decay, track.direction * decay)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Only the lubricant, or only the dry friction."""
