@@ -22,7 +22,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     axis = focus.axis
     motion, order = focus.motion[axis], focus.order[axis]
     traces = {role: _trace(inputs, role, axis, motion, order) for role in ROLES}
-    tau = int(axis_scores(inputs, axis, order, "target", motion)["tau"][0])
+    tau = _delay(inputs, axis, motion, order)
     period_s = float(np.median(np.diff(traces["baseline"][0])))
     window_s = (order - 1) * tau * period_s
     with style():
@@ -59,6 +59,12 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             f"Two overlaid traces of the current envelope of axis {axis}, motion {motion}, from "
             "baseline and target.",
         )
+
+
+def _delay(inputs: ReportInputs, axis: int, motion: int, order: int) -> int:
+    scores = inputs.scores
+    same = (scores["axis"] == axis) & (scores["motion"] == motion) & (scores["order"] == order)
+    return int(scores["tau"][same][0])
 
 
 def _trace(

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from opamc_cli.config.models import SegmentConfig
 from opamc_cli.signal.analytic import analytic_signal, clarke, temporal_fine_structure
-from opamc_cli.signal.motion import MotionBand, motion_frames
+from opamc_cli.signal.motion import motion_frames
 from opamc_cli.signal.noise import noise_level
-from opamc_cli.signal.wavelet import Morse
+from opamc_cli.stages.carrier_segments import MAX_FLOOR_SHARE, frame_step, motion_band
 from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
 from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
 from opamc_cli.stages.report.focus import Focus
@@ -23,8 +23,6 @@ MARGIN_S = 1.0
 
 MAX_WINDOWS = 6
 """Of a recording that never stands still."""
-
-FRAMES_PER_S = 400.0
 
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
@@ -85,27 +83,28 @@ def _draw_phases(
     panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
 ) -> str:
     config = SegmentConfig(**inputs.roles["baseline"].config.get("segment", {}))
-    names = run.channels(axis).phases
+    phases = run.channels(axis).phases
+    names = phases if len(phases) == 3 else phases[:1]
     read = run.read(names, start, stop)
     current = read[names[0]]
     vector = clarke(*(read[n] for n in names)) if len(names) == 3 else analytic_signal(current)
     rate = run.sampling_rate_hz
-    band = MotionBand(
-        f_max_hz=min(0.4 * rate, MotionBand.f_max_hz),
-        voices_per_octave=config.voices_per_octave,
-        wavelet=Morse(config.gamma, config.beta),
-    )
-    step = max(1, round(rate / FRAMES_PER_S))
-    tfs = temporal_fine_structure(vector, 3 * noise_level(vector))
-    frames = motion_frames(tfs, band, rate, step, config.engine)
+    step = frame_step(rate)
+    loudest_a = float(np.quantile(np.abs(vector), 0.95))
+    floor_a = min(config.noise_floor * noise_level(vector), MAX_FLOOR_SHARE * loudest_a)
+    tfs = temporal_fine_structure(np.nan_to_num(vector), floor_a)
+    frames = motion_frames(tfs, motion_band(rate, config), rate, step, config.engine)
     _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
     panels[0].set_ylabel("current (A)")
     _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")
+    for threshold in (config.threshold_on, config.threshold_off):
+        panels[1].axhline(threshold, color=colour("muted"), linewidth=0.7, dashes=(4, 3))
     panels[1].set_ylim(0.0, 1.08)
     panels[1].set_ylabel("S(t)")
     return (
         f"Above: current {names[0]}. Below: S(t), the largest modulus of the wavelet transform of "
-        "its fine structure, near 1 while the joint turns and 0 while it stands."
+        "its fine structure, near 1 while the joint turns. Dashed: what a motion has to reach "
+        f"({config.threshold_on:g}) and may not fall below ({config.threshold_off:g})."
     )
 
 
