@@ -67,7 +67,8 @@ class SweepOutcome:
         """
         rows = self.table.to_pydict()
         axis, order, tau = (np.asarray(rows[name]) for name in ("axis", "order", "tau"))
-        jsd, target = np.asarray(rows["jsd"]), np.asarray(rows["role"]) == "target"
+        # unknown divergences are null in the table
+        jsd, target = np.asarray(rows["jsd"], dtype=float), np.asarray(rows["role"]) == "target"
         tau_opt = np.asarray(rows["tau_opt"])
         found = []
         for a, o in sorted(set(zip(axis.tolist(), order.tolist(), strict=True))):

@@ -151,7 +151,7 @@ class Run:
     def read(
         self, columns: Sequence[str], start: int = 0, stop: int | None = None
     ) -> dict[str, Array]:
-        """Read samples start..stop (half-open) of some columns; nulls become NaN.
+        """Read samples start..stop (half-open) of some columns; nulls and infinities become NaN.
 
         Only the row groups that hold these samples are touched.
 
@@ -475,8 +475,12 @@ def _to_numpy(column: pa.ChunkedArray | pa.Array) -> Array:
     if pa.types.is_integer(column.type):
         column = column.cast(pa.float64())
     if isinstance(column, pa.Array):
-        return np.asarray(column.to_numpy(zero_copy_only=False))
-    return np.asarray(column.to_numpy())
+        values = np.asarray(column.to_numpy(zero_copy_only=False))
+    else:
+        values = np.asarray(column.to_numpy())
+    # an infinite current is no measurement, and one of them spoils every mean and transform
+    infinite = np.isinf(values)
+    return np.where(infinite, np.float32(np.nan), values) if infinite.any() else values
 
 
 def _join(pieces: list[Array]) -> Array:

@@ -86,6 +86,17 @@ def test_nulls_and_integers_become_floats(tmp_path):
     np.testing.assert_array_equal(data["axis1_position"], [1, np.nan, 2])
 
 
+@pytest.mark.parametrize("width", [np.float32, np.float64])
+def test_infinities_are_missing_values(tmp_path, width):
+    path = tmp_path / "r.parquet"
+    save_run(path, INFO, {"axis1_a": np.array([1, np.inf, -np.inf, 2], dtype=width)})
+    run = Run(path)
+    (_, block), values = next(run.blocks(["axis1_a"])), run.read(["axis1_a"])
+    for found in (block["axis1_a"], values["axis1_a"]):
+        assert found.dtype == width
+        np.testing.assert_array_equal(found, [1, np.nan, np.nan, 2])
+
+
 def test_writing_twice_gives_the_same_bytes(tmp_path):
     for name in ("a", "b"):
         save_run(tmp_path / name, INFO, {"axis1_a": noise(300_000)})
