@@ -22,7 +22,8 @@ class ChainOutcome:
     errors
         One for each run, or axis of a run, that could not be used.
     notes
-        What is worth knowing besides: segments that fit no motion of the reference.
+        What is worth knowing besides: doubtful channels, segments that fit no motion of the
+        reference.
     """
 
     segments: Path
@@ -71,7 +72,8 @@ def run_chain(
         patterns=counted.path,
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
-        notes=tuple(
+        notes=segmented.notes
+        + tuple(
             f"{name} axis {axis}: {unidentified} segments fit no motion of the reference cycle"
             for (name, axis), (_, unidentified) in identified.cycles().items()
             if unidentified
