@@ -55,7 +55,8 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             f"Envelope of axis {axis}, motion {motion}",
             "The current's envelope, proportional to torque: the reference segment of the "
             "baseline, and the target's segment of median divergence shifted by its lag. The bar "
-            f"is one ordinal window: order {order}, τ {tau} samples, {1e3 * window_s:.1f} ms.",
+            f"is one ordinal window: order\u00a0{order}, τ\u00a0=\u00a0{tau}\u00a0samples, "
+            f"{1e3 * window_s:.1f}\u00a0ms.",
             f"Two overlaid traces of the current envelope of axis {axis}, motion {motion}, from "
             "baseline and target.",
         )
