@@ -9,6 +9,7 @@ from opamc_cli.commands import (
     diagnose,
     identify,
     ingest,
+    model,
     patterns,
     report,
     score,
@@ -30,5 +31,5 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 """Subcommands by name, in the order of the chain."""
 
-GROUPS: dict[str, typer.Typer] = {"config": config.app}
+GROUPS: dict[str, typer.Typer] = {"model": model.app, "config": config.app}
 """Subcommands that have subcommands."""

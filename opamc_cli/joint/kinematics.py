@@ -57,9 +57,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Motion:
-    """Smoothed motion of one recording, the window (samples) that it was smoothed over, and the
-    standard deviation of the speed's noise.
-    """
+    """Smoothed motion of one recording; its window in samples, and the speed's noise."""
 
     position_rad: Floats
     velocity: Floats
@@ -141,7 +139,7 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     """
     velocity = motion.velocity
     speeds = np.abs(velocity)
-    moving = usable & (direction_of(motion) != 0)
+    moving: Bools = usable & (direction_of(motion) != 0)
     moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     half = motion.window // 2
     turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)

@@ -7,10 +7,13 @@ import numpy as np
 from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
+from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.model import Fit, Session, Term, fit_terms
+from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.trace import (
     Candidate,
     Gate,
+    View,
     decoy_likelihood,
     held_out,
     prepare,
@@ -41,6 +44,7 @@ class Step:
     t_value: float
     consistency: float
     ties: tuple[str, ...]
+    experiment: str | None
     rmse_before_a: float
     rmse_after_a: float
 
@@ -103,6 +107,8 @@ class Loop:
     r2_after: float
     floor_a: float
     explained_share: float
+    remaining_domain: str | None
+    orders_note: str
 
 
 @dataclass
@@ -116,8 +122,7 @@ class _Progress:
 
 
 def close_loop(
-    session: Session,
-    declared: tuple[Effect, ...],
+    before: Fit,
     library: Library,
     seed: int = 0,
     gate: Gate | None = None,
@@ -127,10 +132,9 @@ def close_loop(
 
     Parameters
     ----------
-    session : Session
-        Recordings with their groups; the sealed ones are looked at once, at the end.
-    declared : tuple of Effect
-        The model so far.
+    before : Fit
+        The declared model, fitted to the open groups; the sealed ones are looked at once, at the
+        end.
     library : Library
         Effects that may be added.
     seed : int
@@ -146,13 +150,11 @@ def close_loop(
     """
     gate = gate or Gate()
     generator = np.random.default_rng(seed)
-    before = fit_terms(session, tuple(declared_term(effect, session) for effect in declared))
     seen_before = structures(before)
     progress = _Progress()
     fitted = before
-    banned: set[str] = set()
     while len(progress.steps) < most_steps:
-        step_fit = _round(fitted, library, gate, generator, progress, banned)
+        step_fit = _round(fitted, library, gate, generator, progress)
         if step_fit is None:
             break
         fitted = step_fit
@@ -164,11 +166,103 @@ def close_loop(
     return _summary(before, fitted, tuple(steps), progress, seen_before, remains)
 
 
-def declared_term(effect: Effect, session: Session) -> Term:
-    """Return a declared effect as a term, with the first guess of its non-linear parameters."""
-    track = session.coarse.track
-    guesses = effect.guesses(track, np.zeros(track.size))
-    return Term(effect, guesses[len(guesses) // 2] if guesses else {})
+def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
+    """Fit a declared model; non-linear parameters that are not given are searched first.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings.
+    declared : tuple of (Effect, Term or None)
+        Effects with their terms where parameters are given.
+
+    Returns
+    -------
+    Fit
+        Terms in the declared order.
+    """
+    terms: dict[int, Term] = {}
+    open_places = []
+    for place, (effect, term) in enumerate(declared):
+        if term is not None:
+            terms[place] = term
+        elif not effect.limits(session.coarse.track) and not effect.several:
+            guesses = effect.guesses(session.coarse.track, np.zeros(session.coarse.track.size))
+            terms[place] = Term(effect, guesses[0])
+        else:
+            open_places.append(place)
+    fitted = fit_terms(session, tuple(terms[place] for place in sorted(terms)))
+    for place in open_places:
+        effect = declared[place][0]
+        view = prepare(fitted, fine=effect.fast)
+        found, _tried = search(fitted.session, view, effect)
+        if found is None:
+            guesses = effect.guesses(view.grid.track, view.residual)
+            if not guesses:
+                continue
+            terms[place] = Term(effect, guesses[0])
+        else:
+            terms[place] = found.term
+        fitted = fit_terms(fitted.session, tuple(terms[key] for key in sorted(terms)))
+    return fitted
+
+
+def find_candidates(
+    fitted: Fit, library: Library, gate: Gate | None = None
+) -> tuple[list[Candidate], list[Untestable]]:
+    """Candidates for one residual, best first, each with why it does not pass, if so.
+
+    Parameters
+    ----------
+    fitted : Fit
+        The model so far.
+    library : Library
+        Effects to try; those that the model holds are left out unless they may come twice.
+    gate : Gate, optional
+        What a candidate must show; decoys are left to the loop.
+
+    Returns
+    -------
+    candidates : list of Candidate
+    untestable : list of Untestable
+    """
+    gate = gate or Gate()
+    candidates, untestable, _views = _candidates(fitted, library, gate)
+    return candidates, untestable
+
+
+Views = dict[bool, View]
+
+
+def _candidates(
+    fitted: Fit, library: Library, gate: Gate
+) -> tuple[list[Candidate], list[Untestable], Views]:
+    session = fitted.session
+    present = {term.effect.name for term in fitted.terms}
+    views = {False: prepare(fitted, fine=False)}
+    views[True] = views[False] if session.factor == 1 else prepare(fitted, fine=True)
+    found: list[Candidate] = []
+    untestable: list[Untestable] = []
+    trials = 0
+    for name, effect in library.items():
+        if name in present and not effect.several:
+            continue
+        why = effect.untestable(session.fine.track)
+        if why is not None:
+            untestable.append(Untestable(name, why))
+            continue
+        candidate, _tried = search(session, views[effect.fast], effect)
+        trials += 1
+        if candidate is not None:
+            found.append(candidate)
+    found.sort(key=lambda candidate: -candidate.score)
+    _simplest_first(found, library, session)
+    checked: list[Candidate] = []
+    for candidate in found:
+        tested = held_out(fitted, candidate)
+        tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
+        checked.append(replace(tested, why_not=refusal(tested, gate)))
+    return checked, untestable, views
 
 
 def _round(
@@ -177,33 +271,11 @@ def _round(
     gate: Gate,
     generator: np.random.Generator,
     progress: _Progress,
-    banned: set[str],
 ) -> Fit | None:
     session = fitted.session
-    present = {term.effect.name for term in fitted.terms}
-    views = {False: prepare(fitted, fine=False)}
-    views[True] = views[False] if session.factor == 1 else prepare(fitted, fine=True)
-    found: list[Candidate] = []
-    trials = 0
-    for name, effect in library.items():
-        if (name in present and not effect.several) or name in banned:
-            continue
-        why = effect.untestable(session.fine.track)
-        if why is not None:
-            progress.untestable[name] = Untestable(name, why)
-            continue
-        candidate, _tried = search(session, views[effect.fast], effect)
-        trials += 1
-        if candidate is not None:
-            found.append(candidate)
-    found.sort(key=lambda candidate: -candidate.score)
-    _simplest_first(found, library, session)
+    checked, untestable, views = _candidates(fitted, library, gate)
+    progress.untestable |= {entry.effect: entry for entry in untestable}
     number = len(progress.steps)
-    checked: list[Candidate] = []
-    for candidate in found:
-        tested = held_out(fitted, candidate)
-        why = refusal(tested, gate, max(trials, 1))
-        checked.append(replace(tested, why_not=why))
     for i, candidate in enumerate(checked):
         if candidate.why_not is not None:
             continue
@@ -215,19 +287,19 @@ def _round(
             checked[i] = replace(candidate, why_not="a decoy of the same form does half as well")
             continue
         extended = fit_terms(session, (*fitted.terms, candidate.term))
+        effect = candidate.term.effect
         ties = _ties(candidate, checked)
         progress.steps.append(
             Step(
                 term=candidate.term,
-                interpretation=candidate.term.effect.interpretation(
-                    candidate.term.parameters, session.fine.track
-                ),
+                interpretation=effect.interpretation(candidate.term.parameters, session.fine.track),
                 gain=candidate.gain,
-                p_value=min(candidate.p_value * trials, 1.0),
+                p_value=candidate.p_value,
                 decoy_gain=candidate.decoy_gain,
                 t_value=candidate.t_value,
                 consistency=candidate.consistency,
                 ties=ties,
+                experiment=separating_experiment(effect.name, ties),
                 rmse_before_a=fitted.rmse(sealed=False),
                 rmse_after_a=extended.rmse(sealed=False),
             )
@@ -272,7 +344,7 @@ def _collect(
             effect.domain,
             candidate.term.parameters,
             candidate.gain,
-            min(candidate.p_value, 1.0),
+            candidate.p_value,
             why,
         )
 
@@ -405,6 +477,9 @@ def _summary(
         verdict = "partial"
     else:
         verdict = "closed"
+    domain = None
+    if verdict in ("partial", "not-in-library") and remains:
+        domain = remains[0].domain
     return Loop(
         before=before,
         after=after,
@@ -422,4 +497,17 @@ def _summary(
         r2_after=_r2(after),
         floor_a=floor,
         explained_share=explained,
+        remaining_domain=domain,
+        orders_note=_orders_note(after.session),
+    )
+
+
+def _orders_note(session: Session) -> str:
+    track = session.fine.track
+    if "position" not in track.channels:
+        return "no angle, so no orders"
+    return (
+        f"orders count per {track.angle_kind} revolution; orders closer than "
+        f"{order_resolution(track):.3g} cannot be told apart, and above "
+        f"{highest_order(track):.4g} they fold at the median speed"
     )

@@ -31,7 +31,7 @@ class Normal:
     count: Floats
 
     def taken(self, columns: list[int]) -> "Normal":
-        """Sums of a subset of the regressors."""
+        """Return the sums of a subset of the regressors."""
         index = np.asarray(columns, dtype=np.int64)
         return Normal(
             self.gram[:, index[:, None], index], self.moment[:, index], self.power, self.count
@@ -85,7 +85,7 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     """
     if moment.shape[-1] == 0:
         return moment
-    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-300))
+    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
     scaled = gram / (scale[..., :, None] * scale[..., None, :])
     inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
     solution: Floats = np.einsum("...ij,...j->...i", inverse, moment / scale) / scale
@@ -115,7 +115,7 @@ def held_out_error(normal: Normal, ridged: int = 0) -> Floats:
     """
     gram_total = normal.gram.sum(axis=0)
     scale = np.sqrt(np.diagonal(gram_total))
-    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 0)
+    unit = np.divide(1.0, scale, out=np.zeros_like(scale), where=scale > 1e-100)
     gram = normal.gram * (unit[:, None] * unit)
     moment = normal.moment * unit
     rest = gram.sum(axis=0) - gram

@@ -117,7 +117,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
 def torque_current(
     phases_a: Floats, electrical_rad: Floats, velocity: Floats
 ) -> tuple[Floats, Floats]:
-    """Current along and across the electrical angle.
+    """Split the current along and across the electrical angle.
 
     Parameters
     ----------

@@ -44,7 +44,7 @@ class Candidate:
     score : float
         Likelihood less six for every free parameter.
     p_value : float
-        Chi-square of the likelihood, times the number of guesses.
+        Chi-square of the likelihood, times the numbers of guesses and of effects tried.
     gain, t_value, consistency : float
         Held-out fall of the mean square (share), t over blocks, share of groups better.
     contribution : array of shape (n,)
@@ -356,7 +356,8 @@ def _excitation(normal: Normal, base: int) -> Floats:
         (gram[:base, base:] @ whole)[None, :],
     )[0]
     direction = np.concatenate([-inside, whole])
-    return np.einsum("i,gij,j->g", direction, normal.gram, direction)
+    energy: Floats = np.einsum("i,gij,j->g", direction, normal.gram, direction)
+    return energy
 
 
 def block_t_value(view: View, contribution: Floats) -> float:
@@ -436,10 +437,10 @@ def decoy_likelihood(
     return worst
 
 
-def refusal(candidate: Candidate, gate: Gate, trials: int) -> str | None:
+def refusal(candidate: Candidate, gate: Gate) -> str | None:
     """Say why a candidate does not pass the gate, or None where it passes."""
-    if candidate.p_value * trials > gate.largest_p:
-        return f"p = {min(candidate.p_value * trials, 1.0):.2g}, above {gate.largest_p:g}"
+    if candidate.p_value > gate.largest_p:
+        return f"p = {candidate.p_value:.2g}, above {gate.largest_p:g}"
     if candidate.gain < gate.smallest_gain:
         return f"held-out gain {candidate.gain:.2%}, below {gate.smallest_gain:.0%}"
     if candidate.t_value < gate.smallest_t:

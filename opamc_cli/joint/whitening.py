@@ -68,7 +68,7 @@ def whitened(values: Floats, taps: Floats) -> Floats:
 
 
 def settled(valid: Bools, bounds: tuple[tuple[int, int], ...], past: int) -> Bools:
-    """Samples whose `past` predecessors in the same recording are all valid too.
+    """Tell the samples whose `past` predecessors in the same recording are all valid too.
 
     Parameters
     ----------

@@ -19,5 +19,5 @@ class AsymmetricFriction(Effect):
         return stack(np.ones(track.size), np.abs(track.velocity))
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """The difference may lie in the slope or in the dry friction alone."""
+        """Allow that the difference lies in the slope or in the dry friction alone."""
         return [(parameters | {"dry": 0.0}, (1,)), (parameters | {"slope": 0.0}, (0,))]

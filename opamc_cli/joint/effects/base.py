@@ -77,7 +77,7 @@ class Effect:
         return parameters
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
-        """What the effect with these parameters means to a maintainer."""
+        """Say what the effect with these parameters means to a maintainer."""
         return self.meaning
 
 

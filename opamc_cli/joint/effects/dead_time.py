@@ -22,7 +22,7 @@ class DeadTime(Effect):
     electrical_order = 6
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """The six-step wave itself, and its first harmonic as the current loop leaves it."""
+        """Try the six-step wave itself, and its first harmonic as the current loop leaves it."""
         return [{"six_step": 1.0}, {"six_step": 0.0}]
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

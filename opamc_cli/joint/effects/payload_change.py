@@ -15,7 +15,7 @@ class PayloadChange(Effect):
     needs = ("scale",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """A step between any two groups, or at a sixteenth of the session."""
+        """Try a step between any two groups."""
         groups = track.group
         edges = np.flatnonzero(np.diff(groups) != 0) + 1
         times = {float(track.time_s[edge]) for edge in edges}
@@ -39,5 +39,5 @@ class PayloadChange(Effect):
         )
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """The inertia's step may be too small to see."""
+        """Allow that the inertia's step is too small to see."""
         return [(parameters | {"inertia": 0.0}, (0, 1))]

@@ -25,7 +25,7 @@ class Warmup(Effect):
         ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """A fortieth to three times the session's length."""
+        """From a fortieth to three times the session's length."""
         length = float(np.ptp(track.time_s)) + 1e-9
         return {"time_constant_s": (length / 40, 3 * length)}
 

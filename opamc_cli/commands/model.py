@@ -1,0 +1,208 @@
+"""`opamc model`: fit a declared joint model, trace what it lacks, close the loop."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from opamc_cli.commands.options import DEFAULT_OUT, Json, Out, Quiet
+from opamc_cli.commands.output import Output
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+app = typer.Typer(
+    help="Fit a joint's declared model to runs, trace what it lacks, close the loop.",
+    no_args_is_help=True,
+)
+
+Runs = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run files or folders.")]
+ModelFile = Annotated[
+    Path, typer.Option("--model", metavar="FILE", help="What is declared: see configs/model.yaml.")
+]
+Axis = Annotated[
+    list[int] | None,
+    typer.Option("--axis", min=1, help="Axis, counted from 1; may be repeated. Default: all."),
+]
+
+
+@app.command()
+def fit(
+    runs: Runs,
+    model: ModelFile,
+    axis: Axis = None,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit the declared effects jointly; writes fit.parquet."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages import model as stage
+    from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model)
+    with output_lock(out):
+        outcome = stage.fit(declared, find_runs(runs), axis or (), out)
+    output.result(
+        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
+        *(shown for result in outcome.results for shown in _fit_tables(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+@app.command()
+def trace(
+    runs: Runs,
+    model: ModelFile,
+    axis: Axis = None,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Trace the declared model's residual to its causes; writes candidates.parquet."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages import model as stage
+    from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model)
+    with output_lock(out):
+        outcome = stage.trace(declared, find_runs(runs), axis or (), out)
+    output.result(
+        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
+        *(shown for result in outcome.results for shown in _trace_tables(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+@app.command()
+def close(
+    runs: Runs,
+    model: ModelFile,
+    axis: Axis = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find and add what the declared model lacks; writes loop.json and the extended model."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages import model as stage
+    from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model)
+    with output_lock(out):
+        outcome = stage.close(declared, find_runs(runs), axis or (), out, seed)
+    output.result(
+        {"axes": list(outcome.results)},
+        *(shown for result in outcome.results for shown in _loop_tables(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+def _parameters(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+
+
+def _table(title: str, *headings: str) -> Any:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", title_style="bold")
+    for heading in headings:
+        table.add_column(heading)
+    return table
+
+
+def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    table = _table(
+        f"Axis {result['axis']}: {result['rmse_a']:.4g} A rms left, condition number "
+        f"{result['condition_number']:.3g}",
+        "effect",
+        "coefficients (95 % interval)",
+        "parameters",
+    )
+    for term in result["terms"]:
+        shown = ", ".join(
+            f"{value:.4g} ({low:.3g} .. {high:.3g})"
+            for value, low, high in zip(
+                term["coefficients"], term["low"], term["high"], strict=True
+            )
+        )
+        table.add_row(term["effect"], shown, _parameters(term["parameters"]))
+    apart = [f"the data cannot tell apart: {', '.join(names)}" for names in result["inseparable"]]
+    return [table, *apart]
+
+
+def _trace_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    ceiling = result["ceiling"]
+    domains = _table(
+        f"Axis {result['axis']}: {ceiling['share']:.1%} of the residual's mean square repeats "
+        f"(seen in {ceiling['how']})",
+        "domain",
+        "held-out share",
+        "t",
+    )
+    for entry in result["domains"]:
+        domains.add_row(entry["domain"], f"{entry['gain']:.1%}", f"{entry['t_value']:.1f}")
+    table = _table("Candidates", "effect", "parameters", "held-out gain", "p", "why not")
+    for entry in result["candidates"][:10]:
+        table.add_row(
+            entry["effect"],
+            _parameters(entry["parameters"]),
+            f"{entry['gain']:.1%}",
+            f"{entry['p_value']:.2g}",
+            entry["why_not"] or "passes",
+        )
+    return [domains, table, *_untestable(result)]
+
+
+def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    before, after = result["before"], result["after"]
+    shown: list[RenderableType] = [
+        f"Axis {result['axis']}: {result['verdict']}. Sealed error {before['rmse_a']:.4g} A "
+        f"before, {after['rmse_a']:.4g} A after (r2 {before['r2']:.4f}, {after['r2']:.4f}); floor "
+        f"{result['floor_a']:.4g} A, explained {result['explained_share']:.0%}"
+    ]
+    if result["steps"]:
+        table = _table("Steps", "effect", "parameters", "meaning", "gain", "A before", "A after")
+        for step in result["steps"]:
+            ties = f" (or {', '.join(step['ties'])})" if step["ties"] else ""
+            table.add_row(
+                step["effect"] + ties,
+                _parameters(step["parameters"]),
+                step["interpretation"],
+                f"{step['gain']:.1%}",
+                f"{step['rmse_before_a']:.4g}",
+                f"{step['rmse_after_a']:.4g}",
+            )
+        shown.append(table)
+    shown += [
+        f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"
+        for step in result["steps"]
+        if step["separating_experiment"]
+    ]
+    if result["domain"]:
+        shown.append(f"what remains is structured in the {result['domain']} domain")
+    best = sorted(result["rejected"], key=lambda entry: -entry["gain"])[:5]
+    shown += [f"rejected {entry['effect']}: {entry['why']}" for entry in best]
+    return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
+
+
+def _untestable(result: dict[str, Any]) -> list["RenderableType"]:
+    return [f"untestable {entry['effect']}: {entry['why']}" for entry in result["untestable"]]
