@@ -75,10 +75,10 @@ def run(
     OpamcError
         If the runs cannot be compared, or no run of one side can be used.
     """
-    _check_before(baseline, target)
-    # an older verdict must not stand beside this diagnosis if it ends in an error
+    # yesterday's verdict must not pass for today's if this diagnosis ends in an error
     for name in (verdict.FILE_NAME, report.FILE_NAME):
         (out / name).unlink(missing_ok=True)
+    _check_before(baseline, target)
     progress("baseline: segment, identify, patterns")
     normal = run_chain(baseline, config, out / "baseline", jobs=jobs)
     progress("target: segment, identify, patterns")

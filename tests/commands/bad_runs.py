@@ -190,3 +190,30 @@ def samples(path: Path) -> int:
     """Return how long a run is."""
     with Run(path) as run:
         return run.n_samples
+
+
+def aliased(path: Path) -> Path:
+    """Write a run whose fastest carrier, 80 Hz, is above what 170 Hz can show."""
+    save_run(path, dataclasses.replace(INFO, sampling_rate_hz=170.0), phases(rate_hz=170.0))
+    return path
+
+
+def other_rate(path: Path) -> Path:
+    save_run(path, dataclasses.replace(INFO, sampling_rate_hz=500.0), phases(rate_hz=500.0))
+    return path
+
+
+def other_program(path: Path) -> Path:
+    return good(path, program="place")
+
+
+def other_axis(path: Path) -> Path:
+    columns = {name.replace("axis1", "axis2"): values for name, values in phases().items()}
+    save_run(path, INFO, columns)
+    return path
+
+
+def current_alone(path: Path) -> Path:
+    """Write reported current without position or velocity: nothing tells motion."""
+    save_run(path, INFO, {"axis1_current": phases()["axis1_a"]})
+    return path
