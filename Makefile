@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types check bench clean
+.PHONY: help install demo test lint types check samples bench clean
 
 help:  ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -18,6 +18,11 @@ $(STAMP): pyproject.toml
 	@touch $@
 
 install: $(STAMP)  ## Make the environment in .venv and install opamc into it
+
+demo: $(STAMP)  ## Diagnose data/samples; the report's path is printed
+	@$(BIN)/opamc diagnose --baseline data/samples/normal --target data/samples/fault \
+	  --out opamc-out --exit-zero
+	@echo "open $(CURDIR)/opamc-out/report.html"
 
 test: $(STAMP)  ## Run the test suite on all cores
 	$(BIN)/python -m pytest -n auto --dist loadfile -q
@@ -30,6 +35,12 @@ types: $(STAMP)  ## mypy, strict
 	$(BIN)/mypy
 
 check: lint types test  ## Everything that CI runs
+
+samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
+	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \
+	  --out data/samples/normal
+	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \
+	  --first-session 4 --sessions 2 --fault 3 --out data/samples/fault
 
 clean:  ## Remove the environment and every output
 	rm -rf $(VENV) opamc-out build *.egg-info .pytest_cache .mypy_cache .ruff_cache
