@@ -153,25 +153,43 @@ def apply_to_constants(effects: Sequence[Effect], constants: Constants) -> NDArr
     return np.array(ripples, dtype=np.float64).reshape(-1, 4)
 
 
-def apply_to_phases(
-    effects: Sequence[Effect], phases_a: NDArray[np.float64], rate_hz: float
-) -> NDArray[np.float64]:
-    """Apply the sensor effects of one axis to its phase currents (n, 3); the first is delayed."""
-    out = phases_a
+def apply_to_sensors(
+    effects: Sequence[Effect],
+    gain: NDArray[np.float64],
+    offset_a: NDArray[np.float64],
+    vector_a: NDArray[np.float64],
+    rate_hz: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Switch the sensor effects of one axis on for its phase currents.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    gain, offset_a : ndarray, shape (3,)
+        Of the sensors.
+    vector_a : ndarray, shape (n, 2)
+        Current vector, alpha and beta.
+    rate_hz : float
+
+    Returns
+    -------
+    gain, offset_a, hum_a, vector_a : ndarray
+        As they are with the effects; the hum, shape (n,), is common to the phases.
+    """
+    gain, offset_a = gain.copy(), offset_a.copy()
+    hum = np.zeros(len(vector_a))
     for effect in effects:
         size, p = effect.magnitude, effect.parameters
         if effect.name == "time_delay":
-            out = np.column_stack([delayed(out[:, k], size * rate_hz) for k in range(3)])
+            vector_a = np.column_stack([delayed(vector_a[:, k], size * rate_hz) for k in range(2)])
         elif effect.name == "mains_hum":
-            out = out + _hum(len(out), size, p, rate_hz)[:, None]
-        elif effect.name in ("sensor_offset", "sensor_gain"):
-            out = out.copy()
-            k = int(p["phase"])
-            if effect.name == "sensor_offset":
-                out[:, k] += size
-            else:
-                out[:, k] *= 1.0 + size
-    return out
+            hum += _hum(len(vector_a), size, p, rate_hz)
+        elif effect.name == "sensor_offset":
+            offset_a[int(p["phase"])] += size
+        elif effect.name == "sensor_gain":
+            gain[int(p["phase"])] *= 1.0 + size
+    return gain, offset_a, hum, vector_a
 
 
 def apply_to_reported(

@@ -41,12 +41,14 @@ def damaged_share(
     sign = 1.0
     if wrapped < 0.0:
         wrapped, sign = -wrapped, -1.0
-    x = (half_sector_rad + half_zone_rad - wrapped) / (2.0 * half_zone_rad)
+    ramp = 2.0 * min(half_sector_rad, half_zone_rad)
+    most = min(1.0, half_sector_rad / half_zone_rad)  # a zone may be longer than the sector
+    x = (half_sector_rad + half_zone_rad - wrapped) / ramp
     if x <= 0.0:
         return 0.0, 0.0
     if x >= 1.0:
-        return 1.0, 0.0
-    return x * x * (3.0 - 2.0 * x), -sign * 6.0 * x * (1.0 - x) / (2.0 * half_zone_rad)
+        return most, 0.0
+    return most * x * x * (3.0 - 2.0 * x), -sign * most * 6.0 * x * (1.0 - x) / ramp
 
 
 @njit(cache=True, nogil=True, inline="always")

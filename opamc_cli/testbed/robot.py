@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, cos, exp, pi, sin, sqrt
+from math import ceil, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter
 
+from opamc_cli.testbed.constants import axis_constants
 from opamc_cli.testbed.effects import (
     apply_to_constants,
-    apply_to_phases,
     apply_to_reported,
+    apply_to_sensors,
     complete,
 )
 from opamc_cli.testbed.kernel import AxisConstants, run_axis
@@ -20,7 +21,6 @@ from opamc_cli.testbed.program import Program, Schedule, reference, schedule
 from opamc_cli.testbed.sensors import phase_currents
 from opamc_cli.testbed.session import AxisSession, draw_session, stream
 
-GRAVITY_M_S2 = 9.80665
 _CONTROL_HZ = 4000.0
 _STEP_HZ = 16000.0
 _SETTLE_S = 0.75
@@ -199,11 +199,17 @@ def _record_axis(
     position, velocity, acceleration = _padded_reference(
         plan, axis, program.waypoints_rad[0], control_hz, n_samples * controls, settle * controls
     )
-    constants = _constants(joint, session, damage, program.payload_kg, position[0])
-    constants["step_s"] = 1.0 / (control_hz * steps)
-    constants["steps_per_control"] = steps
-    constants["controls_per_sample"] = controls
-    _digital(constants, joint, robot, control_hz)
+    constants = axis_constants(
+        joint,
+        sensor,
+        session,
+        damage,
+        payload_kg=program.payload_kg,
+        start_rad=position[0],
+        sampling_rate_hz=rate_hz,
+        controls_per_sample=controls,
+        steps_per_control=steps,
+    )
     ripples = apply_to_constants(effects, constants)
     constants["payload_change_s"] += settle / rate_hz
     rest = sqrt(control_hz * 1e-3 / 2)  # white noise held over one control period -> about 1 kHz
@@ -240,110 +246,6 @@ def _padded_reference(
     )
 
 
-def _constants(
-    joint: Joint, session: AxisSession, damage: Damage, payload_kg: float, start_rad: float
-) -> dict[str, float]:
-    """Physical constants of one axis in one session, by the names of `AxisConstants`."""
-    motor, gear, friction, link = joint.motor, joint.gear, joint.friction, joint.link
-    arm = link.payload_arm_m
-    inertia_per_kg = arm**2
-    gravity_per_kg = link.payload_gravity_share * GRAVITY_M_S2 * arm
-    link_inertia = link.inertia_kgm2 + payload_kg * inertia_per_kg
-    gravity = link.gravity_torque_nm + payload_kg * gravity_per_kg
-    load = gravity * sin(start_rad - link.gravity_angle_rad)
-    mount, error = session.mount_rad, session.error
-    windup = load / gear.stiffness_nm_per_rad
-    constants: dict[str, float] = dict.fromkeys(AxisConstants._fields, 0.0)
-    constants.update(
-        pole_pairs=float(motor.pole_pairs),
-        torque_constant=motor.torque_constant_nm_per_a,
-        motor_inertia=motor.inertia_kgm2,
-        resistance=motor.resistance_ohm,
-        inductance=motor.inductance_h,
-        phase_voltage=motor.bus_voltage_v / sqrt(3.0),
-        current_limit=motor.current_limit_a,
-        cogging_order=motor.cogging_order,
-        cogging_torque=motor.cogging_torque_nm,
-        ratio=gear.ratio,
-        stiffness=gear.stiffness_nm_per_rad,
-        stiffening=gear.stiffening_nm_per_rad3,
-        damping=gear.damping_nms_per_rad,
-        hysteresis_torque=gear.hysteresis_torque_nm,
-        hysteresis_width=gear.hysteresis_width_rad,
-        error_2c=gear.error_2_circular_rad * error,
-        error_4c_sin=gear.error_4_circular_rad * error * cos(mount[1]),
-        error_4c_cos=gear.error_4_circular_rad * error * sin(mount[1]),
-        error_2f=gear.error_2_flexspline_rad * error,
-        error_4f_sin=gear.error_4_flexspline_rad * error * cos(mount[3]),
-        error_4f_cos=gear.error_4_flexspline_rad * error * sin(mount[3]),
-        phase_2c=mount[0],
-        phase_2f=mount[2],
-        tooth_mesh_order=2.0 * gear.ratio + 2.0,  # teeth of the circular spline
-        tooth_mesh_torque=gear.tooth_mesh_torque_nm,
-        severity=damage.severity,
-        half_sector=pi * damage.share,
-        half_zone=damage.zone_half_width_rad,
-        half_play=0.5 * damage.gap_rad,
-        stiffness_loss=damage.stiffness_loss,
-        play_shared=damage.gap_shared,
-        closing=damage.closing,
-        sector_angle=mount[4],
-        coulomb=friction.coulomb_nm * session.friction,
-        viscous=friction.viscous_nms_per_rad * session.friction * session.viscous,
-        stribeck=friction.stribeck_nm * session.friction,
-        stribeck_velocity=friction.stribeck_velocity_rad_s,
-        smoothing_velocity=friction.smoothing_velocity_rad_s,
-        load_coefficient=friction.load_coefficient,
-        viscous_per_kelvin=friction.viscous_per_kelvin,
-        coulomb_per_kelvin=friction.coulomb_per_kelvin,
-        output_coulomb=friction.output_coulomb_nm,
-        output_viscous=friction.output_viscous_nms_per_rad,
-        link_inertia=link_inertia,
-        gravity=gravity,
-        late_link_inertia=link_inertia,
-        late_gravity=gravity,
-        payload_change_s=np.inf,
-        payload_inertia_per_kg=inertia_per_kg,
-        payload_gravity_per_kg=gravity_per_kg,
-        gravity_angle=link.gravity_angle_rad,
-        ambient_c=joint.thermal.ambient_c,
-        start_c=session.temperature_c,
-        heat_resistance=joint.thermal.resistance_k_per_w,
-        heat_time=joint.thermal.time_constant_s,
-        start_joint=start_rad - windup,
-        start_motor=start_rad * gear.ratio,
-        start_current=load / gear.ratio / motor.torque_constant_nm_per_a,
-        fx_stribeck_velocity=1.0,
-        fx_warmup_time=1.0,
-        fx_drag_width=1.0,
-        fx_hysteresis_width=1.0,
-    )
-    return constants
-
-
-def _digital(constants: dict[str, float], joint: Joint, robot: Robot, control_hz: float) -> None:
-    """Set the controller's and the drive's constants; these know the nominal robot only."""
-    motor, control, friction = joint.motor, joint.control, joint.friction
-    ratio, k = joint.gear.ratio, joint.motor.torque_constant_nm_per_a
-    inertia = motor.inertia_kgm2 + constants["link_inertia"] / ratio**2
-    gain = 2.0 * pi * control.velocity_bandwidth_hz * inertia / k
-    step_s = constants["step_s"]
-    counts = control.encoder_counts_per_turn
-    constants.update(
-        position_gain=control.position_gain_per_s,
-        velocity_gain=gain,
-        velocity_integral=gain / control.velocity_integral_time_s,
-        current_blend=1.0 - exp(-2.0 * pi * control.current_bandwidth_hz * step_s),
-        velocity_blend=1.0 - exp(-2.0 * pi * control.velocity_filter_hz / control_hz),
-        encoder_step=2.0 * pi / counts if counts else 0.0,
-        feed_inertia=control.inertia_feedforward * inertia * ratio / k,
-        feed_coulomb=control.friction_feedforward * friction.coulomb_nm / k,
-        feed_viscous=control.friction_feedforward * friction.viscous_nms_per_rad * ratio / k,
-        feed_gravity=control.gravity_feedforward * constants["gravity"] / ratio / k,
-        report_blend=1.0 - exp(-2.0 * pi * robot.sensor.reported_filter_hz * step_s),
-    )
-
-
 def _measure(
     joint: Joint,
     robot: Robot,
@@ -356,23 +258,16 @@ def _measure(
     sensor, ratio = robot.sensor, joint.gear.ratio
     n = len(out)
     noise = sensor.noise_a * rng.standard_normal((n, 3))
-    wrong = [e for e in effects if e.name in ("sensor_offset", "sensor_gain", "mains_hum")]
-    late = [e for e in effects if e.name == "time_delay"]
-    vector = np.column_stack([out[:, 6], out[:, 7], np.zeros(n)])
-    vector = apply_to_phases(late, vector, rate_hz)
-    gain, offset = session.phase_gain.copy(), session.phase_offset_a.copy()
-    disturbance = apply_to_phases(
-        [e for e in wrong if e.name != "sensor_gain"], np.zeros((n, 3)), rate_hz
+    vector = np.column_stack([out[:, 6], out[:, 7]])
+    gain, offset, disturbance, vector = apply_to_sensors(
+        effects, session.phase_gain, session.phase_offset_a, vector, rate_hz
     )
-    for effect in wrong:
-        if effect.name == "sensor_gain":
-            gain[int(effect.parameters["phase"])] *= 1.0 + effect.magnitude
     phases = phase_currents(
         vector[:, 0],
         vector[:, 1],
         gain,
         offset,
-        noise + disturbance,
+        noise + disturbance[:, None],
         sensor.full_scale_a,
         sensor.bits,
     )
