@@ -47,7 +47,8 @@ def report(
         )
     inputs = outcome.inputs
     shown = [
-        feature_table(inputs) if inputs.verdict is None else verdict_table(inputs.verdict),
+        *([verdict_table(inputs.verdict)] if inputs.verdict is not None else []),
+        *([feature_table(inputs)] if inputs.verdict is None and inputs.axes else []),
         *([loop_table(inputs.loop)] if inputs.loop is not None else []),
     ]
     output = Output(as_json=as_json, quiet=quiet)

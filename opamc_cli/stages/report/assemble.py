@@ -51,6 +51,7 @@ EVIDENCE = (
 )
 """The thesis's figures: first what the verdict rests on, then how the segments were found."""
 
+LOOP_TABLES = ("residuals.parquet", "order_spectrum.parquet")
 LOOP = (("residual", residual.figure), ("order spectrum", order_spectrum.figure))
 
 
@@ -113,8 +114,12 @@ def run(
 
 def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:
     """Return the page, and one line for each part that could not be drawn."""
-    focus = choose_focus(inputs)
-    evidence = _draw(EVIDENCE, lambda draw: draw(inputs, focus))
+    if inputs.axes:
+        focus = choose_focus(inputs)
+        evidence = _draw(EVIDENCE, lambda draw: draw(inputs, focus))
+        views = {axis: _axis_view(inputs, axis, focus) for axis in by_severity(inputs)}
+    else:
+        evidence, views = Section((), ()), {}
     loops = [_loop_view(inputs, entry) for entry in (inputs.loop or {}).get("axes", ())]
     notes = _notes(inputs)
     omitted = [
@@ -122,25 +127,18 @@ def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:
         *evidence.omitted,
         *(line for loop in loops for line in loop["section"].omitted),
     ]
-    page = (
-        _environment()
-        .get_template("report.html.j2")
-        .render(
-            title=title,
-            styles=custom_properties() + "\n" + _resource("report.css"),
-            headline=_headline(inputs),
-            rows=[_axis_view(inputs, axis, focus) for axis in inputs.all_axes],
-            attention=[
-                _axis_view(inputs, axis, focus)
-                for axis in by_severity(inputs)
-                if inputs.state(axis) not in (None, "healthy")
-            ],
-            compared=_compared(inputs),
-            evidence=evidence,
-            loops=loops,
-            notes=notes,
-            provenance=_provenance(inputs),
-        )
+    template = _environment().get_template("report.html.j2")
+    page = template.render(
+        title=title,
+        styles=custom_properties() + "\n" + _resource("report.css"),
+        headline=_headline(inputs),
+        rows=[views[axis] for axis in sorted(views)],
+        attention=[v for axis, v in views.items() if inputs.state(axis) not in (None, "healthy")],
+        compared=_compared(inputs) if views else [],
+        evidence=evidence,
+        loops=loops,
+        notes=notes,
+        provenance=_provenance(inputs),
     )
     return page, tuple(omitted)
 
@@ -148,7 +146,9 @@ def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:
 def _notes(inputs: ReportInputs) -> list[str]:
     """Whole sections that the folder has nothing for."""
     notes = []
-    if inputs.verdict is None:
+    if not inputs.axes:
+        notes.append("diagnosis: scores.parquet is absent; `opamc diagnose` writes it")
+    elif inputs.verdict is None:
         notes.append("verdict: verdict.json is absent; `opamc diagnose` writes it")
     if inputs.loop is None:
         notes.append("closed loop: loop.json is absent; `opamc model close` writes it")
@@ -193,7 +193,11 @@ def _resource(name: str) -> str:
 
 
 def _headline(inputs: ReportInputs) -> str:
-    return "No verdict yet" if inputs.verdict is None else wording.headline(inputs.verdict)
+    if inputs.verdict is not None:
+        return wording.headline(inputs.verdict)
+    if inputs.loop is not None:
+        return wording.loop_headline(inputs.loop)
+    return "No verdict yet"
 
 
 def _axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
@@ -289,6 +293,7 @@ def _loop_view(inputs: ReportInputs, entry: Mapping[str, Any]) -> dict[str, Any]
         "steps": [
             {**step, "effect_text": wording.effect_phrase(step)} for step in entry.get("steps", ())
         ],
+        "experiments": wording.experiments(entry),
         "rejected": [wording.set_aside(item) for item in entry.get("rejected", ())],
         "untestable": [wording.set_aside(item) for item in entry.get("untestable", ())],
         "remains": wording.remains(entry),
@@ -299,7 +304,9 @@ def _loop_view(inputs: ReportInputs, entry: Mapping[str, Any]) -> dict[str, Any]
 def _provenance(inputs: ReportInputs) -> dict[str, Any]:
     config: dict[str, Any] = {}
     for file in inputs.files:
-        if file.record is not None:
+        if file.record is not None and file.name in LOOP_TABLES:
+            config["model"] = file.record.get("config")
+        elif file.record is not None:
             config.update(file.record.get("config") or {})
     records = [file.record for file in inputs.files if file.record is not None]
     versions = next((r["versions"] for r in records if "versions" in r), library_versions())

@@ -104,7 +104,7 @@ class ReportInputs:
     Attributes
     ----------
     scores, features
-        Tables of the stage `score`.
+        Tables of the stage `score`; without columns where there are none.
     verdict
         verdict.json, or None.
     roles
@@ -127,7 +127,7 @@ class ReportInputs:
     @property
     def axes(self) -> list[int]:
         """Axes with scores, ascending."""
-        return sorted({int(axis) for axis in self.scores["axis"]})
+        return sorted({int(axis) for axis in self.scores.get("axis", ())})
 
     @property
     def all_axes(self) -> list[int]:
@@ -154,71 +154,85 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
     Parameters
     ----------
     out
-        The folder; scores.parquet and features.parquet must be in it, all else may be.
+        The folder; scores.parquet with features.parquet, or loop.json, must be in it, all else
+        may be.
     moved_to
         For each role the folders or files where its runs are now.
 
     Raises
     ------
     InputError
-        If scores or features are missing, or any file is damaged or of another kind.
+        If neither scores nor a loop is there, or any file is damaged or of another kind.
     """
-    files: list[SourceFile] = []
+    folder = _Folder(out)
+    loop = folder.optional_json("loop.json")
+    verdict = folder.optional_json("verdict.json")
+    scores: Columns = {}
+    features: Columns = {}
+    if loop is None or verdict is not None or (out / "scores.parquet").exists():
+        scores = folder.stage_table("scores.parquet", SCORE_COLUMNS)
+        features = folder.stage_table("features.parquet", FEATURE_COLUMNS)
+        if not n_rows(scores):
+            msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
+            raise InputError(msg)
+    return ReportInputs(
+        scores=scores,
+        features=features,
+        verdict=verdict,
+        roles={role: _role_tables(folder, role, moved_to.get(role, ())) for role in ROLES},
+        loop=loop,
+        residuals=folder.optional_table("residuals.parquet", RESIDUAL_COLUMNS),
+        spectrum=folder.optional_table("order_spectrum.parquet", SPECTRUM_COLUMNS),
+        files=tuple(folder.files),
+    )
 
-    def note(path: Path, record: Mapping[str, Any] | None) -> None:
-        files.append(SourceFile(path.relative_to(out).as_posix(), file_sha256(path), record))
 
-    def stage_table(name: str, needed: Sequence[str]) -> Columns:
-        path = out / name
+class _Folder:
+    """An output folder, and the files that have been read of it."""
+
+    def __init__(self, out: Path) -> None:
+        self.out = out
+        self.files: list[SourceFile] = []
+
+    def stage_table(self, name: str, needed: Sequence[str]) -> Columns:
+        path = self.out / name
         table = read_table(path, "score")
         _need_columns(path, table, needed)
-        note(path, table_record(path, table.schema.metadata))
+        self._note(path, table_record(path, table.schema.metadata))
         return to_columns(table)
 
-    def optional_table(name: str, needed: Sequence[str]) -> Columns | None:
-        path = out / name
+    def optional_table(self, name: str, needed: Sequence[str]) -> Columns | None:
+        path = self.out / name
         if not path.exists():
             return None
         table = _read_parquet(path)
         _need_columns(path, table, needed)
         metadata = table.schema.metadata or {}
-        note(path, table_record(path, metadata) if TABLE_KEY in metadata else None)
+        self._note(path, table_record(path, metadata) if TABLE_KEY in metadata else None)
         return to_columns(table)
 
-    def optional_json(name: str) -> Mapping[str, Any] | None:
-        path = out / name
+    def optional_json(self, name: str) -> Mapping[str, Any] | None:
+        path = self.out / name
         if not path.exists():
             return None
-        note(path, None)
+        self._note(path, None)
         return _read_json(path)
 
-    scores = stage_table("scores.parquet", SCORE_COLUMNS)
-    if not n_rows(scores):
-        msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
-        raise InputError(msg)
-    features = stage_table("features.parquet", FEATURE_COLUMNS)
-    verdict = optional_json("verdict.json")
-    roles = {}
-    for role in ROLES:
-        motions = optional_table(f"{role}/motions.parquet", ("run", "axis", "start", "stop"))
-        segments = optional_table(f"{role}/segments.parquet", ("run", "axis", "start", "stop"))
-        roles[role] = RoleTables(
-            motions=motions if motions is not None else segments,
-            patterns=optional_table(
-                f"{role}/patterns.parquet", ("axis", "motion", "order", "counts")
-            ),
-            sources=_sources(out, role, moved_to.get(role, ())),
-            config=_recorded_config(files, role),
-        )
-    return ReportInputs(
-        scores=scores,
-        features=features,
-        verdict=verdict,
-        roles=roles,
-        loop=optional_json("loop.json"),
-        residuals=optional_table("residuals.parquet", RESIDUAL_COLUMNS),
-        spectrum=optional_table("order_spectrum.parquet", SPECTRUM_COLUMNS),
-        files=tuple(files),
+    def _note(self, path: Path, record: Mapping[str, Any] | None) -> None:
+        name = path.relative_to(self.out).as_posix()
+        self.files.append(SourceFile(name, file_sha256(path), record))
+
+
+def _role_tables(folder: _Folder, role: str, moved_to: Sequence[Path]) -> RoleTables:
+    interval = ("run", "axis", "start", "stop")
+    motions = folder.optional_table(f"{role}/motions.parquet", interval)
+    segments = folder.optional_table(f"{role}/segments.parquet", interval)
+    counts = ("axis", "motion", "order", "counts")
+    return RoleTables(
+        motions=motions if motions is not None else segments,
+        patterns=folder.optional_table(f"{role}/patterns.parquet", counts),
+        sources=_sources(folder.out, role, moved_to),
+        config=_recorded_config(folder.files, role),
     )
 
 

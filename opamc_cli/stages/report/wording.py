@@ -144,6 +144,33 @@ def _plain(value: object) -> str:
     return number(value, 4) if isinstance(value, int | float) else str(value)
 
 
+def loop_headline(loop: Mapping[str, Any]) -> str:
+    """Return what the loop found on all its axes in one sentence."""
+    parts = []
+    for entry in loop.get("axes", ()):
+        added = len(entry.get("steps", ()))
+        noun = "effect" if added == 1 else "effects"
+        parts.append(f"axis {entry.get('axis')} {entry.get('verdict')}, {added} {noun} added")
+    text = "; ".join(parts) or "no axis was modelled"
+    return text[0].upper() + text[1:]
+
+
+def experiments(entry: Mapping[str, Any]) -> list[str]:
+    """Return the experiments that would separate what a loop could not tell apart.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
+    return [
+        f"To tell {step.get('effect')} from {', '.join(step.get('ties', ()))}: "
+        f"{step['separating_experiment']}"
+        for step in entry.get("steps", ())
+        if step.get("separating_experiment")
+    ]
+
+
 def effect_phrase(step: Mapping[str, Any]) -> str:
     """Return a step's effect with its parameters."""
     return cause_phrase(

@@ -132,6 +132,7 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
                         "parameters": {"order": 14.0},
                         "gain": 0.2,
                         "ties": ["elasticity"],
+                        "separating_experiment": "move at two more speeds",
                         "interpretation": "unknown periodic source, order 14",
                         "rmse_before_a": 0.031,
                         "rmse_after_a": 0.021,

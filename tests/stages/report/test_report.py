@@ -259,3 +259,13 @@ def test_numbers_that_are_not_known_are_dashes(folder: Path) -> None:
     assert "feature-space" not in page.figures()
     assert "ordinal-distribution" in page.figures()
     assert not {"nan", "None", "inf"} & set(page.words().split())
+
+
+def test_a_loop_alone_makes_a_report(tmp_path: Path) -> None:
+    output_folder.add_loop(tmp_path)
+    outcome = report.run(tmp_path)
+    page = _Page(outcome.path.read_text(encoding="utf-8"))
+    assert page.figures() == {"residual-3", "order-spectrum-3"}
+    assert "Axis 3 closed, 2 effects added" in page.words()
+    assert "To tell ripple from elasticity: move at two more speeds" in page.words()
+    assert outcome.omitted == ("diagnosis: scores.parquet is absent; `opamc diagnose` writes it",)

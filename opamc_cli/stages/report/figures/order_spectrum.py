@@ -45,7 +45,7 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
                 ha="center",
                 fontweight="bold",
             )
-        panel.set_xlabel("order (cycles per motor revolution)")
+        panel.set_xlabel("order (cycles per revolution)")
         panel.set_ylabel("amplitude (A)")
         panel.set_ylim(0.0, 1.15 * highest if highest > 0 else 1.0)
         panel.margins(x=0.01)
@@ -55,8 +55,8 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
             drawing,
             f"order-spectrum-{axis}",
             f"Order spectrum of axis {axis}",
-            f"Amplitude of the residual over motor revolutions. Orders that the loop added: "
-            f"{named}.",
+            f"Amplitude of the residual's share that repeats with the angle. Orders that the loop "
+            f"added: {named}.",
             f"Order spectrum of axis {axis} before and after the loop; added orders: {named}.",
         )
 

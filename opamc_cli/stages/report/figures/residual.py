@@ -46,10 +46,10 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
             drawing,
             f"residual-{axis}",
             f"Residual of axis {axis} before and after",
-            "Measured less modelled current with the declared effects (before) and with those "
-            "that the loop added (after). Above: the range of every stretch of time, moving "
-            "samples one after the other. Below: its RMS where the joint was and how fast it "
-            "moved.",
+            "Measured less modelled current of the sealed recordings, with the declared effects "
+            "(before) and with those that the loop added (after). Above: the range of every "
+            "stretch of time, one recording after the other. Below: its RMS where the joint was "
+            "and how fast it moved.",
             f"Residual current of axis {axis}: RMS {rms['before']:.3g} ampere before and "
             f"{rms['after']:.3g} ampere after the loop, over time, joint angle and joint speed.",
         )
