@@ -244,9 +244,7 @@ def _row_groups(blocks: Iterable[Block], schema: pa.Schema) -> Generator[pa.Tabl
     held: list[pa.Table] = []
     n_held = 0
     for block in blocks:
-        columns = [
-            pa.array(block[field.name].astype(field.type.to_pandas_dtype())) for field in schema
-        ]
+        columns = [pa.array(_measured(block[field.name], field.type)) for field in schema]
         held.append(pa.Table.from_arrays(columns, schema=schema))
         n_held += held[-1].num_rows
         while n_held >= ROW_GROUP_SAMPLES:
@@ -256,3 +254,11 @@ def _row_groups(blocks: Iterable[Block], schema: pa.Schema) -> Generator[pa.Tabl
             n_held -= ROW_GROUP_SAMPLES
     if n_held:
         yield pa.concat_tables(held)
+
+
+def _measured(values: Array, width: pa.DataType) -> Array:
+    # what float32 cannot hold is as little a measurement as an infinity
+    with np.errstate(over="ignore"):
+        column = values.astype(width.to_pandas_dtype())
+    column[np.isinf(column)] = np.nan
+    return np.asarray(column)

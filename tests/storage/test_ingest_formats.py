@@ -186,6 +186,32 @@ def test_truncated_files_are_refused_or_lose_whole_channels(tmp_path, kind, keep
         assert not list((tmp_path / "out").glob("*.par*"))
 
 
+@pytest.mark.parametrize("kind", ["mat", "h5", "tdms"])
+def test_damaged_files_end_in_a_sentence_or_a_run(tmp_path, kind):
+    if kind == "mat":
+        # scipy's C code may read beyond its buffer where an uncompressed file lies about sizes
+        file, prefix = tmp_path / "r.mat", "g."
+        scipy.io.savemat(file, {"g": {"x": np.arange(10.0)}}, do_compression=True)
+    else:
+        file, prefix = write(kind, tmp_path)
+    path = tmp_path / "map.yaml"
+    path.write_text(one_channel(prefix + "x"))
+    channels, content = load_map(path), file.read_bytes()
+    rng = np.random.default_rng(1)
+    n_refused = 0
+    for _ in range(80):
+        damaged = bytearray(content)
+        for at in rng.integers(len(content), size=rng.integers(1, 9)):
+            damaged[at] = rng.integers(256)
+        file.write_bytes(damaged)
+        outcome = ingest.run([file], channels, tmp_path / "out")
+        for error in outcome.errors:
+            n_refused += 1
+            assert str(error).startswith(str(file))
+            assert "\n" not in str(error)
+    assert n_refused > 5
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_files_of_another_format_are_refused(tmp_path, kind):
     file = tmp_path / f"r.{kind}"

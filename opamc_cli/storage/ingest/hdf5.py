@@ -65,11 +65,7 @@ class Hdf5Source:
         n_samples = check_lengths(self.path, lengths)
         for start in range(0, n_samples, BLOCK_ROWS):
             stop = min(start + BLOCK_ROWS, n_samples)
-            try:
-                block = {name: column.read(start, stop) for name, column in columns.items()}
-            except OSError as error:
-                msg = f"{self.path}: samples {start}..{stop} cannot be read ({_first_line(error)})"
-                raise InputError(msg) from error
+            block = {name: column.read(start, stop) for name, column in columns.items()}
             for name, selection in selections.items():
                 if selection.dates:
                     texts = [_text(value) for value in block[name]]

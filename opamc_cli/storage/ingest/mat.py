@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import scipy.io
+from scipy.io.matlab import MatReadError
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.dates import parse_dates
@@ -88,10 +89,9 @@ class MatSource:
     def _call(self, function: Any, **options: Any) -> Any:
         try:
             return function(str(self.path), **options)
-        except Exception as error:
-            reason = " ".join(str(error).split()) or type(error).__name__
-            msg = f"{self.path}: cannot be read as a MAT file ({reason}); save it again"
-            raise InputError(msg) from error
+        except MatReadError as error:
+            # the one error of scipy's own descends from nothing that is caught with the others
+            raise ValueError(str(error)) from error
 
     def _load(self, variables: set[str]) -> None:
         for variable in sorted(variables):

@@ -38,12 +38,7 @@ def open_tdms(path: Path) -> Iterator["TdmsSource"]:
     if mark != b"TDSm":
         msg = f"{path}: is not a TDMS file (it starts with {mark!r}); check format in the map"
         raise InputError(msg)
-    try:
-        file = TdmsFile.open(path)
-    except Exception as error:
-        msg = f"{path}: cannot be read as TDMS ({' '.join(str(error).split())}); copy it again"
-        raise InputError(msg) from error
-    with file:
+    with TdmsFile.open(path) as file:
         yield TdmsSource(path, file)
 
 
