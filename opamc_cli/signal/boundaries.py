@@ -13,6 +13,8 @@ SMOOTHING_S = 0.004  # a quarter period at 60 Hz, faster than any carrier that j
 LEAST_TURN_RAD = 0.12  # the least turn that counts as leaving standstill
 # A smaller current at standstill may be the sensors' offset, which has an angle of its own.
 MIN_HOLDING_SHARE = 0.15
+# Drives settle after a stop: what is left of the current is not motion.
+REST_SHARE = 0.1
 STAY_S = 0.025  # a quarter period at 10 Hz
 CLEAR_TURN_RAD = 1.5  # the turn up to which the angle is followed
 
@@ -23,6 +25,7 @@ def refine_boundaries(
     stop: int,
     fs_hz: float,
     noise_a: float,
+    n_to_f_last: int | None = None,
 ) -> tuple[int, int]:
     """Move coarse boundaries outwards to where the vector leaves and reaches standstill.
 
@@ -41,6 +44,9 @@ def refine_boundaries(
         Sampling rate, Hz.
     noise_a : float
         Standard deviation of the noise in each component of `current`, A.
+    n_to_f_last : int or None
+        Samples from `start` to where the carrier first was as fast as at `stop`; given if it is
+        still fast there.
 
     Returns
     -------
@@ -54,8 +60,17 @@ def refine_boundaries(
     before, after = current[:middle], current[middle:][::-1]
     onset = _onset if np.iscomplexobj(current) else _departure
     refined_start = onset(before, start, fs_hz, noise_a, amplitude_a)
-    n_after = onset(after, current.size - stop, fs_hz, noise_a, amplitude_a)
-    return refined_start, current.size - n_after
+    n_rest = current.size - stop
+    if n_to_f_last is not None and not _is_held(after[: int(0.4 * n_rest)], amplitude_a):
+        # The carrier is lost at speed: friction does the braking, the current is near zero, and
+        # so it stays. A joint brakes as it accelerates, for all that is known.
+        return refined_start, min(current.size, stop + start + n_to_f_last - refined_start)
+    return refined_start, current.size - onset(after, n_rest, fs_hz, noise_a, amplitude_a)
+
+
+def _is_held(rest: NDArray[np.inexact], amplitude_a: float) -> bool:
+    """Whether a holding torque stands out from what a sensor's offset may be."""
+    return rest.size > 0 and float(np.abs(np.mean(rest))) >= MIN_HOLDING_SHARE * amplitude_a
 
 
 def _departure(
@@ -69,11 +84,19 @@ def _departure(
     smooth = _moving_mean(x[:coarse], width)
     limit = max(5 * noise_a / np.sqrt(width), LEAST_TURN_RAD * amplitude_a)
     away = np.abs(smooth - np.median(smooth[:n_rest])) > limit
-    # A current that oscillates passes its standstill value again and again, but does not stay.
+    return _last_stay(~away, coarse, fs_hz)
+
+
+def _last_stay(at_rest: NDArray[np.bool_], coarse: int, fs_hz: float) -> int:
+    """End of the last standstill before `coarse`.
+
+    A current that oscillates, or changes its sign while braking, passes its standstill value
+    again and again, but does not stay.
+    """
     n_stay = round(STAY_S * fs_hz)
     if coarse < n_stay:
         return coarse
-    stays = ~np.lib.stride_tricks.sliding_window_view(away, n_stay).any(axis=1)
+    stays = np.lib.stride_tricks.sliding_window_view(at_rest[:coarse], n_stay).all(axis=1)
     ends = np.flatnonzero(stays) + n_stay
     return int(ends[-1]) if ends.size else coarse
 
@@ -97,7 +120,10 @@ def _onset(
     rest = smooth[:n_rest]
     reference = complex(np.mean(rest * rest))
     if np.sqrt(abs(reference)) < max(3 * noise, MIN_HOLDING_SHARE * amplitude_a):
-        return _rise(smooth - np.mean(rest), coarse, noise)
+        # Without current at standstill the motion begins where the current does.
+        limit = max(4 * noise, REST_SHARE * amplitude_a)
+        at_rest = np.abs(smooth - np.mean(rest)) < limit
+        return _last_stay(at_rest, coarse, fs_hz)
     turned = _turn_since(smooth, reference, noise)
     least = max(LEAST_TURN_RAD, 4 * noise / float(np.sqrt(abs(reference))))
     return _extrapolate(turned, np.abs(smooth), least, coarse)
@@ -143,12 +169,6 @@ def _extrapolate(
         best = min(best, (misfit, zero))
     earliest = t_least - 1.5 * (t_clear - t_least)
     return int(np.clip(round(best[1]), max(0, earliest), min(t_least, coarse)))
-
-
-def _rise(smooth: NDArray[np.inexact], coarse: int, noise: float) -> int:
-    """Without current at standstill the motion begins where the current does."""
-    quiet = np.flatnonzero(np.abs(smooth[:coarse]) < 4 * noise)
-    return int(quiet[-1]) + 1 if quiet.size else coarse
 
 
 def _moving_mean(x: NDArray[np.inexact], width: int) -> NDArray[np.inexact]:

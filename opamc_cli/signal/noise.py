@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-BLOCK = 64
+BLOCK = 256
 QUIET_SHARE = 0.1
 
 

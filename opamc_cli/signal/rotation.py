@@ -34,6 +34,19 @@ class Rotation:
         """Sense of rotation over all frames: 1, -1, or 0 if the vector does not turn."""
         return int(np.sign(self.turn.sum()))
 
+    def smoothed(self, n_frames: int) -> "Rotation":
+        """Rotation within each frame and its neighbours, `n_frames` in all; no edge rule needed.
+
+        Beyond the ends nothing is added.
+        """
+        window = np.ones(n_frames, dtype=np.float32)
+        n = self.turn.size
+        first = (n_frames - 1) // 2
+        return Rotation(
+            np.convolve(self.turn, window)[first : first + n].astype(np.float32),
+            np.convolve(self.along, window)[first : first + n].astype(np.float32),
+        )
+
     def frequency_hz(self, fs_hz: float) -> NDArray[np.float64]:
         """Mean frequency within each frame, Hz; negative where the vector turns backwards."""
         angle: NDArray[np.float64] = np.arctan2(self.turn, self.along).astype(np.float64)

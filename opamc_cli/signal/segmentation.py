@@ -11,9 +11,14 @@ from opamc_cli.signal.motion import MotionFrames
 from opamc_cli.signal.rotation import Rotation
 
 MIN_CLEAR_FRAMES = 3
-# Largest ratio between the ridge's and the vector's frequency where the two agree: half way
-# to the sidebands of a torque ripple twice per motor turn with five pole pairs, 1 ± 2/5.
+SMOOTHED_FRAMES = 3
+# Largest ratio between the ridge's and the vector's frequency where the two agree: well inside
+# the sidebands of a torque ripple twice per motor turn with five pole pairs, 1 ± 2/5.
 AGREEMENT = 1.2
+# Share of the largest S(t) where the ridge is trusted with the largest frequency.
+HIGH_SHARE = 0.8
+# Frames of a motion that are looked at to tell whether the next lobe continues it.
+RECENT_FRAMES = 256
 # Share of a lobe's largest frequency that its ridge still has where a dip begins.
 FAST_SHARE = 0.7
 
@@ -52,12 +57,18 @@ class Motion:
         Sense of rotation: 1, -1, or 0 where unknown.
     f_max_hz : float
         Largest fundamental frequency that lasted, Hz.
+    f_last_hz : float
+        Frequency in the last frame, Hz.
+    n_to_f_last : int
+        Frames from the first one to that in which the frequency first was as high as in the last.
     """
 
     first: int
     last: int
     direction: int
     f_max_hz: float
+    f_last_hz: float
+    n_to_f_last: int
 
 
 @dataclass(frozen=True)
@@ -139,25 +150,42 @@ def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     ridge_hz = evidence.frames.ridge_hz.astype(np.float64)
     clear = clear_motion(evidence, rule)
 
-    def speed_hz(lobe: tuple[int, int]) -> float:
-        inside = slice(*lobe)
-        return largest_frequency(ridge_hz[inside][clear[inside]])
+    def speed_hz(first: int, last: int) -> float:
+        """Largest frequency where S(t) is nearly as high as it gets."""
+        high = evidence.frames.strength[first:last] * clear[first:last]
+        return largest_frequency(ridge_hz[first:last][high >= HIGH_SHARE * high.max()])
 
     joined: list[tuple[int, int]] = []
-    for lobe in hysteresis(evidence.frames.strength, rule.on, rule.off):
-        for part in _split_by_direction(lobe, evidence, rule):
+    for high in hysteresis(evidence.frames.strength, rule.on, rule.off):
+        for part in _split_by_direction(high, evidence, rule):
             # Noise may pass the threshold for a moment; a carrier is clear for a few frames.
-            if clear[slice(*part)].sum() < MIN_CLEAR_FRAMES:
+            turning = np.flatnonzero(clear[slice(*part)])
+            if turning.size < MIN_CLEAR_FRAMES:
                 continue
-            if joined and _is_one_motion(joined[-1], part, evidence, rule, speed_hz):
-                joined[-1] = (joined[-1][0], part[1])
+            # Slow wavelets are long and still ring after the vector has come to rest.
+            lobe = (part[0] + int(turning[0]), part[0] + int(turning[-1]) + 1)
+            if joined and _is_one_motion(joined[-1], lobe, evidence, rule, speed_hz):
+                joined[-1] = (joined[-1][0], lobe[1])
             else:
-                joined.append(part)
-    return [
-        Motion(*lobe, evidence.direction(*lobe), speed_hz(lobe))
-        for lobe in joined
-        if (lobe[1] - lobe[0]) * evidence.frame_s >= rule.min_motion_s
-    ]
+                joined.append(lobe)
+    motions = []
+    for first, last in joined:
+        if (last - first) * evidence.frame_s < rule.min_motion_s:
+            continue
+        f_last_hz = float(ridge_hz[last - 1])
+        # A few percent less, or noise would put it anywhere in a cruise at constant speed.
+        as_fast = clear[first:last] & (ridge_hz[first:last] >= 0.95 * f_last_hz)
+        motions.append(
+            Motion(
+                first,
+                last,
+                evidence.direction(first, last),
+                speed_hz(first, last),
+                f_last_hz,
+                int(np.argmax(as_fast)),
+            )
+        )
+    return motions
 
 
 def clear_motion(evidence: Evidence, rule: MotionRule) -> NDArray[np.bool_]:
@@ -167,7 +195,8 @@ def clear_motion(evidence: Evidence, rule: MotionRule) -> NDArray[np.bool_]:
     zero, the ripple's sidebands outgrow the carrier, whose frequency the vector still shows.
     """
     ridge_hz = np.maximum(evidence.frames.ridge_hz, 1e-9)
-    ratio = np.abs(evidence.rotation.frequency_hz(evidence.fs_hz)) / ridge_hz
+    turned_hz = evidence.rotation.smoothed(SMOOTHED_FRAMES).frequency_hz(evidence.fs_hz)
+    ratio = np.abs(turned_hz) / ridge_hz
     agrees = (ratio > 1 / AGREEMENT) & (ratio < AGREEMENT)
     return agrees & (evidence.frames.strength >= rule.on)
 
@@ -211,7 +240,7 @@ def _is_one_motion(
     after: tuple[int, int],
     evidence: Evidence,
     rule: MotionRule,
-    speed_hz: Callable[[tuple[int, int]], float],
+    speed_hz: Callable[[int, int], float],
 ) -> bool:
     """Whether the gap between two lobes of S(t) is a dip inside one motion.
 
@@ -219,6 +248,7 @@ def _is_one_motion(
     joint it may stay near zero for long. No joint stops from speed at once: where the carrier is
     fast on both sides of the gap it was fast within, unless a holding torque proves standstill.
     """
+    before = (max(before[0], before[1] - RECENT_FRAMES), before[1])
     if evidence.direction(*before) != evidence.direction(*after):
         return False
     gap_s = (after[0] - before[1]) * evidence.frame_s
@@ -229,7 +259,7 @@ def _is_one_motion(
     ridge_hz = evidence.frames.ridge_hz
     leaving = float(np.median(ridge_hz[max(before[0], before[1] - 3) : before[1]]))
     arriving = float(np.median(ridge_hz[after[0] : min(after[1], after[0] + 3)]))
-    return leaving > FAST_SHARE * speed_hz(before) and arriving > FAST_SHARE * speed_hz(after)
+    return leaving > FAST_SHARE * speed_hz(*before) and arriving > FAST_SHARE * speed_hz(*after)
 
 
 def _split_by_direction(

@@ -31,6 +31,8 @@ MAX_FLOOR_SHARE = 0.3
 """Of the current's larger amplitudes: a noise floor above that hides the carrier."""
 CONTEXT_S = 2.0
 """Standstill beside a motion that is read to place its boundaries."""
+LOST_SHARE = 0.25
+"""Of its largest frequency: a carrier that ends faster than that did not end, but was lost."""
 STILL_SHARE = 0.05
 """A recording that stands still for less than this share never stands still."""
 
@@ -290,8 +292,14 @@ def _refined(
         last = min(stop + context, (after + stop) // 2 if i + 1 < len(motions) else run.n_samples)
         block = run.read(names, first, last)
         current = np.nan_to_num(_current([block[name] for name in names]), posinf=0, neginf=0)
+        lost_at_speed = motion.f_last_hz > LOST_SHARE * motion.f_max_hz
         refined = refine_boundaries(
-            current, start - first, stop - first, run.sampling_rate_hz, evidence.noise_a
+            current,
+            start - first,
+            stop - first,
+            run.sampling_rate_hz,
+            evidence.noise_a,
+            motion.n_to_f_last * step if lost_at_speed else None,
         )
         segments.append(
             Segment(first + refined[0], first + refined[1], motion.f_max_hz, motion.direction)

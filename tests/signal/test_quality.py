@@ -1,0 +1,45 @@
+"""Noise level and signs of channels that cannot be trusted."""
+
+import numpy as np
+import pytest
+from carriers import Move, record
+
+from opamc_cli.signal.analytic import clarke
+from opamc_cli.signal.noise import noise_level
+from opamc_cli.signal.quality import clipped_share, is_constant
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.05, 0.1])
+def test_noise_is_told_from_a_recording_that_moves_and_stands(noise):
+    recording = record([Move(157), Move(314, -1)], noise=noise)
+    # The Clarke vector takes sqrt(2/3) of each phase's noise.
+    assert noise_level(clarke(*recording.phases)) == pytest.approx(noise * np.sqrt(2 / 3), rel=0.15)
+    assert noise_level(recording.phases[0]) == pytest.approx(noise, rel=0.15)
+
+
+@pytest.mark.parametrize("n", range(6))
+def test_noise_of_next_to_nothing(n):
+    assert noise_level(np.zeros(n)) == 0
+
+
+def test_noise_passes_over_missing_samples():
+    x = np.random.default_rng(0).standard_normal(10_000)
+    x[::100] = np.nan
+    assert noise_level(x) == pytest.approx(1, rel=0.15)
+
+
+def test_a_clipped_carrier_is_told_from_a_quantised_one():
+    carrier = np.sin(2 * np.pi * 0.0137 * np.arange(20_000))
+    quantised = np.round(carrier * 2048) / 2048
+    assert clipped_share(quantised) == 0
+    assert clipped_share(carrier) == 0
+    assert clipped_share(np.clip(quantised, -0.9, 0.9)) == pytest.approx(0.287, abs=0.01)
+    assert clipped_share(np.clip(carrier, None, 0.9)) == pytest.approx(0.1435, abs=0.01)
+    assert clipped_share(np.array([1.0])) == 0
+
+
+def test_constants():
+    assert is_constant(np.full(10, 2.0))
+    assert is_constant(np.array([np.nan, 1.0, np.nan]))
+    assert is_constant(np.zeros(0))
+    assert not is_constant(np.array([1.0, 1.1]))

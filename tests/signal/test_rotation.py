@@ -1,0 +1,70 @@
+"""Sense and frequency of rotation, frame by frame."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opamc_cli.signal.rotation import RotationStream, join_rotation
+
+
+def rotation_of(z, step=16):
+    stream = RotationStream(step)
+    return join_rotation([stream.push(z), stream.finish()])
+
+
+def vector(frequency_hz, n=1000, fs_hz=2048.0):
+    return np.exp(2j * np.pi * frequency_hz * np.arange(n) / fs_hz).astype(np.complex64)
+
+
+@pytest.mark.parametrize("frequency_hz", [-400.0, -3.0, 50.0, 900.0])
+def test_frequency_of_a_turning_vector(frequency_hz):
+    rotation = rotation_of(vector(frequency_hz))
+    assert rotation.frequency_hz(2048.0)[1:] == pytest.approx(frequency_hz, abs=0.01)
+    assert rotation.direction() == np.sign(frequency_hz)
+
+
+def test_a_change_of_sign_does_not_change_the_sense():
+    torque = np.cos(2 * np.pi * np.arange(1000) / 300)
+    rotation = rotation_of((torque * vector(100.0)).astype(np.complex64))
+    clear = rotation.along > 0.5 * rotation.along.max()
+    # The first frame has one step less: its first sample has none before it.
+    assert rotation.frequency_hz(2048.0)[1:][clear[1:]] == pytest.approx(100, rel=0.01)
+
+
+def test_noise_adds_nothing_on_the_whole():
+    rng = np.random.default_rng(0)
+    noise = rng.standard_normal(100_000) + 1j * rng.standard_normal(100_000)
+    rotation = rotation_of(vector(100.0, 100_000) + 0.5 * noise.astype(np.complex64))
+    angle = np.arctan2(rotation.turn.sum(), rotation.along.sum())
+    assert angle * 2048 / (2 * np.pi) == pytest.approx(100, rel=0.05)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.integers(0, 70), max_size=8), st.integers(1, 20))
+def test_does_not_depend_on_the_pieces(pieces, step):
+    rng = np.random.default_rng(sum(pieces))
+    z = rng.standard_normal(sum(pieces)) + 1j * rng.standard_normal(sum(pieces))
+    z = z.astype(np.complex64)
+    whole = rotation_of(z, step)
+    stream = RotationStream(step)
+    parts = [stream.push(p) for p in np.split(z, np.cumsum(pieces)[:-1])] if pieces else []
+    found = join_rotation([*parts, stream.finish()])
+    assert found.turn.size == -(-z.size // step)
+    assert np.array_equal(found.turn, whole.turn)
+    assert np.array_equal(found.along, whole.along)
+    by_definition = np.imag(z[1:] * np.conj(z[:-1])).sum()
+    assert found.turn.sum() == pytest.approx(by_definition, abs=1e-3)
+
+
+def test_smoothing_sums_neighbours():
+    rotation = rotation_of(vector(100.0, 160))
+    smooth = rotation.smoothed(3)
+    assert smooth.turn[4] == pytest.approx(rotation.turn[3:6].sum())
+    assert smooth.turn[0] == pytest.approx(rotation.turn[:2].sum())
+
+
+def test_missing_samples_are_passed_over():
+    z = vector(100.0)
+    z[500] = np.nan
+    assert np.isfinite(rotation_of(z).turn).all()

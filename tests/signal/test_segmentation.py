@@ -1,0 +1,156 @@
+"""Motions found in generated currents against the moves that made them."""
+
+import numpy as np
+import pytest
+from axis import errors_s, gather, segments_of
+from carriers import Move, Torque, record
+
+from opamc_cli.signal.analytic import clarke
+from opamc_cli.signal.boundaries import refine_boundaries
+from opamc_cli.signal.segmentation import (
+    MotionRule,
+    find_motions,
+    hysteresis,
+    largest_frequency,
+)
+
+HELD = Torque(hold=1.0)
+NO_HOLDING = Torque(hold=0.0, swing=0.0, friction=0.3)
+
+
+def moves(f_max_hz, **options):
+    return [
+        Move(f_max_hz, 1, **options),
+        Move(f_max_hz, -1, **options),
+        Move(0.6 * f_max_hz, -1, **options),
+        Move(f_max_hz, 1, **options),
+    ]
+
+
+def noise_for(snr_db, moves, torque):
+    clean = record(moves, torque=torque)
+    moving = clean.frequency_hz != 0
+    return float(clean.phases[:, moving].std()) * 10 ** (-snr_db / 20)
+
+
+@pytest.mark.parametrize("snr_db", [20, 40])
+@pytest.mark.parametrize("torque", [HELD, NO_HOLDING], ids=["held", "not held"])
+@pytest.mark.parametrize("f_max_hz", [62.8, 157, 314])
+def test_finds_every_motion_with_its_speed_and_direction(f_max_hz, torque, snr_db):
+    wanted = moves(f_max_hz, ramp_s=0.2)
+    errors = []
+    for seed in range(3):
+        noise = noise_for(snr_db, wanted, torque)
+        recording = record(wanted, torque=torque, noise=noise, offset=0.03, seed=seed)
+        spans, motions = segments_of(recording.phases)
+        assert [m.direction for m in motions] == [m.direction for m in wanted]
+        found_hz = np.array([m.f_max_hz for m in motions])
+        assert found_hz == pytest.approx([m.f_max_hz for m in wanted], rel=0.03)
+        errors.append(errors_s(spans, recording.intervals))
+    off = np.abs(np.concatenate(errors))
+    assert np.median(off, axis=0).max() < 0.02
+    assert off.max() < 0.15
+
+
+@pytest.mark.parametrize("smooth", [True, False], ids=["jerk limited", "trapezoidal"])
+@pytest.mark.parametrize("ramp_s", [0.12, 0.4])
+def test_boundaries_do_not_depend_on_the_shape_of_the_ramp(ramp_s, smooth):
+    wanted = moves(157, ramp_s=ramp_s, rest_s=0.4)
+    recording = record(wanted, noise=0.02, smooth=smooth)
+    spans, _ = segments_of(recording.phases)
+    assert np.abs(errors_s(spans, recording.intervals)).max() < 0.025
+
+
+def test_a_dip_while_braking_is_one_motion():
+    torque = Torque(hold=0.0, swing=0.0, friction=0.5, viscous=0.0, inertia=1.5)
+    wanted = [Move(157, ramp_s=0.3), Move(157, -1, ramp_s=0.3)]
+    recording = record(wanted, torque=torque, noise=0.03)
+    z = clarke(*recording.phases)
+    braking = slice(recording.intervals[0][1] - 600, recording.intervals[0][1])
+    assert np.abs(z[braking]).min() < 0.05  # the current does pass zero
+    assert len(segments_of(recording.phases)[0]) == 2
+
+
+def test_a_cruise_without_current_is_bridged():
+    # Gravity pulls as hard as friction brakes: no current at constant speed.
+    torque = Torque(hold=-0.5, swing=0.0, friction=0.4, viscous=0.1, ripple=0.0)
+    recording = record([Move(157), Move(157)], torque=torque, noise=0.02)
+    spans, _ = segments_of(recording.phases)
+    assert len(spans) == 2
+    assert np.abs(errors_s(spans, recording.intervals)).max() < 0.03
+
+
+def test_a_short_rest_between_equal_motions_divides_them():
+    recording = record([Move(157, rest_s=0.2)] * 3, noise=0.02)
+    assert len(segments_of(recording.phases)[0]) == 3
+
+
+def test_a_reversal_without_rest_divides_two_motions():
+    recording = record([Move(157, 1, rest_s=0.0), Move(157, -1)], noise=0.02)
+    spans, motions = segments_of(recording.phases)
+    assert [m.direction for m in motions] == [1, -1]
+    assert np.abs(errors_s(spans, recording.intervals)).max() < 0.12
+
+
+@pytest.mark.parametrize("hold", [0.0, 0.5])
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_at_standstill_is_no_motion(hold, seed):
+    rng = np.random.default_rng(seed)
+    phases = hold * np.array([[1.0], [-0.4], [-0.6]]) + 0.1 * rng.standard_normal((3, 60_000))
+    assert find_motions(gather(clarke(*phases.astype(np.float32))), MotionRule()) == []
+
+
+def test_a_changing_torque_at_standstill_is_no_motion():
+    n = 20_000
+    torque = np.sin(2 * np.pi * 0.7 * np.arange(n) / 2048)  # changes its sign
+    phases = torque * np.array([[1.0], [-0.3], [-0.7]])
+    phases += 0.02 * np.random.default_rng(1).standard_normal((3, n))
+    assert find_motions(gather(clarke(*phases.astype(np.float32))), MotionRule()) == []
+
+
+def test_a_single_phase_has_no_direction_but_the_same_motions():
+    recording = record(moves(157), noise=0.02)
+    from opamc_cli.signal.analytic import AnalyticStream
+    from opamc_cli.signal.noise import noise_level
+
+    stream = AnalyticStream(2048.0, 8.0)
+    z = np.concatenate([stream.push(recording.phases[0]), stream.finish()])
+    motions = find_motions(gather(z, has_direction=False), MotionRule())
+    assert [m.direction for m in motions] == [0] * 4
+    off = []
+    for i, (motion, truth) in enumerate(zip(motions, recording.intervals, strict=True)):
+        before = (motions[i - 1].last * 16 + motion.first * 16) // 2 if i else 0
+        after = (motions[i + 1].first * 16 + motion.last * 16) // 2 if i < 3 else z.size
+        current = recording.phases[0][before:after]
+        start, stop = refine_boundaries(
+            current,
+            motion.first * 16 - before,
+            motion.last * 16 - before,
+            2048.0,
+            noise_level(current),
+        )
+        off += [start + before - truth[0], stop + before - truth[1]]
+    assert np.median(np.abs(off)) / 2048 < 0.02
+
+
+class TestHysteresis:
+    def test_needs_the_upper_threshold_and_keeps_to_the_lower(self):
+        strength = np.array([0, 0.4, 0.6, 0.4, 0.1, 0.4, 0.4, 0.0, 0.5])
+        assert hysteresis(strength, 0.5, 0.3) == [(1, 4), (8, 9)]
+
+    def test_of_nothing_is_nothing(self):
+        assert hysteresis(np.zeros(0), 0.5, 0.3) == []
+
+    def test_nan_is_below_every_threshold(self):
+        assert hysteresis(np.array([1, np.nan, 1.0]), 0.5, 0.3) == [(0, 1), (2, 3)]
+
+    def test_may_reach_both_ends(self):
+        assert hysteresis(np.ones(3), 0.5, 0.3) == [(0, 3)]
+
+
+def test_a_single_frame_does_not_make_the_largest_frequency():
+    ridge = np.full(50, 100.0)
+    ridge[[7, 20, 21]] = 400.0
+    assert largest_frequency(ridge) == 100.0
+    assert largest_frequency(np.zeros(0)) == 0.0
+    assert largest_frequency(np.array([5.0, 7.0])) == 6.0

@@ -1,0 +1,44 @@
+"""Windows of whole carrier periods."""
+
+from itertools import pairwise
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from opamc_cli.signal.windows import carrier_windows
+
+
+def test_four_windows_of_whole_periods():
+    windows = carrier_windows(0, 5000, 60.0, 1000.0, 4, 1200)
+    assert len(windows) == 4
+    assert {b - a for a, b in windows} == {1250}  # 75 periods
+    assert windows[0] == (0, 1250)
+
+
+def test_fewer_windows_rather_than_too_short_ones():
+    assert len(carrier_windows(0, 3000, 60.0, 1000.0, 4, 1200)) == 2
+    assert len(carrier_windows(0, 500, 60.0, 1000.0, 4, 1200)) == 1
+
+
+def test_less_than_a_period_gives_none():
+    assert carrier_windows(0, 10, 60.0, 1000.0, 4, 1) == []
+
+
+@given(
+    st.integers(0, 1000),
+    st.integers(1, 100_000),
+    st.floats(0.5, 400),
+    st.integers(1, 10),
+    st.integers(1, 5000),
+)
+def test_windows_are_equal_ordered_and_inside(start, length, carrier_hz, n, least):
+    windows = carrier_windows(start, start + length, carrier_hz, 1000.0, n, least)
+    assert len(windows) <= n
+    for (a, b), (c, _) in pairwise(windows):
+        assert b <= c
+        assert b - a == windows[0][1] - windows[0][0]
+    for a, b in windows:
+        assert start <= a < b <= start + length
+        periods = (b - a) * carrier_hz / 1000
+        # Whole to half a sample, or cut by the room that there is.
+        assert abs(periods - round(periods)) <= carrier_hz / 1000 * 1.01
