@@ -1,6 +1,7 @@
 """Identification of cycles and motions by the similarity of variance vectors."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -153,13 +154,7 @@ def identify(
     similarity = sliding_similarity(reference.variance, segments.variance)
     for k, value in enumerate(similarity):
         best_similarity[k : k + n] = np.maximum(best_similarity[k : k + n], value)
-    fits = np.array(
-        [
-            value >= rule.min_similarity and _agree(reference, segments.part(k, k + n), rule)
-            for k, value in enumerate(similarity)
-        ],
-        dtype=bool,
-    )
+    fits = (similarity >= rule.min_similarity) & _agreement(reference, segments, rule)
     for index, k in enumerate(_most_windows(fits, similarity, n)):
         cycle[k : k + n] = index
         motion[k : k + n] = np.arange(n)
@@ -237,17 +232,26 @@ def _clearly_longer(pauses: list[float]) -> bool:
     return len(ordered) > 1 and ordered[0] > 1.5 * ordered[1]
 
 
-def _agree(reference: SegmentFeatures, window: SegmentFeatures, rule: MatchRule) -> bool:
-    near = [
-        np.abs(have - want) <= tolerance * want
-        for have, want, tolerance in (
-            (window.duration_s, reference.duration_s, rule.duration_tolerance),
-            (window.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
-        )
-    ]
+def _agreement(
+    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
+) -> npt.NDArray[np.bool_]:
+    """Tell of every window whether each of its segments agrees with its reference by itself."""
+    n = len(reference)
+    if len(segments) < n or n == 0:
+        return np.zeros(0, dtype=bool)
+
+    def windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return np.lib.stride_tricks.sliding_window_view(values, n)
+
+    agree = np.ones((len(segments) - n + 1, n), dtype=bool)
+    for have, want, tolerance in (
+        (segments.duration_s, reference.duration_s, rule.duration_tolerance),
+        (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
+    ):
+        agree &= np.abs(windows(have) - want) <= tolerance * want
     if rule.use_direction:
-        near.append(window.direction * reference.direction >= 0)
-    return bool(np.all(near))
+        agree &= windows(segments.direction) * reference.direction >= 0
+    return np.asarray(agree.all(axis=1))
 
 
 def _most_windows(fits: npt.NDArray[np.bool_], similarity: Floats, n: int) -> list[int]:
