@@ -76,7 +76,11 @@ def run(files: Sequence[Path], channels: IngestMap, out: Path, jobs: int = 1) ->
             raise UsageError(msg)
         by_run[task.run] = task.source
     with output_lock(out):
-        return map_items(ingest_file, tasks, jobs)
+        outcome = map_items(ingest_file, tasks, jobs)
+    for error in outcome.errors:
+        if isinstance(error, UsageError):
+            raise error  # what cannot be written for one file cannot be for the next
+    return outcome
 
 
 def ingest_file(task: _Task) -> Ingested:
