@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+    from rich.padding import Padding
     from rich.table import Table
     from rich.text import Text
 
@@ -64,10 +65,9 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
         )
     unhealthy = [entry for entry in axes if entry.get("state") != "healthy"]
     shared = wording.shared_reasons(unhealthy)
-    lines = [_explanation(entry, set(shared)) for entry in unhealthy]
+    lines = [line for entry in unhealthy for line in _explanation(entry, set(shared))]
     for reason, numbers in shared.items():
-        text = Text(f"{wording.axes_phrase(numbers)}: ", style="bold")
-        lines.append(text.append(printable(reason), style="not bold"))
+        lines += [Text(f"{wording.axes_phrase(numbers)}:", style="bold"), _indented(reason)]
     return Group(title, Text(), table, Text(), *lines)
 
 
@@ -145,21 +145,28 @@ def printable(text: str) -> str:
     return "".join(c if c.isprintable() else "�" for c in text)
 
 
-def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "Text":
+def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
 
-    text = Text(f"axis {entry.get('axis')}:", style="bold")
     sentences = [str(r) for r in entry.get("reasons", ()) if str(r) not in said_below]
     if entry.get("cause"):
         sentences.append(f"cause: {wording.cause_phrase(entry['cause'])}")
     advice = wording.advice(entry)
     if advice:
         sentences.append(advice)
-    for sentence in sentences:
-        text.append(f"\n  {printable(sentence)}", style="not bold")
-    return text
+    if not sentences:
+        return []
+    heading = Text(f"axis {entry.get('axis')}:", style="bold")
+    return [heading, *(_indented(sentence) for sentence in sentences)]
+
+
+def _indented(text: str) -> "Padding":
+    from rich.padding import Padding
+    from rich.text import Text
+
+    return Padding(Text(printable(text)), (0, 0, 0, 2))
 
 
 def _state(state: str) -> "Text":

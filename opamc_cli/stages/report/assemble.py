@@ -182,6 +182,7 @@ def _environment() -> jinja2.Environment:
     environment.filters |= {
         "number": wording.number,
         "p_value": wording.p_value,
+        "p_phrase": wording.p_phrase,
         "moment": wording.moment,
     }
     environment.globals |= {"sign": state_sign, "role": state_role}

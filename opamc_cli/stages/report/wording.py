@@ -67,6 +67,12 @@ def p_value(value: object) -> str:
     return "< 0.0001" if value < 1e-4 else f"{value:.2g}"
 
 
+def p_phrase(value: object) -> str:
+    """Return what follows the letter p in a sentence."""
+    text = p_value(value)
+    return {"–": "unknown"}.get(text, text if text.startswith("<") else f"= {text}")
+
+
 def moment(iso: str) -> str:
     """Return an ISO 8601 time as "2026-03-10 06:00 UTC", or as it is if it is not one."""
     try:
@@ -84,8 +90,10 @@ def cause_phrase(cause: Mapping[str, Any] | None) -> str:
         return "–"
     text = str(cause.get("effect", cause.get("name", "unnamed")))
     parameters = cause.get("parameters")
-    if isinstance(parameters, Mapping) and parameters:
-        text += " (" + ", ".join(f"{k} {_plain(v)}" for k, v in sorted(parameters.items())) + ")"
+    if isinstance(parameters, Mapping):
+        shown = [_parameter(k, v) for k, v in sorted(parameters.items(), key=_order_first)]
+        if any(shown):
+            text += f" ({', '.join(part for part in shown if part)})"
     if cause.get("interpretation"):
         text += f": {cause['interpretation']}"
     share = cause.get("share")
@@ -140,6 +148,17 @@ def loop_phrase(verdict: object) -> str:
     }.get(str(verdict), str(verdict))
 
 
+def _order_first(item: tuple[str, object]) -> tuple[bool, str]:
+    return item[0] != "order", item[0]
+
+
+def _parameter(name: str, value: object) -> str:
+    # a ripple's switches: whether its amplitude and phase depend on this
+    if name in ("speed", "direction", "load") and value in (0, 1):
+        return f"varies with {name}" if value else ""
+    return f"{name} {_plain(value)}"
+
+
 def _plain(value: object) -> str:
     return number(value, 4) if isinstance(value, int | float) else str(value)
 
@@ -150,7 +169,9 @@ def loop_headline(loop: Mapping[str, Any]) -> str:
     for entry in loop.get("axes", ()):
         added = len(entry.get("steps", ()))
         noun = "effect" if added == 1 else "effects"
-        parts.append(f"axis {entry.get('axis')} {entry.get('verdict')}, {added} {noun} added")
+        parts.append(
+            f"model of axis {entry.get('axis')}: {entry.get('verdict')}, {added} {noun} added"
+        )
     text = "; ".join(parts) or "no axis was modelled"
     return text[0].upper() + text[1:]
 

@@ -50,7 +50,7 @@ def test_an_unhealthy_axis_is_explained() -> None:
     assert text.startswith("Axis 3 at fault; axis 4 not judged for want of data; axis 1 healthy\n")
     assert "✕ fault" in text
     assert "< 0.0001" in text
-    assert "axis 3:\n  worse than before\n" in text
+    assert "axis 3:\n  worse than before" in text
     assert "Record more cycles" in text
     assert "nothing to see" not in text
     assert "None" not in text
@@ -63,7 +63,7 @@ def test_what_several_axes_share_is_said_once() -> None:
     }
     text = shown(verdict_table(verdict))
     assert text.count("inspect the gear") == 1
-    assert "axes 2 and 5: inspect the gear" in text
+    assert "axes 2 and 5:\n  inspect the gear" in text
     assert "only axis 5" in text
 
 

@@ -1,5 +1,6 @@
 """Envelope of the same motion in baseline and target, aligned by lag (thesis Figure 4-2)."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -35,14 +36,14 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             max(trace[0][0] for trace in traces.values()),
             min(trace[0][-1] for trace in traces.values()),
         )
-        start, stop = _close_up(traces["baseline"], overlap, CLOSE_UP_WINDOWS * window_s)
+        start, stop = _close_up(traces, overlap, CLOSE_UP_WINDOWS * window_s)
         for role, (time, values, name) in traces.items():
             part = (time >= start) & (time <= stop)
             x, y = extremes(time[part], values[part], MAX_TRACE_POINTS)
             panels[1].plot(x, y, color=colour(role), linewidth=1.2, label=f"{role}: {name}")
         panels[0].axvspan(start, stop, color=colour("muted"), alpha=0.15, linewidth=0)
         panels[0].set_title(f"Axis {axis}, motion {motion}")
-        panels[1].set_title("Close-up of the shaded part")
+        panels[1].set_title("Close-up of the shaded part, where they differ most")
         _window_bar(panels[1], start, window_s)
         for panel in panels:
             panel.set_ylabel("envelope (A)")
@@ -109,16 +110,22 @@ def _median_row(rows: Columns, scores: dict[str, Any]) -> int:
 
 
 def _close_up(
-    trace: tuple[NDArray[np.float64], NDArray[np.floating], str],
+    traces: Mapping[str, tuple[NDArray[np.float64], NDArray[np.floating], str]],
     overlap: tuple[float, float],
     length_s: float,
 ) -> tuple[float, float]:
-    """Return a stretch of the overlap about the middle of the motion."""
+    """Return the stretch of the overlap in which the two envelopes differ most."""
     first, last = overlap
-    length_s = min(length_s, last - first)
-    middle = 0.5 * float(trace[0][0] + trace[0][-1])
-    start = float(np.clip(middle - 0.5 * length_s, first, last - length_s))
-    return start, start + length_s
+    time, baseline, _ = traces["baseline"]
+    inside = (time >= first) & (time <= last)
+    if np.count_nonzero(inside) < 2 or length_s >= last - first:
+        return first, last
+    target = np.interp(time[inside], traces["target"][0], traces["target"][1])
+    energy = np.concatenate(([0.0], np.cumsum(np.nan_to_num(target - baseline[inside]) ** 2)))
+    size = max(1, round(length_s / float(time[1] - time[0])))
+    best = int(np.argmax(energy[size:] - energy[:-size])) if energy.size > size else 0
+    start = float(time[inside][best])
+    return start, min(start + length_s, last)
 
 
 def _window_bar(panel: Axes, start: float, window_s: float) -> None:

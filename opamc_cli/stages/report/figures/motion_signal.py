@@ -54,29 +54,33 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             return finish(
                 drawing,
                 "motion-signal",
-                f"Motion signal of axis {focus.axis} over one cycle",
-                f"{caption} Shaded: the segments of one cycle, with the number of their motion.",
+                f"Motion signal of axis {focus.axis}",
+                f"{caption} Shaded: {_what_is_shaded(rows)}, with the number of their motion.",
                 f"Current and motion signal of axis {focus.axis} over one cycle of run {name} "
                 f"with {n_rows(rows)} segments.",
             )
+
+
+def _what_is_shaded(rows: Columns) -> str:
+    if rows["kind"][0] == "window":
+        return "the windows into which a recording is cut that never stands still"
+    return "the segments of one cycle"
 
 
 def _one_cycle(rows: Columns) -> Columns:
     """Return the reference cycle, else the first cycle, else the first segments."""
     if not n_rows(rows):
         return rows
+    if rows["kind"][0] == "window":
+        rows = select(rows, rows["run"] == rows["run"][0])
+        return {name: values[:MAX_WINDOWS] for name, values in rows.items()}
     if "reference" in rows and rows["reference"].any():
         rows = select(rows, rows["reference"].astype(bool))
     elif "cycle" in rows and (rows["cycle"] >= 0).any():
         first = int(np.flatnonzero(rows["cycle"] >= 0)[0])
         same = (rows["run"] == rows["run"][first]) & (rows["cycle"] == rows["cycle"][first])
         rows = select(rows, same)
-    rows = select(rows, rows["run"] == rows["run"][0])
-    return (
-        {name: values[:MAX_WINDOWS] for name, values in rows.items()}
-        if (rows["kind"][0] == "window")
-        else rows
-    )
+    return select(rows, rows["run"] == rows["run"][0])
 
 
 def _draw_phases(

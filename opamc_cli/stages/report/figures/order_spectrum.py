@@ -35,8 +35,8 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
             panel.plot(x, y, color=colour(role), linewidth=width, label=name)
         highest = float(np.nanmax(rows["before_a"]))
         for value in added[:MAX_LABELS]:
-            near = np.abs(order - value) <= 0.5
-            top = float(np.nanmax(rows["before_a"][near])) if near.any() else highest
+            nearest = int(np.argmin(np.abs(order - value)))
+            top = float(np.nanmax(rows["before_a"][max(nearest - 1, 0) : nearest + 2]))
             panel.annotate(
                 f"{value:g}",
                 (value, top),

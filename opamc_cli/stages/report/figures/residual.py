@@ -38,6 +38,8 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
         ):
             panel = drawing.add_subplot(layout[1, place])
             _over_quantity(panel, rows, column, label)
+        handles, labels = over_time.get_legend_handles_labels()
+        drawing.legend(handles, labels, loc="outside upper right", ncols=2)
         rms = {name: _rms(rows[column]) for name, column, _ in SERIES}
         over_time.set_title(
             f"Axis {axis} · RMS {rms['before']:.3g} A before, {rms['after']:.3g} A after"
@@ -66,7 +68,6 @@ def _over_time(panel: Axes, rows: Columns) -> None:
         )
     panel.set_xlabel("recorded time, one recording after the other (s)")
     panel.set_ylabel("residual (A)")
-    panel.legend(loc="upper right", ncols=2)
     panel.margins(x=0.0)
 
 
