@@ -60,7 +60,7 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
 
 
 def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
-    """Compute the standard deviation of a derivative where the path carries white noise of unit deviation.
+    """Compute the standard deviation of a derivative of white noise of unit deviation.
 
     Parameters
     ----------

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -21,11 +21,11 @@ from opamc_cli.joint.effects.library import (
     effect_named,
     load_user_effects,
 )
-from opamc_cli.joint.groups import cycle_length, group_samples
 from opamc_cli.joint.intervals import Certainty, certainty
-from opamc_cli.joint.kinematics import Recording, build_track
+from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop, declared_fit, find_candidates
 from opamc_cli.joint.model import Fit, Session, Term, open_session
+from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.spectra import order_spectrum
 from opamc_cli.joint.trace import Candidate
 from opamc_cli.joint.track import Floats, Joint
@@ -244,23 +244,16 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
         if recording.size < 64:
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
-    track = build_track(recordings, Joint(model.joint.gear_ratio, model.joint.pole_pairs))
+    track, grouping = grouped_track(
+        recordings, Joint(model.joint.gear_ratio, model.joint.pole_pairs)
+    )
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
-    travel = float(np.ptp(track.position_rad))
-    if np.count_nonzero(track.moving) < 50 or travel < 1e-4:
+    if not is_moving(track):
         msg = (
-            f"{named}: axis {axis} does not move (travel {travel:.2g} rad); "
+            f"{named}: axis {axis} does not move (travel {np.ptp(track.position_rad):.2g} rad); "
             "give runs in which it does"
         )
         raise NotEnoughDataError(msg)
-    periods = [
-        cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
-    ]
-    known = [period for period in periods if period is not None]
-    period = round(float(np.median(known))) if known else None
-    track = replace(track, period_samples=period)
-    names = tuple(recording.name for recording in recordings)
-    grouping = group_samples(track.moving, track.bounds, period, track.rate_hz, names)
     if grouping is None:
         moving = np.count_nonzero(track.moving) / track.rate_hz
         msg = (

@@ -33,6 +33,9 @@ EFFECTS = (
 )
 
 
+ELECTRICAL = ("sensor_offset", "sensor_gain", "dead_time")
+
+
 @dataclass(frozen=True)
 class Simulated:
     rate_hz: float
@@ -48,6 +51,7 @@ class Simulated:
     pole_pairs: int
     truth: dict[str, float]
     columns: np.ndarray
+    phases: np.ndarray
 
 
 def trapezoid(distance, speed, acceleration, rate):
@@ -112,6 +116,7 @@ def simulate(
     cycles=None,
     declared=DECLARED,
     quantum=None,
+    phase_errors=False,
 ):
     rng = np.random.default_rng(seed)
     rate = rate or float(rng.choice([100.0, 250.0, 500.0, 1000.0, 2048.0]))
@@ -160,7 +165,10 @@ def simulate(
     noise *= noise_rms
     truth: dict[str, float] = {}
     total = np.zeros(n)
+    field = pole_pairs * gear_ratio * q + rng.uniform(0, 6)
     for name in effects:
+        if phase_errors and name in ELECTRICAL:
+            continue
 
         def left(shape):
             rest = shape[moving]
@@ -197,6 +205,15 @@ def simulate(
         )
         total += shape * wanted / left(shape)
     current = base + total + noise
+    phases = np.stack([current * np.cos(field - k * 2 * np.pi / 3) for k in range(3)], axis=1)
+    phases += 0.5 * noise_rms * rng.normal(size=phases.shape)
+    errors = dict.fromkeys(effects) if phase_errors else {}
+    if "sensor_offset" in errors:
+        phases[:, 1] += 1.5 * ratio * noise_rms * np.sqrt(2)
+    if "sensor_gain" in errors:
+        phases[:, 2] *= 1 + 3 * ratio * noise_rms * np.sqrt(2) / np.sqrt(np.mean(current**2))
+    if "dead_time" in errors:
+        phases -= 8 * ratio * noise_rms * np.sign(phases)
     # At rest the brake holds: friction has no direction there.
     logged = q if quantum is None else np.round(q / quantum) * quantum
     return Simulated(
@@ -213,6 +230,7 @@ def simulate(
         pole_pairs,
         truth,
         columns,
+        phases,
     )
 
 

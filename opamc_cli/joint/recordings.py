@@ -1,0 +1,48 @@
+"""From recordings to a session: motion, cycles, groups, and what is sealed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from opamc_cli.joint.groups import Grouping, cycle_length, group_samples
+from opamc_cli.joint.kinematics import Recording, build_track
+from opamc_cli.joint.track import Joint, Track
+
+SHORTEST_TRAVEL_RAD = 1e-4
+FEWEST_MOVING_SAMPLES = 50
+
+
+def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
+    """Lay recordings on one grid and split them into groups.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        In time order, all at one rate.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+
+    Returns
+    -------
+    track : Track
+        With the cycle's length, if the motion repeats.
+    grouping : Grouping or None
+        None where too little moves to seal anything off.
+    """
+    track = build_track(recordings, joint)
+    lengths = [
+        cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
+    ]
+    known = [length for length in lengths if length is not None]
+    period = round(float(np.median(known))) if known else None
+    track = replace(track, period_samples=period)
+    names = tuple(recording.name for recording in recordings)
+    return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def is_moving(track: Track) -> bool:
+    """Tell whether the joint moves at all."""
+    return (
+        int(np.count_nonzero(track.moving)) >= FEWEST_MOVING_SAMPLES
+        and float(np.ptp(track.position_rad)) >= SHORTEST_TRAVEL_RAD
+    )
