@@ -8,9 +8,10 @@ from numpy.typing import NDArray
 
 from opamc_cli.config.models import SegmentConfig
 from opamc_cli.signal.analytic import analytic_signal, clarke, temporal_fine_structure
-from opamc_cli.signal.motion import motion_frames
+from opamc_cli.signal.motion import MotionBand, motion_frames
 from opamc_cli.signal.noise import noise_level
-from opamc_cli.stages.carrier_segments import MAX_FLOOR_SHARE, frame_step, motion_band
+from opamc_cli.signal.wavelet import Morse
+from opamc_cli.stages.carrier_segments import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
 from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
 from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
 from opamc_cli.stages.report.focus import Focus
@@ -86,18 +87,24 @@ def _one_cycle(rows: Columns) -> Columns:
 def _draw_phases(
     panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
 ) -> str:
-    config = SegmentConfig(**inputs.roles["baseline"].config.get("segment", {}))
+    config = _segment_config(inputs)
     phases = run.channels(axis).phases
     names = phases if len(phases) == 3 else phases[:1]
     read = run.read(names, start, stop)
     current = read[names[0]]
     vector = clarke(*(read[n] for n in names)) if len(names) == 3 else analytic_signal(current)
+    vector = np.nan_to_num(vector)
     rate = run.sampling_rate_hz
-    step = frame_step(rate)
+    band = MotionBand(
+        config.f_min_hz,
+        config.f_max_hz or min(HIGHEST_CARRIER_HZ, CARRIER_SHARE * rate),
+        config.voices_per_octave,
+        Morse(config.gamma, config.beta),
+    )
+    step = int(2 ** max(0, np.floor(np.log2(FRAME_S * rate))))
     loudest_a = float(np.quantile(np.abs(vector), 0.95))
-    floor_a = min(config.noise_floor * noise_level(vector), MAX_FLOOR_SHARE * loudest_a)
-    tfs = temporal_fine_structure(np.nan_to_num(vector), floor_a)
-    frames = motion_frames(tfs, motion_band(rate, config), rate, step, config.engine)
+    tfs = temporal_fine_structure(vector, min(config.noise_floor * noise_level(vector), loudest_a))
+    frames = motion_frames(tfs, band, rate, step, config.engine)
     _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
     panels[0].set_ylabel("current (A)")
     _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")
@@ -110,6 +117,13 @@ def _draw_phases(
         "its fine structure, near 1 while the joint turns. Dashed: what a motion has to reach "
         f"({config.threshold_on:g}) and may not fall below ({config.threshold_off:g})."
     )
+
+
+def _segment_config(inputs: ReportInputs) -> SegmentConfig:
+    recorded = inputs.roles["baseline"].config.get("segment", {})
+    # a table of an older opamc may hold options that are gone
+    known = {name: value for name, value in recorded.items() if name in SegmentConfig.model_fields}
+    return SegmentConfig(**known)
 
 
 def _draw_reported(
