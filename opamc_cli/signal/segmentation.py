@@ -201,16 +201,18 @@ def clear_motion(evidence: Evidence, rule: MotionRule) -> NDArray[np.bool_]:
     return agrees & (evidence.frames.strength >= rule.on)
 
 
-def largest_frequency(ridge_hz: NDArray[np.floating]) -> float:
+def largest_frequency(ridge_hz: NDArray[np.floating], n_lasting: int = 5) -> float:
     """Largest frequency that lasts, of the ridge where the motion is clear.
 
     A single frame may jump to a harmonic or to noise while the current passes zero; the median of
-    five neighbours does not follow it.
+    its neighbours does not follow it.
 
     Parameters
     ----------
     ridge_hz : array, shape (n,)
         Ridge in frames of clear motion, Hz.
+    n_lasting : int
+        Frames over which the median is taken.
 
     Returns
     -------
@@ -219,7 +221,7 @@ def largest_frequency(ridge_hz: NDArray[np.floating]) -> float:
     """
     if not ridge_hz.size:
         return 0.0
-    windows = np.lib.stride_tricks.sliding_window_view(ridge_hz, min(5, ridge_hz.size))
+    windows = np.lib.stride_tricks.sliding_window_view(ridge_hz, min(n_lasting, ridge_hz.size))
     return float(np.median(windows, axis=1).max())
 
 

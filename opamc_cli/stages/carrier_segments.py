@@ -14,7 +14,13 @@ from opamc_cli.signal.motion import MotionBand, MotionStream, join_frames
 from opamc_cli.signal.noise import noise_level
 from opamc_cli.signal.quality import clipped_share
 from opamc_cli.signal.rotation import RotationStream, join_rotation
-from opamc_cli.signal.segmentation import Evidence, Motion, MotionRule, find_motions
+from opamc_cli.signal.segmentation import (
+    Evidence,
+    Motion,
+    MotionRule,
+    find_motions,
+    largest_frequency,
+)
 from opamc_cli.signal.wavelet import Morse
 from opamc_cli.signal.windows import carrier_windows
 from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows
@@ -27,12 +33,15 @@ HIGHEST_CARRIER_HZ = 1000.0
 """No servo motor turns faster: 10 pole pairs at 6000 revolutions per minute."""
 PROBES = 4
 """Row groups, spread over the run, from which noise and clipping are told."""
-MAX_FLOOR_SHARE = 0.3
-"""Of the current's larger amplitudes: a noise floor above that hides the carrier."""
+MAX_FLOOR_SHARE = 1.0
+"""Of the larger moduli: a carrier that never stands still passes for noise in part, and must not
+hide itself."""
 CONTEXT_S = 2.0
 """Standstill beside a motion that is read to place its boundaries."""
 LOST_SHARE = 0.25
 """Of its largest frequency: a carrier that ends faster than that did not end, but was lost."""
+STEADY_S = 0.25
+"""Least time for which a recording that never stands still has to keep its largest frequency."""
 STILL_SHARE = 0.05
 """A recording that stands still for less than this share never stands still."""
 
@@ -79,6 +88,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     """
     names = channels.phases if len(channels.phases) == 3 else channels.phases[:1]
     band = motion_band(run.sampling_rate_hz, config)
+    _check_band(run, band)
     probe = _look(run, names, config)
     evidence, notes = _gather(run, names, band, probe, config)
     rule = MotionRule(
@@ -107,13 +117,6 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
 def motion_band(fs_hz: float, config: SegmentConfig) -> MotionBand:
     """Return the frequencies in which carriers are looked for."""
     highest = config.f_max_hz or min(HIGHEST_CARRIER_HZ, CARRIER_SHARE * fs_hz)
-    if highest > CARRIER_SHARE * fs_hz or highest <= config.f_min_hz:
-        msg = (
-            f"segment.f_max_hz is {highest:g}; it must be above segment.f_min_hz = "
-            f"{config.f_min_hz:g} and at most {CARRIER_SHARE * fs_hz:g} for runs sampled at "
-            f"{fs_hz:g} Hz"
-        )
-        raise InputError(msg)
     return MotionBand(
         config.f_min_hz, highest, config.voices_per_octave, Morse(config.gamma, config.beta)
     )
@@ -238,6 +241,17 @@ def _check_channels(
         raise InputError(msg)
 
 
+def _check_band(run: Run, band: MotionBand) -> None:
+    limit = CARRIER_SHARE * run.sampling_rate_hz
+    if band.f_min_hz < band.f_max_hz <= limit:
+        return
+    msg = (
+        f"{run.path}: segment.f_max_hz is {band.f_max_hz:g}; it must be above segment.f_min_hz = "
+        f"{band.f_min_hz:g} and, at sampling_rate_hz = {run.sampling_rate_hz:g}, at most {limit:g}"
+    )
+    raise InputError(msg)
+
+
 def _check_carrier(
     run: Run, channels: AxisChannels, motions: Sequence[Motion], band: MotionBand
 ) -> None:
@@ -274,7 +288,12 @@ def _windows(run: Run, evidence: Evidence, motion: Motion, config: SegmentConfig
         config.windows,
         config.min_window_samples,
     )
-    return [Segment(a, b, motion.f_max_hz, motion.direction, "window") for a, b in spans]
+    # Without rests there is no lack of frames: only what lasts for a while counts.
+    f_max_hz = largest_frequency(
+        evidence.frames.ridge_hz[inside][clear].astype(np.float64),
+        round(STEADY_S * run.sampling_rate_hz / evidence.frames.step),
+    )
+    return [Segment(a, b, f_max_hz, motion.direction, "window") for a, b in spans]
 
 
 def _refined(
