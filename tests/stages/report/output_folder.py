@@ -34,6 +34,7 @@ class Plan:
     n_cycles: int = 3
     faulty: int | None = 3
     names: tuple[str, str] = ("normal", "fault")
+    signal: str = "phases"
 
 
 def make(out: Path, plan: Plan = Plan(), seed: int = 0) -> Path:
@@ -167,6 +168,10 @@ def _run(rng: np.random.Generator, plan: Plan, *, faulty: bool) -> dict[str, Any
         if faulty and axis == plan.faulty:
             amplitude *= 1 + 0.25 * np.maximum(np.sin(2.02 * angle), 0) ** 3
         amplitude = amplitude + 0.04 * rng.standard_normal(amplitude.size)
+        if plan.signal == "reported":
+            columns[f"axis{axis}_current"] = (np.sign(speed) * amplitude).astype(np.float32)
+            columns[f"axis{axis}_velocity"] = speed / 10
+            continue
         for phase, shift in zip("abc", (0, 1, 2), strict=True):
             current = amplitude * np.cos(angle - 2 * np.pi * shift / 3)
             columns[f"axis{axis}_{phase}"] = (
@@ -185,7 +190,10 @@ def _rows(
     index: int,
 ) -> None:
     for axis in range(1, plan.n_axes + 1):
-        whole = envelope(clarke(*(columns[f"axis{axis}_{p}"] for p in "abc")))
+        if plan.signal == "reported":
+            whole = np.abs(columns[f"axis{axis}_current"])
+        else:
+            whole = envelope(clarke(*(columns[f"axis{axis}_{p}"] for p in "abc")))
         for segment in range(plan.n_cycles * N_MOTIONS):
             cycle, motion = divmod(segment, N_MOTIONS)
             start = PAUSE + segment * (MOVE + PAUSE)
@@ -199,7 +207,7 @@ def _rows(
                 "cycle": cycle,
                 "motion": motion,
                 "f_max_hz": SPEEDS_HZ[motion],
-                "signal": "phases",
+                "signal": plan.signal,
                 "temperature_c": None,
             }
             motions.append(

@@ -222,11 +222,14 @@ def test_a_table_without_a_needed_column_is_named(folder: Path) -> None:
         report.run(folder)
 
 
-def test_one_healthy_axis_alone(tmp_path: Path) -> None:
+def test_one_healthy_axis_alone_with_reported_current(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    output_folder.make(out, Plan(n_axes=1, n_runs=1, n_cycles=2, faulty=None))
+    plan = Plan(n_axes=1, n_runs=1, n_cycles=2, faulty=None, signal="reported")
+    output_folder.make(out, plan)
     text = report.run(out).path.read_text(encoding="utf-8")
+    assert {"motion-signal", "envelopes"} <= _Page(text).figures()
+    assert "speed (rad/s)" in text
     assert "Axis 1 healthy" in _Page(text).words()
     assert 'class="card' not in text
 
