@@ -253,7 +253,9 @@ def _read_json(path: Path) -> Mapping[str, Any]:
         msg = f"{path}: cannot be read as JSON ({error}); make it again or remove it"
         raise InputError(msg) from error
     axes = values.get("axes") if isinstance(values, dict) else None
-    if not isinstance(axes, list) or not all(isinstance(a, dict) and "axis" in a for a in axes):
+    if not isinstance(axes, list) or not all(
+        isinstance(entry, dict) and isinstance(entry.get("axis"), int) for entry in axes
+    ):
         msg = f"{path}: holds no list 'axes' of objects with 'axis'; make it again or remove it"
         raise InputError(msg)
     return dict(values)
@@ -278,11 +280,19 @@ def _sources(out: Path, role: str, moved_to: Sequence[Path]) -> tuple[RunSource,
     return ()
 
 
-def _recorded_config(files: Sequence[SourceFile], role: str) -> Mapping[str, Any]:
+def _recorded_config(files: Sequence[SourceFile], role: str) -> dict[str, Any]:
+    mine = [file.record for file in files if file.name.startswith(f"{role}/") and file.record]
+    return merged_config(mine)
+
+
+def merged_config(records: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the configuration that several tables record each a part of."""
     config: dict[str, Any] = {}
-    for file in files:
-        if file.name.startswith(f"{role}/") and file.record is not None:
-            config.update(file.record.get("config", {}))
+    for record in records:
+        for name, values in (record.get("config") or {}).items():
+            # two stages may each record some options of one section
+            both = isinstance(values, dict) and isinstance(config.get(name), dict)
+            config[name] = {**config[name], **values} if both else values
     return config
 
 

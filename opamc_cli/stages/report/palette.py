@@ -14,7 +14,7 @@ PALETTE = MappingProxyType(
         "muted": ("#56606c", "#a3adb8"),
         "grid": ("#d6dade", "#3a434d"),
         "baseline": ("#0b69a3", "#62b6ee"),
-        "target": ("#c55a11", "#f6a15c"),
+        "target": ("#b65009", "#f6a15c"),
         "healthy": ("#0a7359", "#45c9a0"),
         "changed": ("#8a6100", "#e9bb42"),
         "fault": ("#b0241c", "#ff8b7d"),

@@ -1,0 +1,160 @@
+import math
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from opamc_cli.stages.report import wording
+from opamc_cli.stages.report.columns import extremes, to_columns
+from opamc_cli.stages.report.figure import canvas, style, to_svg
+from opamc_cli.stages.report.inputs import ReportInputs, RoleTables, merged_config
+from opamc_cli.stages.report.onset import find_onset
+from opamc_cli.stages.report.palette import PALETTE, colour
+
+
+@given(st.lists(st.floats(-1e3, 1e3) | st.just(math.nan), max_size=300), st.integers(4, 60))
+def test_a_thinned_trace_keeps_its_extremes(values: list[float], most: int) -> None:
+    y = np.array(values)
+    x = np.arange(y.size, dtype=float)
+    kept_x, kept_y = extremes(x, y, most)
+    assert kept_x.size <= most or kept_x.size == y.size <= most
+    assert (np.diff(kept_x) > 0).all()
+    np.testing.assert_array_equal(kept_y, y[kept_x.astype(int)])
+    if np.isfinite(y).any():
+        assert np.nanmin(kept_y) == np.nanmin(y)
+        assert np.nanmax(kept_y) == np.nanmax(y)
+
+
+def test_null_numbers_become_nan() -> None:
+    table = pa.table({"n": pa.array([1, None]), "x": pa.array([None, None])})
+    columns = to_columns(table)
+    np.testing.assert_array_equal(columns["n"], [1.0, np.nan])
+    np.testing.assert_array_equal(columns["x"], [np.nan, np.nan])
+
+
+@pytest.mark.parametrize(
+    ("axes", "phrase"),
+    [
+        ([3], "axis 3"),
+        ([2, 1], "axes 1 and 2"),
+        ([1, 2, 3], "axes 1-3"),
+        ([1, 2, 5], "axes 1, 2 and 5"),
+        ([], "no axis"),
+    ],
+)
+def test_axes_in_words(axes: list[int], phrase: str) -> None:
+    assert wording.axes_phrase(axes) == phrase
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0"),
+        (-0.00012345, "−0.000123"),
+        (1.2e-7, "1.2e−7"),
+        (123456.0, "1.23e5"),
+        (None, "–"),
+        (math.nan, "–"),
+        (True, "–"),
+    ],
+)
+def test_numbers_in_few_digits(value: object, text: str) -> None:
+    assert wording.number(value) == text
+
+
+def test_the_headline_tells_the_worst_first() -> None:
+    states = {1: "healthy", 2: "changed", 3: "fault", 4: "healthy", 5: "fault"}
+    verdict = {"axes": [{"axis": axis, "state": state} for axis, state in states.items()]}
+    assert (
+        wording.headline(verdict)
+        == "Axes 3 and 5 at fault; axis 2 changed; the other 2 axes healthy"
+    )
+    assert wording.headline({"axes": []}) == "No axis was judged"
+
+
+def test_a_cause_names_effect_order_meaning_and_share() -> None:
+    cause = {
+        "effect": "ripple",
+        "parameters": {"speed": 1.0, "order": 2.02, "load": 0.0},
+        "interpretation": "flexspline tooth damage",
+        "share": 0.834,
+    }
+    assert wording.cause_phrase(cause) == (
+        "ripple (order 2.02, varies with speed): flexspline tooth damage; "
+        "explains 83 % of the change"
+    )
+    assert wording.cause_phrase(None) == "–"
+
+
+def test_moments_are_utc_and_nonsense_is_left_alone() -> None:
+    assert wording.moment("2026-03-01T08:30:00+02:00") == "2026-03-01 06:30 UTC"
+    assert wording.moment("yesterday") == "yesterday"
+
+
+def test_config_of_two_stages_is_merged_by_section() -> None:
+    records = [
+        {"config": {"identify": {"a": 1}, "patterns": {"envelope": "auto"}}},
+        {"config": {"patterns": {"gamma": 2.0}}},
+        {},
+    ]
+    assert merged_config(records) == {
+        "identify": {"a": 1},
+        "patterns": {"envelope": "auto", "gamma": 2.0},
+    }
+
+
+def _scores(rows: list[tuple[str, str, int, int, float]]) -> ReportInputs:
+    names = ("role", "run", "cycle", "motion", "jsd")
+    columns = {name: np.array([row[i] for row in rows]) for i, name in enumerate(names)}
+    columns |= {"axis": np.ones(len(rows), int), "order": np.full(len(rows), 5)}
+    empty = RoleTables(motions=None, patterns=None, sources=(), config={})
+    return ReportInputs(columns, {}, None, {"baseline": empty, "target": empty}, None, None, None)
+
+
+def test_onset_compares_each_motion_with_its_own_baseline() -> None:
+    baseline = [("baseline", "n", 0, 0, 0.1), ("baseline", "n", 0, 1, 0.5)]
+    target = [
+        ("target", "b", 0, 0, 0.05),
+        ("target", "b", 0, 1, 0.4),
+        ("target", "b", 1, 0, 0.2),
+        ("target", "b", 2, 1, 0.6),
+        ("target", "b", 3, 2, 9.9),  # a motion that the baseline lacks tells nothing
+    ]
+    onset = find_onset(_scores(baseline + target), 1, 5)
+    assert (onset.n_above, onset.n_target) == (2, 5)
+    assert (onset.first_run, onset.first_cycle) == ("b", 1)
+    quiet = find_onset(_scores(baseline + target[:2]), 1, 5)
+    assert (quiet.n_above, quiet.first_run) == (0, None)
+
+
+def test_figures_take_their_colours_from_the_page() -> None:
+    with style():
+        drawing = canvas(2.0)
+        panel = drawing.add_subplot()
+        panel.plot([0, 1], [0, 1], color=colour("target"), label="3.14159 $x$ <b>")
+        panel.legend()
+        svg = to_svg(drawing, "name")
+    assert "var(--target)" in svg
+    assert not any(light in svg for light, _ in PALETTE.values())
+    assert "3.14159 $x$ &lt;b&gt;" in svg  # text keeps its digits, coordinates do not
+    assert "http" not in svg
+
+
+def test_colours_differ_and_are_read_on_their_page() -> None:
+    for page, index in (("light", 0), ("dark", 1)):
+        paper = _luminance(PALETTE["paper"][index])
+        for role in ("ink", "muted", "baseline", "target", "healthy", "changed", "fault"):
+            mine = _luminance(PALETTE[role][index])
+            contrast = (max(mine, paper) + 0.05) / (min(mine, paper) + 0.05)
+            assert contrast >= 4.5, (page, role, contrast)
+    # one colour stands for one role, or the page could not tell which one to put in
+    assert len({light for light, _ in PALETTE.values()}) == len(PALETTE)
+
+
+def _luminance(hexadecimal: str) -> float:
+    """Relative luminance of WCAG 2.1."""
+    parts = [int(hexadecimal[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return float(np.dot([0.2126, 0.7152, 0.0722], linear))
