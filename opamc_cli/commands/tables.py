@@ -166,7 +166,7 @@ def _indented(text: str) -> "Padding":
     from rich.padding import Padding
     from rich.text import Text
 
-    return Padding(Text(printable(text)), (0, 0, 0, 2))
+    return Padding(Text(printable(text)), (0, 0, 0, 2), expand=False)
 
 
 def _state(state: str) -> "Text":

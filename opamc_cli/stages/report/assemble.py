@@ -97,11 +97,16 @@ def run(
     InputError
         If scores or features are missing, or any file is damaged.
     """
-    inputs = read_inputs(out, {"baseline": baseline, "target": target})
+    inputs = read_inputs(out, {"baseline": _folders(baseline), "target": _folders(target)})
     page, omitted = render(inputs, title)
     path = out / FILE_NAME
     write_text(path, page)
     return ReportOutcome(path, inputs, omitted)
+
+
+def _folders(paths: Sequence[Path]) -> list[Path]:
+    """Return where runs are to be looked for: a file stands for its folder."""
+    return [path if path.is_dir() else path.parent for path in paths]
 
 
 def render(inputs: ReportInputs, title: str) -> tuple[str, tuple[str, ...]]:

@@ -192,7 +192,9 @@ def test_runs_that_were_moved_are_found_again(folder: Path) -> None:
     (folder.parent / "baseline").rename(folder.parent / "old")
     reasons = " ".join(report.run(folder).omitted)
     assert "the samples of run normal-0 are not there" in reasons
-    assert report.run(folder, baseline=[folder.parent / "old"]).omitted == ()
+    moved = folder.parent / "old"
+    assert report.run(folder, baseline=[moved]).omitted == ()
+    assert report.run(folder, baseline=[moved / "run0.parquet"]).omitted == ()
 
 
 @pytest.mark.parametrize("name", ["scores.parquet", "features.parquet"])
