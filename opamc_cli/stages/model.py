@@ -29,8 +29,9 @@ from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.spectra import order_spectrum
 from opamc_cli.joint.trace import Candidate
 from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.stages.declared_terms import declared_term
 from opamc_cli.storage.atomic import atomic_path, ensure_directory
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs import Array, Run
 from opamc_cli.storage.tables import write_table
 
 FIT_NAME = "fit.parquet"
@@ -191,6 +192,8 @@ def read_recording(run: Run, axis: int) -> Recording:
         phases = np.stack(
             [np.asarray(samples[name], dtype=np.float64) for name in channels.phases], axis=1
         )
+    for channel, values in samples.items():
+        _check_channel(run, channel, values)
     return Recording(
         name=run.name,
         rate_hz=run.sampling_rate_hz,
@@ -201,6 +204,20 @@ def read_recording(run: Run, axis: int) -> Recording:
         temperature_c=arrays["temperature"],
         started_s=_seconds(run),
     )
+
+
+def _check_channel(run: Run, name: str, values: Array) -> None:
+    known = np.isfinite(values)
+    if not known.any():
+        msg = f"{run.path}: column {name} holds no number; check the sensor or leave the column out"
+        raise InputError(msg)
+    is_current = not name.endswith(("position", "velocity", "temperature"))
+    if is_current and np.ptp(values[known]) == 0:
+        msg = (
+            f"{run.path}: column {name} is constant at {float(values[known][0]):g} A in all "
+            f"{len(values)} samples; check the sensor"
+        )
+        raise InputError(msg)
 
 
 def _seconds(run: Run) -> float | None:
@@ -276,12 +293,10 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
 
 def fitted(laid: AxisModel) -> Fit:
     """Fit the declared model; parameters that were not given are searched."""
+    track = laid.session.coarse.track
     return declared_fit(
         laid.session,
-        tuple(
-            (effect, Term(effect, entry.parameters, entry.columns) if entry.parameters else None)
-            for effect, entry in laid.declared
-        ),
+        tuple((effect, declared_term(effect, entry, track)) for effect, entry in laid.declared),
     )
 
 

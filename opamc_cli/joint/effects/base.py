@@ -34,6 +34,8 @@ class Effect:
     """True where a joint can have the effect more than once (several ripple orders)."""
     static: ClassVar[bool] = True
     """True where the effect takes part in the load or friction that other effects scale."""
+    forms: ClassVar[tuple[str, ...]] = ()
+    """Parameters that switch regressors on (not 0); never searched, off where not declared."""
     carries_load: ClassVar[bool] = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
 

@@ -20,6 +20,7 @@ class Ripple(Effect):
     needs = ("position",)
     fast = True
     several = True
+    forms = FORMS
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest order of the whitened residual, with every dependence."""

@@ -1,0 +1,44 @@
+"""Effects as a user declares them in model.yaml, made ready for the fit."""
+
+import difflib
+
+import numpy as np
+
+from opamc_cli.config.joint_model import DeclaredEffect
+from opamc_cli.errors import ConfigError
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.track import Track
+
+
+def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Term | None:
+    """Return the term of a declared effect, or None where its parameters are to be found.
+
+    Parameters that were not declared take the effect's first guess; forms are off.
+
+    Raises
+    ------
+    ConfigError
+        If a parameter is unknown, or one that the data would decide is missing beside others.
+    """
+    given = declared.parameters
+    if not given:
+        return None
+    searched = effect.limits(track)
+    guesses = effect.guesses(track, np.zeros(track.size))
+    defaults = {**(guesses[0] if guesses else {}), **dict.fromkeys(effect.forms, 0.0)}
+    known = sorted({*searched, *defaults})
+    for name in given:
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+            hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+            msg = f"Effect {effect.name!r} in the model has no parameter {name!r}; {hint}"
+            raise ConfigError(msg)
+    for name in searched:
+        if name not in given:
+            msg = (
+                f"Effect {effect.name!r} in the model is declared without {name!r}; give it too, "
+                "or leave out all its parameters to have them found"
+            )
+            raise ConfigError(msg)
+    return Term(effect, {**defaults, **given}, declared.columns)
