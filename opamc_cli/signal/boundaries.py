@@ -87,6 +87,17 @@ def _departure(
     return _last_stay(~away, coarse, fs_hz)
 
 
+def _weighted_line(
+    t: NDArray[np.int_], y: NDArray[np.floating], weight: NDArray[np.floating]
+) -> tuple[float, float]:
+    """Slope and intercept of the line through (t, y) of least weighted squares."""
+    w = weight * weight
+    w = w / w.sum()
+    t_mean, y_mean = float(w @ t), float(w @ y)
+    slope = float(w @ ((t - t_mean) * (y - y_mean))) / float(w @ (t - t_mean) ** 2)
+    return slope, y_mean - slope * t_mean
+
+
 def _last_stay(at_rest: NDArray[np.bool_], coarse: int, fs_hz: float) -> int:
     """End of the last standstill before `coarse`.
 
@@ -161,7 +172,7 @@ def _extrapolate(
     w = weight[t_least:t_clear]
     best = (np.inf, float(t_least))
     for power in (2, 3):
-        slope, intercept = np.polyfit(t, y ** (1 / power), 1, w=w)
+        slope, intercept = _weighted_line(t, y ** (1 / power), w)
         if slope <= 0:
             continue
         zero = -intercept / slope

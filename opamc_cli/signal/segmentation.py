@@ -125,11 +125,14 @@ def hysteresis(strength: NDArray[np.floating], on: float, off: float) -> list[tu
     """
     above = np.concatenate([[False], strength >= off, [False]])
     edges = np.flatnonzero(above[1:] != above[:-1])
-    return [
-        (int(a), int(b))
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-        if strength[a:b].max() >= on
-    ]
+    first, last = edges[::2], edges[1::2]
+    if not first.size:
+        return []
+    # Noise makes lobes by the hundred thousand: their maxima are taken in one call. Between two
+    # lobes the strength is below `off` or NaN, so that it may count with the lobe before it.
+    highest = np.fmax.reduceat(strength, first)
+    chosen = highest >= on
+    return list(zip(first[chosen].tolist(), last[chosen].tolist(), strict=True))
 
 
 def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:

@@ -23,7 +23,13 @@ from opamc_cli.signal.segmentation import (
 )
 from opamc_cli.signal.wavelet import Morse
 from opamc_cli.signal.windows import carrier_windows
-from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows
+from opamc_cli.stages.segment_rows import (
+    AxisSegments,
+    Segment,
+    make_rows,
+    mean_variance,
+    read_variance,
+)
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, AxisChannels, Run
 
 FRAME_S = 0.008
@@ -101,14 +107,14 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     motions = find_motions(evidence, rule)
     _check_carrier(run, channels, motions, band)
     if _never_stands(motions, evidence):
-        segments = _windows(run, evidence, motions[0], config)
+        segments = _windows(run, names, evidence, motions[0], config)
     else:
         segments = _refined(run, names, motions, evidence)
     signal = "phases" if len(names) == 3 else "phase"
     strongest = float(evidence.frames.strength.max(initial=0))
     return AxisSegments(
         run.name,
-        make_rows(run, channels, segments, names, signal),
+        make_rows(run, channels, segments, signal),
         probe.notes + notes,
         f"axis {channels.axis}: S(t) reaches {strongest:.2f}, {config.threshold_on:g} is motion",
     )
@@ -276,7 +282,9 @@ def _never_stands(motions: Sequence[Motion], evidence: Evidence) -> bool:
     return n_moving >= (1 - STILL_SHARE) * evidence.frames.strength.size
 
 
-def _windows(run: Run, evidence: Evidence, motion: Motion, config: SegmentConfig) -> list[Segment]:
+def _windows(
+    run: Run, names: Sequence[str], evidence: Evidence, motion: Motion, config: SegmentConfig
+) -> list[Segment]:
     inside = slice(motion.first, motion.last)
     clear = evidence.frames.strength[inside] >= config.threshold_on
     carrier_hz = float(np.median(evidence.frames.ridge_hz[inside][clear]))
@@ -293,7 +301,10 @@ def _windows(run: Run, evidence: Evidence, motion: Motion, config: SegmentConfig
         evidence.frames.ridge_hz[inside][clear].astype(np.float64),
         round(STEADY_S * run.sampling_rate_hz / evidence.frames.step),
     )
-    return [Segment(a, b, f_max_hz, motion.direction, "window") for a, b in spans]
+    return [
+        Segment(a, b, f_max_hz, motion.direction, read_variance(run, names, a, b), kind="window")
+        for a, b in spans
+    ]
 
 
 def _refined(
@@ -321,6 +332,12 @@ def _refined(
             motion.n_to_f_last * step if lost_at_speed else None,
         )
         segments.append(
-            Segment(first + refined[0], first + refined[1], motion.f_max_hz, motion.direction)
+            Segment(
+                first + refined[0],
+                first + refined[1],
+                motion.f_max_hz,
+                motion.direction,
+                mean_variance([block[name][slice(*refined)] for name in names]),
+            )
         )
     return segments

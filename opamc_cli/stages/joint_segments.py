@@ -13,7 +13,7 @@ from opamc_cli.signal.reported import (
     velocity_from_position,
 )
 from opamc_cli.signal.windows import carrier_windows
-from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows
+from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows, mean_variance
 from opamc_cli.storage.runs import AxisChannels, Run
 
 STILL_SHARE = 0.05
@@ -74,10 +74,10 @@ def joint_segments(
         notes.append(
             f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
         )
-    segments = _segments(run, motions, config, joint)
+    segments = _segments(run, current, motions, config, joint)
     return AxisSegments(
         run.name,
-        make_rows(run, channels, segments, [name], "reported"),
+        make_rows(run, channels, segments, "reported"),
         tuple(notes),
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
         f"{config.min_speed_rad_s:g} is motion",
@@ -85,7 +85,11 @@ def joint_segments(
 
 
 def _segments(
-    run: Run, motions: list[JointMotion], config: SegmentConfig, joint: JointConfig
+    run: Run,
+    current: npt.NDArray[np.floating],
+    motions: list[JointMotion],
+    config: SegmentConfig,
+    joint: JointConfig,
 ) -> list[Segment]:
     def frequency(motion: JointMotion) -> float:
         return motor_frequency(motion.speed_rad_s, joint.gear_ratio, joint.pole_pairs)
@@ -95,7 +99,16 @@ def _segments(
         and motions[0].stop - motions[0].start >= (1 - STILL_SHARE) * run.n_samples
     )
     if not never_stands:
-        return [Segment(m.start, m.stop, frequency(m), m.direction) for m in motions]
+        return [
+            Segment(
+                m.start,
+                m.stop,
+                frequency(m),
+                m.direction,
+                mean_variance([current[m.start : m.stop]]),
+            )
+            for m in motions
+        ]
     only = motions[0]
     # Whole revolutions of the motor where they are known and fit; else equal parts.
     carriers = (frequency(only), run.sampling_rate_hz)
@@ -110,7 +123,10 @@ def _segments(
         )
         if spans:
             break
-    return [Segment(a, b, frequency(only), only.direction, "window") for a, b in spans]
+    return [
+        Segment(a, b, frequency(only), only.direction, mean_variance([current[a:b]]), kind="window")
+        for a, b in spans
+    ]
 
 
 def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:

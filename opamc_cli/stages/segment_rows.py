@@ -21,6 +21,7 @@ class Segment:
     stop: int
     f_max_hz: float
     direction: int
+    variance: float
     kind: str = "motion"
 
 
@@ -50,10 +51,9 @@ def make_rows(
     run: Run,
     channels: AxisChannels,
     segments: Sequence[Segment],
-    currents: Sequence[str],
     signal: str,
 ) -> tuple[dict[str, Any], ...]:
-    """Complete segments to rows: variance of the current, temperature, edges."""
+    """Complete segments to rows: temperature, edges, and what they have in common."""
     return tuple(
         {
             "run": run.name,
@@ -64,7 +64,7 @@ def make_rows(
             "sampling_rate_hz": run.sampling_rate_hz,
             "f_max_hz": segment.f_max_hz,
             "direction": segment.direction,
-            "variance": variance(run, currents, segment.start, segment.stop),
+            "variance": segment.variance,
             "edge": segment.kind == "motion" and _touches_edge(run, segment),
             "kind": segment.kind,
             "signal": signal,
@@ -74,18 +74,33 @@ def make_rows(
     )
 
 
-def variance(run: Run, names: Sequence[str], start: int, stop: int) -> float:
-    """Variance of a current over an interval, averaged over its phases; equation (3-2)."""
-    n = np.zeros(len(names))
-    first = np.zeros(len(names))
-    second = np.zeros(len(names))
+def read_variance(run: Run, names: Sequence[str], start: int, stop: int) -> float:
+    """Variance of a current over an interval of any length; see `mean_variance`."""
+    moments = np.zeros((3, len(names)))
     for block in read_in_pieces(run, names, start, stop):
-        for i, name in enumerate(names):
-            x = block[name][np.isfinite(block[name])].astype(np.float64)
-            n[i] += x.size
-            first[i] += x.sum()
-            second[i] += x @ x
-    n = np.maximum(n, 1)
+        moments += _moments([block[name] for name in names])
+    return _variance_of(moments)
+
+
+def mean_variance(currents: Sequence[npt.NDArray[np.floating]]) -> float:
+    """Variance of a current, averaged over its phases; equation (3-2). NaN is passed over."""
+    return _variance_of(_moments(currents))
+
+
+def _moments(currents: Sequence[npt.NDArray[np.floating]]) -> npt.NDArray[np.float64]:
+    moments = np.zeros((3, len(currents)))
+    for i, current in enumerate(currents):
+        x = current.astype(np.float64)
+        total = float(x.sum())
+        if not np.isfinite(total):
+            x = x[np.isfinite(x)]
+            total = float(x.sum())
+        moments[:, i] = x.size, total, x @ x
+    return moments
+
+
+def _variance_of(moments: npt.NDArray[np.float64]) -> float:
+    n, first, second = np.maximum(moments[0], 1), moments[1], moments[2]
     return float(np.mean(np.maximum(second / n - (first / n) ** 2, 0)))
 
 
