@@ -18,6 +18,9 @@ WIDTH_IN = 9.6
 MAX_TRACE_POINTS = 1600
 """Points of one trace: two for each pixel of a column of 800."""
 
+MAX_NAME = 36
+"""Signs of a run's name in a figure."""
+
 STYLE: dict[str, Any] = {
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
@@ -133,6 +136,11 @@ def to_png(drawing: Canvas, dots_per_inch: int = 120) -> bytes:
         metadata={"Software": None},
     )
     return buffer.getvalue()
+
+
+def short(name: str) -> str:
+    """Return the end of a long name, which is what tells runs of one folder apart."""
+    return name if len(name) <= MAX_NAME else "…" + name[1 - MAX_NAME :]
 
 
 def grid_shape(n_panels: int, columns: int = 3) -> tuple[int, int]:

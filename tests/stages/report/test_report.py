@@ -158,7 +158,7 @@ def test_provenance_holds_every_input(made: Path, page: str) -> None:
 def test_names_from_files_stay_text(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
-    evil = '<script>alert("x")</script>$x_1$&機械'
+    evil = '<script>alert("x")</script>$x_1$&機械' + "x" * 200
     output_folder.make(out, Plan(names=("normal", evil)))
     verdict = json.loads((out / "verdict.json").read_text())
     verdict["axes"][2]["reasons"] = ["<img src=x onerror=alert(1)>"]
@@ -234,6 +234,17 @@ def test_one_healthy_axis_alone_with_reported_current(tmp_path: Path) -> None:
     assert "speed (rad/s)" in text
     assert "Axis 1 healthy" in _Page(text).words()
     assert 'class="card' not in text
+
+
+def test_a_trained_discriminant_takes_the_place_of_the_health_index(folder: Path) -> None:
+    path = folder / "features.parquet"
+    table = pq.read_table(path)
+    place = table.column_names.index("lda")
+    values = pa.array([float(axis) - 2.5 for axis in table["axis"].to_pylist()])
+    pq.write_table(table.set_column(place, "lda", values), path)
+    words = _Page(report.run(folder).path.read_text(encoding="utf-8")).words()
+    assert "Latent axis The three features projected" in words
+    assert "discriminant (unit: within-class standard deviations)" in words
 
 
 def test_an_axis_without_scores_is_named_all_the_same(folder: Path) -> None:

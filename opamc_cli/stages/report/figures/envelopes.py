@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.stages.envelope import read_envelope
 from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
-from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
+from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, short, style
 from opamc_cli.stages.report.focus import Focus, axis_scores
 from opamc_cli.stages.report.inputs import ROLES, NothingToDrawError, ReportInputs
 from opamc_cli.stages.report.palette import colour
@@ -95,7 +95,7 @@ def _trace(
     if values.size < 2:
         msg = f"the segment of motion {motion} on axis {axis} is empty"
         raise NothingToDrawError(msg)
-    return time, values, f"{name}, cycle {int(rows['cycle'][row])}"
+    return time, values, f"{short(name)}, cycle {int(rows['cycle'][row])}"
 
 
 def _median_row(rows: Columns, scores: dict[str, Any]) -> int:

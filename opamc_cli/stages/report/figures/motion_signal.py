@@ -13,7 +13,7 @@ from opamc_cli.signal.noise import noise_level
 from opamc_cli.signal.wavelet import Morse
 from opamc_cli.stages.carrier_segments import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
 from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
-from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
+from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, short, style
 from opamc_cli.stages.report.focus import Focus
 from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
 from opamc_cli.stages.report.palette import colour
@@ -51,7 +51,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
                 _shade(panel, rows, run.sampling_rate_hz)
                 panel.margins(x=0.0)
             _number(panels[0], rows, run.sampling_rate_hz)
-            panels[1].set_xlabel(f"time in run {name} (s)")
+            panels[1].set_xlabel(f"time in run {short(name)} (s)")
             return finish(
                 drawing,
                 "motion-signal",
