@@ -58,7 +58,7 @@ def diagnose(
             out,
             models=latent.read_models(model) if model else None,
             jobs=jobs,
-            progress=output.note,
+            progress=output.progress,
         )
     for note in outcome.notes:
         output.note(note)
@@ -70,6 +70,7 @@ def diagnose(
         },
         verdict_table(outcome.verdict),
         f"report: {outcome.report_path}",
+        urgent=outcome.exit_code is ExitCode.UNHEALTHY,
     )
     failed = output.failures([str(error) for error in outcome.errors], outcome.n_runs)
     if outcome.exit_code is ExitCode.UNHEALTHY:

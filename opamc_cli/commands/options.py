@@ -24,7 +24,7 @@ Json = Annotated[
     bool,
     typer.Option("--json", help="Machine-readable result on stdout, all else on stderr."),
 ]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")]
+Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing unless something is wrong.")]
 ExitZero = Annotated[
     bool, typer.Option("--exit-zero", help="Exit 0 where the verdict alone would make it 1.")
 ]

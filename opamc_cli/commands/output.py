@@ -36,17 +36,33 @@ class Output:
         """Print why one of several runs could not be used."""
         print(f"opamc: {text}", file=sys.stderr)
 
-    def result(self, values: Mapping[str, Any], *shown: "RenderableType") -> None:
-        """Print the result: `values` as JSON, or `shown` for people."""
+    def progress(self, text: str) -> None:
+        """Print which step begins, to a terminal only: cron mails whatever else it gets."""
+        if sys.stderr.isatty():
+            self.note(f"{text} ...")
+
+    def result(
+        self, values: Mapping[str, Any], *shown: "RenderableType", urgent: bool = False
+    ) -> None:
+        """Print the result: `values` as JSON, or `shown` for people.
+
+        An urgent result, such as a joint at fault, is printed even if quiet.
+        """
         if self.as_json:
             print(json.dumps(values, indent=2, sort_keys=True, allow_nan=False))
-        elif not self.quiet:
+        elif urgent or not self.quiet:
             from rich.console import Console
 
-            # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched
-            console = Console(width=None if sys.stdout.isatty() else 120)
+            # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched;
+            # brackets in a path are brackets, not markup
+            console = Console(
+                width=None if sys.stdout.isatty() else 120,
+                markup=False,
+                emoji=False,
+                highlight=False,
+            )
             for item in shown:
-                console.print(item)
+                console.print(item, soft_wrap=isinstance(item, str))
 
     def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
         """Print the runs that failed and return the exit code that they make."""
