@@ -217,3 +217,21 @@ def current_alone(path: Path) -> Path:
     """Write reported current without position or velocity: nothing tells motion."""
     save_run(path, INFO, {"axis1_current": phases()["axis1_a"]})
     return path
+
+
+def moving_joint(path: Path, change: object = None, n: int = 9000) -> Path:
+    """Write what a drive reports of a joint that swings, with `change` done to its columns."""
+    rng = np.random.default_rng(0)
+    t_s = np.arange(n) / RATE_HZ
+    angle = np.sin(2 * np.pi * t_s / 3)
+    speed = np.gradient(angle, 1 / RATE_HZ)
+    current = 0.5 * np.sign(speed) + 0.3 * speed + 0.4 * np.sin(angle) + 0.02 * rng.normal(size=n)
+    columns = {
+        "axis1_current": current.astype(np.float32),
+        "axis1_position": angle,
+        "axis1_velocity": speed.astype(np.float32),
+    }
+    if change is not None:
+        change(columns)  # type: ignore[operator]
+    save_run(path, INFO, columns)
+    return path

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bad_runs
+import numpy as np
 import pytest
 
 from opamc_cli.app import main
@@ -140,18 +141,23 @@ def commands_with_output(tmp_path: Path) -> dict[str, list[object]]:
         "diagnose": ["--baseline", run, "--target", run],
         "sweep": ["--baseline", run],
         "simulate": ["--config", ROOT / "configs" / "testbed.yaml"],
+        "model fit": [run, "--model", ROOT / "configs" / "model.yaml"],
+        "model close": [run, "--model", ROOT / "configs" / "model.yaml"],
     }
 
 
 @pytest.mark.parametrize(
     "command",
-    ["ingest", "segment", "identify", "patterns", "score", "diagnose", "sweep", "simulate"],
+    [
+        *("ingest", "segment", "identify", "patterns", "score", "diagnose", "sweep", "simulate"),
+        *("model fit", "model close"),
+    ],
 )
 @pytest.mark.parametrize("which", range(3))
 def test_unwritable_outputs(opamc, tmp_path, command, which):
     out = unusable_outputs(tmp_path)[which]
     arguments = commands_with_output(tmp_path)[command]
-    ended = opamc(command, *arguments, "--out", out)
+    ended = opamc(*command.split(), *arguments, "--out", out)
     check_refusal(ended, ExitCode.USAGE, str(out), "--out")
     assert (tmp_path / "a-file").read_text() == "mine"
 
@@ -435,6 +441,102 @@ def test_runs_that_changed_or_went_after_their_segments_were_found(opamc, tmp_pa
 def test_sweeps(opamc, tmp_path, pair, arguments, part):
     ended = opamc("sweep", "--baseline", pair[0], *arguments, "--out", tmp_path / "out")
     check_refusal(ended, ExitCode.USAGE, part)
+
+
+# -- a joint's model -------------------------------------------------------------------------
+
+
+@pytest.fixture
+def model(tmp_path) -> Path:
+    path = tmp_path / "model.yaml"
+    path.write_text("effects: [gravity, coulomb, viscous]\n")
+    return path
+
+
+def in_column(name: str, value: float) -> Callable[[dict[str, np.ndarray]], None]:
+    def change(columns: dict[str, np.ndarray]) -> None:
+        columns[name][:] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "parts"),
+    [
+        (in_column("axis1_current", np.nan), ExitCode.BAD_INPUT, ["axis1_current", "no number"]),
+        (in_column("axis1_current", np.inf), ExitCode.BAD_INPUT, ["axis1_current", "no number"]),
+        (in_column("axis1_current", 1.5), ExitCode.BAD_INPUT, ["axis1_current", "at 1.5 A"]),
+        (in_column("axis1_position", np.nan), ExitCode.BAD_INPUT, ["axis1_position"]),
+        (
+            lambda c: (c.pop("axis1_velocity"), c.pop("axis1_position")),
+            ExitCode.BAD_INPUT,
+            ["axis1_position", "log one of them"],
+        ),
+        (
+            lambda c: (c.pop("axis1_velocity"), in_column("axis1_position", 0.1)(c)),
+            ExitCode.NOT_ENOUGH_DATA,
+            ["axis 1 does not move"],
+        ),
+    ],
+)
+@pytest.mark.parametrize("command", ["fit", "trace", "close"])
+def test_models_of_unusable_runs(opamc, tmp_path, model, command, change, code, parts):
+    file = bad_runs.moving_joint(tmp_path / "bad.parquet", change)
+    ended = opamc("model", command, file, "--model", model, "--out", tmp_path / "out")
+    check_refusal(ended, code, str(file), *parts)
+    assert not [p for p in (tmp_path / "out").rglob("*") if p.suffix in (".json", ".parquet")]
+
+
+def test_models_of_too_little(opamc, tmp_path, model):
+    file = bad_runs.moving_joint(tmp_path / "bad.parquet", n=50)
+    ended = opamc("model", "fit", file, "--model", model, "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, str(file), "50 samples")
+    file = bad_runs.moving_joint(tmp_path / "bad.parquet", n=900)
+    ended = opamc("model", "close", file, "--model", model, "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, str(file))
+
+
+def test_models_of_an_axis_that_is_not_there(opamc, tmp_path, model):
+    file = bad_runs.moving_joint(tmp_path / "r.parquet")
+    ended = opamc("model", "fit", file, "--model", model, "--axis", 9, "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.BAD_INPUT, str(file), "axis 9", "the run has axes 1")
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("effects: [gravty]", "did you mean gravity"),
+        ("effects: 5", "effects is 5"),
+        ("joint: {gear_ration: 100}", "did you mean 'gear_ratio'"),
+        ("joint: {gear_ratio: -1}", "joint.gear_ratio is -1"),
+        ("effects: [{effect: ripple, parameters: {ordr: 2}}]", "did you mean 'order'"),
+        ("effects: [{effect: ripple, parameters: {speed: 1}}]", "declared without 'order'"),
+        ("effects: [{effect: stribeck, parameters: {exponent: 1}}]", "without 'stribeck_speed'"),
+        ("effects: [thermal_viscous]", "no temperature channel"),
+        ("library: [none.py]", "none.py"),
+        ("library: [model.yaml]", "model.yaml"),
+        ("without: [nothing]", "'nothing'"),
+        ("- 1", "holds a list"),
+    ],
+)
+def test_unusable_models(opamc, tmp_path, text, part):
+    file = bad_runs.moving_joint(tmp_path / "r.parquet")
+    model = tmp_path / "model.yaml"
+    model.write_text(text)
+    ended = opamc("model", "fit", file, "--model", model, "--out", tmp_path / "out")
+    assert ended.code == ExitCode.USAGE, ended
+    assert len(ended.sentences) == 1
+    assert part in ended.sentences[0]
+
+
+def test_a_ripple_is_declared_by_its_order(opamc, tmp_path):
+    file = bad_runs.moving_joint(tmp_path / "r.parquet")
+    model = tmp_path / "model.yaml"
+    model.write_text("effects: [coulomb, {effect: ripple, parameters: {order: 2.0}}]")
+    ended = opamc("model", "fit", file, "--model", model, "--out", tmp_path / "out", "--json")
+    assert ended.code == ExitCode.DONE
+    _, ripple = json.loads(ended.out)["axes"][0]["terms"]
+    assert len(ripple["coefficients"]) == 2
 
 
 # -- the lock --------------------------------------------------------------------------------
