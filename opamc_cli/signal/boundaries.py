@@ -135,18 +135,20 @@ def _onset(
         limit = max(4 * noise, REST_SHARE * amplitude_a)
         at_rest = np.abs(smooth - np.mean(rest)) < limit
         return _last_stay(at_rest, coarse, fs_hz)
-    turned = _turn_since(smooth, reference, noise)
+    weak = max(2.5 * noise, REST_SHARE * amplitude_a)
+    turned = _turn_since(smooth, reference, weak)
     least = max(LEAST_TURN_RAD, 4 * noise / float(np.sqrt(abs(reference))))
     return _extrapolate(turned, np.abs(smooth), least, coarse)
 
 
 def _turn_since(
-    smooth: NDArray[np.inexact], reference: complex, noise: float
+    smooth: NDArray[np.inexact], reference: complex, weak: float
 ) -> NDArray[np.float64]:
     """Angle turned since standstill, rad, from the squared vector; positive on the whole."""
     doubled = np.angle(smooth * smooth * np.conj(reference))
-    # While the torque passes zero the vector has no angle: it is bridged.
-    known = np.flatnonzero(np.abs(smooth) > 2.5 * noise)
+    # While the torque passes zero the vector has the angle of what is left, noise and the
+    # sensors' offset: it is bridged.
+    known = np.flatnonzero(np.abs(smooth) > weak)
     if known.size < 2:
         return np.zeros(smooth.size)
     followed = np.unwrap(doubled[known]) / 2
