@@ -125,6 +125,11 @@ class PatternsConfig(Section):
         description="Where the envelope comes from: Clarke vector of three phases, Hilbert "
         "transform of the first phase, or the modulus of the reported current.",
     )
+    remove_offset: bool = Field(
+        True,
+        description="Take the current sensors' offset, found from whole turns of the current "
+        "vector, off before the envelope; it drifts between sessions. The thesis does not.",
+    )
 
 
 class ScoreConfig(Section):

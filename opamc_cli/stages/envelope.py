@@ -1,5 +1,6 @@
 """The current of one segment and its envelope, from whichever channels a run holds."""
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -41,8 +42,63 @@ def envelope_kind(path: object, channels: AxisChannels, wanted: EnvelopeKind) ->
     return wanted
 
 
+OFFSET_SPANS = 64
+"""Most segments that the sensors' offset is estimated from."""
+
+OFFSET_TURNS = 50.0
+"""Fewest turns of the current vector: fewer leave more of the vector than of the offset."""
+
+
+def current_offset(
+    run: Run, axis: int, spans: Sequence[tuple[int, int]], wanted: EnvelopeKind = "auto"
+) -> complex:
+    """Estimate what the current sensors add to the current vector of an axis.
+
+    The vector turns, its sensors' offset stands still: it is the mean over many turns. Left in,
+    it modulates the envelope once per electrical period, by more than early damage does, and it
+    drifts from session to session.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    axis
+        Counted from 1.
+    spans
+        Half-open intervals of samples in which the axis moves.
+    wanted
+        Which current, see `PatternsConfig.envelope`.
+
+    Returns
+    -------
+    complex
+        In ampere; 0 for a reported current, whose mean is torque, and where the vector turns
+        fewer than `OFFSET_TURNS` times in all.
+    """
+    if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
+        return 0j
+    total, count, turns = 0j, 0, 0.0
+    for start, stop in spans[:: -(-len(spans) // OFFSET_SPANS) or 1]:
+        vector = read_current(run, axis, start, stop, wanted).astype(np.complex128)
+        vector = vector[np.isfinite(vector)]
+        if vector.size < 2:
+            continue
+        # the square's angle does not jump where torque changes its sign
+        squared = vector * vector
+        advance = np.angle(squared[1:] * squared[:-1].conj()).sum()
+        turns += abs(float(advance)) / (4 * np.pi)
+        total += complex(vector.sum())
+        count += vector.size
+    return total / count if turns >= OFFSET_TURNS else 0j
+
+
 def read_envelope(
-    run: Run, axis: int, start: int, stop: int, wanted: EnvelopeKind = "auto"
+    run: Run,
+    axis: int,
+    start: int,
+    stop: int,
+    wanted: EnvelopeKind = "auto",
+    offset: complex = 0j,
 ) -> npt.NDArray[np.floating]:
     """Read the current of an axis and return its envelope over start..stop.
 
@@ -56,6 +112,8 @@ def read_envelope(
         Half-open interval of samples; what lies outside the run is left out.
     wanted
         Which current it is taken from, see `PatternsConfig.envelope`.
+    offset
+        Taken off the current vector first, A; see `current_offset`.
 
     Returns
     -------
@@ -68,7 +126,10 @@ def read_envelope(
         If the axis lacks the current that is wanted.
     """
     current = read_current(run, axis, start, stop, wanted)
-    return envelope(current) if np.iscomplexobj(current) else np.abs(current)
+    if not np.iscomplexobj(current):
+        return np.asarray(np.abs(current))
+    vector = current - current.dtype.type(offset) if offset else current
+    return np.asarray(envelope(vector))
 
 
 def read_current(

@@ -13,7 +13,7 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
-from opamc_cli.stages.envelope import read_envelope
+from opamc_cli.stages.envelope import current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
 from opamc_cli.storage.tables import MOTIONS, PATTERNS, read_table, table_input, write_table
@@ -140,10 +140,14 @@ def count_patterns(job: _Job) -> pa.Table:
     config = job.config
     rows = []
     with job.source.open() as run:
+        offset = 0j
+        if config.remove_offset:
+            spans = [aligned_span(row) for row in job.rows]
+            offset = current_offset(run, job.axis, spans, config.envelope)
         for row in job.rows:
             start, stop = aligned_span(row)
             stop = min(stop, run.n_samples)
-            envelope = _finite(read_envelope(run, job.axis, start, stop, config.envelope))
+            envelope = _finite(read_envelope(run, job.axis, start, stop, config.envelope, offset))
             delays = {
                 order: delay(config, run.sampling_rate_hz, row["reference_f_max_hz"], order)
                 for order in sorted(set(config.orders))

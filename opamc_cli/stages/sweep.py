@@ -13,7 +13,7 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal import ordinal_counts, time_delay
-from opamc_cli.stages.envelope import EnvelopeKind, read_envelope
+from opamc_cli.stages.envelope import EnvelopeKind, current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
 from opamc_cli.stages.patterns import aligned_span
 from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
@@ -107,6 +107,7 @@ class _Job:
     taus: tuple[int, ...]
     orders: tuple[int, ...]
     envelope: EnvelopeKind
+    remove_offset: bool
 
 
 @dataclass(frozen=True)
@@ -134,7 +135,7 @@ def run(
     baseline, target
         Tables of stage `identify`; without a target only the baseline's own divergences.
     config
-        `patterns.envelope`, `patterns.gamma` and `score.base` are used.
+        `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma` and `score.base` are used.
     out
         Folder of the sweep table.
     taus, orders
@@ -187,7 +188,15 @@ def _work(
     for name in dict.fromkeys(name for name, _ in work):
         by_name[name].verify()
     return [
-        _Job(by_name[name], axis, tuple(rows), tuple(taus), tuple(orders), config.patterns.envelope)
+        _Job(
+            by_name[name],
+            axis,
+            tuple(rows),
+            tuple(taus),
+            tuple(orders),
+            config.patterns.envelope,
+            config.patterns.remove_offset,
+        )
         for (name, axis), rows in work.items()
     ]
 
@@ -197,8 +206,12 @@ def _count(job: _Job) -> _Counted:
         (order, tau): [] for order in job.orders for tau in job.taus
     }
     with job.source.open() as run:
+        offset = 0j
+        if job.remove_offset:
+            spans = [aligned_span(row) for row in job.rows]
+            offset = current_offset(run, job.axis, spans, job.envelope)
         for row in job.rows:
-            envelope = read_envelope(run, job.axis, *aligned_span(row), job.envelope)
+            envelope = read_envelope(run, job.axis, *aligned_span(row), job.envelope, offset)
             for tau in job.taus:
                 for order, values in ordinal_counts(envelope, job.orders, tau).items():
                     counts[order, tau].append(values)

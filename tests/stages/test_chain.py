@@ -12,7 +12,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.signal.ordinal import time_delay
 from opamc_cli.stages import identify, patterns, segment, sweep
 from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.envelope import read_envelope
+from opamc_cli.stages.envelope import current_offset, read_envelope
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.tables import table_provenance
 
@@ -66,10 +66,14 @@ def test_segments_are_cut_like_their_reference(chain):
 
 def test_counts_are_those_of_the_envelope_itself(chain):
     _, outcome = chain
+    motions = pq.read_table(outcome.motions).to_pylist()
     rows = [r for r in pq.read_table(outcome.patterns).to_pylist() if r["run"] == ONE.stem][:8]
     with Run(ONE) as run:
         for row in rows:
-            values = read_envelope(run, row["axis"], row["start"], row["stop"])
+            same = [m for m in motions if (m["run"], m["axis"]) == (row["run"], row["axis"])]
+            offset = current_offset(run, row["axis"], [patterns.aligned_span(m) for m in same])
+            assert 0 < abs(offset) < 0.5
+            values = read_envelope(run, row["axis"], row["start"], row["stop"], offset=offset)
             assert row["tau"] == time_delay(2048, row["f_max_hz"], row["order"], 2.0)
             n = row["stop"] - row["start"] - (row["order"] - 1) * row["tau"]
             assert row["n_patterns"] == n == sum(row["counts"])
