@@ -100,9 +100,7 @@ def main() -> None:
             )
     found = np.array(rows, dtype=float)
     print(f"{n_seeds} recordings, {n_missed} with a motion too many or too few")
-    print(
-        "| f_max, SNR, holding | motions | start ms, median (90 %) | stop ms | f_max % | direction |"
-    )
+    print("| | motions | start ms, median (90 %) | stop ms | f_max % | direction |")
     print("|---|---|---|---|---|---|")
     groups = [("all", np.ones(len(found), dtype=bool))]
     groups += [(f"{f:g} Hz", found[:, 0] == f) for f in (62.8, 157, 314)]

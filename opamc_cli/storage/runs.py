@@ -384,7 +384,10 @@ def _open_parquet(path: Path) -> pq.ParquetFile:
         msg = f"{path}: is a folder where a run file (*.parquet) is needed"
         raise InputError(msg)
     try:
-        return pq.ParquetFile(path, page_checksum_verification=True, memory_map=False)
+        # pre-buffering would hold the columns of all row groups at once
+        return pq.ParquetFile(
+            path, page_checksum_verification=True, memory_map=False, pre_buffer=False
+        )
     except (pa.ArrowException, OSError) as error:
         msg = (
             f"{path}: cannot be opened as Parquet ({_first_line(error)}); "
