@@ -1,10 +1,11 @@
 """What a subcommand prints: results on stdout, notes on stderr."""
 
 import json
+import os
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from opamc_cli.errors import ExitCode
 
@@ -30,11 +31,11 @@ class Output:
     def note(self, text: str) -> None:
         """Print something worth knowing that is not the result."""
         if not self.quiet:
-            print(text, file=sys.stderr)
+            _write(f"{text}\n", sys.stderr)
 
     def failure(self, text: str) -> None:
         """Print why one of several runs could not be used."""
-        print(f"opamc: {text}", file=sys.stderr)
+        _write(f"opamc: {text}\n", sys.stderr)
 
     def progress(self, text: str) -> None:
         """Print which step begins, to a terminal only: cron mails whatever else it gets."""
@@ -49,7 +50,7 @@ class Output:
         An urgent result, such as a joint at fault, is printed even if quiet.
         """
         if self.as_json:
-            print(json.dumps(values, indent=2, sort_keys=True, allow_nan=False))
+            _write(json.dumps(values, indent=2, sort_keys=True, allow_nan=False) + "\n", sys.stdout)
         elif urgent or not self.quiet:
             from rich.console import Console
 
@@ -61,8 +62,10 @@ class Output:
                 emoji=False,
                 highlight=False,
             )
-            for item in shown:
-                console.print(item, soft_wrap=isinstance(item, str))
+            with console.capture() as captured:
+                for item in shown:
+                    console.print(item, soft_wrap=isinstance(item, str))
+            _write(captured.get(), sys.stdout)
 
     def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
         """Print the runs that failed and return the exit code that they make."""
@@ -72,3 +75,12 @@ class Output:
             self.note(f"{len(failures)} of {len(failures) + n_done} runs failed, the rest are done")
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
+
+
+def _write(text: str, stream: TextIO) -> None:
+    """Write at once; a reader that has seen enough, as ``| head``, changes no exit code."""
+    try:
+        stream.write(text)
+        stream.flush()
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

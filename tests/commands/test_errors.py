@@ -1,6 +1,11 @@
 """What users get wrong: one sentence, the right exit code, nothing half-written."""
 
 import json
+import os
+import resource
+import signal
+import subprocess
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -562,3 +567,45 @@ def test_usage(opamc, arguments):
     ended = opamc(*arguments)
     assert ended.code == ExitCode.USAGE
     assert "Traceback" not in ended.err
+
+
+def test_a_reader_that_has_seen_enough_changes_no_exit_code(tmp_path, pair):
+    command = [sys.executable, "-m", "opamc_cli", "segment", str(pair[0]), "--json"]
+    read, write = os.pipe()
+    os.close(read)
+    with os.fdopen(write) as broken:
+        ended = subprocess.run(
+            [*command, "--out", str(tmp_path / "out")],
+            stdout=broken,
+            stderr=subprocess.PIPE,
+            check=False,
+        )
+    # 1 would say that a joint has changed
+    assert (ended.returncode, ended.stderr) == (0, b"")
+
+
+def test_a_full_disk_leaves_nothing_half_written(tmp_path):
+    log = tmp_path / "log.csv"
+    log.write_text("".join(f"{k * 0.001}\n" for k in range(100_000)))
+    (tmp_path / "map.yaml").write_text(MAP)
+
+    def limit() -> None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
+
+    arguments = ["ingest", log, "--map", tmp_path / "map.yaml", "--out", tmp_path / "out"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "opamc_cli", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limit,
+    )
+    check_refusal(
+        Ended(ended.returncode, ended.stdout, ended.stderr),
+        ExitCode.USAGE,
+        str(tmp_path / "out" / "log.parquet"),
+        "cannot be written",
+        "check space",
+    )
+    assert not list((tmp_path / "out").glob("*log*"))
