@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
 from opamc_cli.signal.noise import noise_level
 from opamc_cli.signal.segmentation import hysteresis
@@ -57,6 +56,9 @@ def velocity_from_position(
     Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
     ends.
     """
+    # Importing it takes as long as all else together, and few runs lack the velocity.
+    from scipy.signal import savgol_filter
+
     angle = np.unwrap(np.asarray(position_rad, dtype=np.float64))
     window = min(max(3, round(window_s * fs_hz) | 1), angle.size - 1 + angle.size % 2)
     if window < 3:
