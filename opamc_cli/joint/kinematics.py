@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opamc_cli.joint.phases import PhaseAngle, follow_phases, torque_current
+from opamc_cli.joint.angle_filter import smoothing_kernel
+from opamc_cli.joint.phases import PhaseAngle, follow_phases, side_of_torque, torque_current
 from opamc_cli.joint.smoothing import (
+    averaging_kernel,
     derivatives,
     measurement_noise,
     noise_gain,
@@ -57,13 +59,26 @@ class Recording:
 
 @dataclass(frozen=True)
 class Motion:
-    """Smoothed motion of one recording; its window in samples, and the speed's noise."""
+    """Smoothed motion of one recording.
+
+    Attributes
+    ----------
+    position_rad, velocity, acceleration : arrays of shape (n,)
+        Smoothed.
+    window : int
+        Samples over which they are smooth.
+    velocity_noise : float
+        Standard deviation of the speed's noise.
+    kernel : array of odd length
+        Moving average that the acceleration has gone through.
+    """
 
     position_rad: Floats
     velocity: Floats
     acceleration: Floats
     window: int
-    velocity_noise: float = 0.0
+    velocity_noise: float
+    kernel: Floats
 
 
 def motion_from_position(
@@ -100,9 +115,11 @@ def motion_from_position(
                 derivatives(speed, rate_hz, own, 1),
                 own,
                 measurement_noise(speed) * noise_gain(rate_hz, own, 0),
+                averaging_kernel(own, 1),
             )
     noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
-    return Motion(position, velocity, acceleration, window, noise)
+    kernel = averaging_kernel(window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -113,7 +130,8 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     steps = 0.5 * (velocity[1:] + velocity[:-1]) / rate_hz
     noise = measurement_noise(velocity_rad_s) * noise_gain(rate_hz, window, 0)
     position = np.concatenate([[0.0], np.cumsum(steps)])
-    return Motion(position, velocity, acceleration, window, noise)
+    kernel = averaging_kernel(window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -148,6 +166,16 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     moving[:half] = False
     moving[velocity.size - half :] = False
     return moving
+
+
+def widened(rows: Bools, reach: int) -> Bools:
+    """Rows that are true, or nearer than `reach` to one that is."""
+    change = np.zeros(rows.size + 1, dtype=np.int64)
+    at = np.flatnonzero(rows)
+    np.add.at(change, np.maximum(at - reach, 0), 1)
+    np.add.at(change, np.minimum(at + reach + 1, rows.size), -1)
+    wide: Bools = np.cumsum(change[:-1]) > 0
+    return wide
 
 
 def filled(values: Floats) -> Floats:
@@ -225,6 +253,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         temperature_c=join("temperature_c") if with_temperature else None,
         current_d_a=join("current_d_a") if with_phases else None,
         electrical_rad=join("electrical_rad") if with_angle else None,
+        kernel=max((piece.kernel for piece in pieces), key=len),
     )
 
 
@@ -259,7 +288,9 @@ def _one(recording: Recording, joint: Joint) -> Track:
         if poles and ratio:
             scale, kind = 1.0 / (poles * ratio), "joint"
             channels |= {"scale"}
-        motion = _scaled(phase_angle, scale)
+        motion = _scaled(phase_angle, scale, rate)
+        # Where there is too little current to tell an angle, the motion is a guess.
+        usable &= ~widened(~phase_angle.strong, phase_angle.window)
         channels |= {"position"}
     else:
         msg = "a recording needs a position, a velocity or three phase currents"
@@ -267,12 +298,17 @@ def _one(recording: Recording, joint: Joint) -> Track:
 
     current_d = electrical = None
     if phases is not None and phase_angle is not None:
-        if kind == "joint" and "scale" in channels and recording.size:
+        if recording.position_rad is not None or recording.velocity_rad_s is not None:
             known = poles * ratio if poles and ratio else None
             electrical = phase_angle.aligned_with(motion.position_rad, known)
         else:
             electrical = phase_angle.angle_rad
         current, current_d = torque_current(phases, electrical, motion.velocity)
+        if electrical is phase_angle.angle_rad:
+            side = side_of_torque(current, phase_angle, rate)
+            current, current_d = side * current, side * current_d
+            # The other side is half an electrical turn away.
+            electrical = electrical + np.where(side < 0, np.pi, 0.0)
         channels |= {"electrical"}
     elif recording.current_a is not None:
         usable &= np.isfinite(recording.current_a)
@@ -318,13 +354,16 @@ def _one(recording: Recording, joint: Joint) -> Track:
         temperature_c=None if temperature is None else filled(temperature),
         current_d_a=current_d,
         electrical_rad=electrical,
+        kernel=motion.kernel,
     )
 
 
-def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
+def _scaled(phase_angle: PhaseAngle, scale: float, rate_hz: float) -> Motion:
     return Motion(
         phase_angle.angle_rad * scale,
         phase_angle.velocity_rad_s * scale,
         phase_angle.acceleration_rad_s2 * scale,
         phase_angle.window,
+        0.0,
+        smoothing_kernel(rate_hz),
     )

@@ -240,7 +240,7 @@ def _candidates(
     session = fitted.session
     present = {term.effect.name for term in fitted.terms}
     views = {False: prepare(fitted, fine=False)}
-    views[True] = views[False] if session.factor == 1 else prepare(fitted, fine=True)
+    views[True] = views[False] if session.coarse is session.fine else prepare(fitted, fine=True)
     found: list[Candidate] = []
     untestable: list[Untestable] = []
     trials = 0
@@ -382,7 +382,7 @@ def _pruned(fitted: Fit, before: Fit, progress: _Progress) -> tuple[Fit, list[St
                 1.0,
                 np.zeros(0),
                 np.zeros(0),
-                fine=fitted.session.factor == 1 or steps[i].term.effect.fast,
+                fine=steps[i].term.effect.fast,
             )
             worth.append((held_out(smaller, candidate).gain, i))
         gain, index = min(worth, default=(1.0, -1))

@@ -7,10 +7,13 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
 from opamc_cli.joint.normal import Normal, normal_equations, solve
-from opamc_cli.joint.track import Bools, Floats, Track, block_mean, coarsen
+from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 20_000
+SMALLEST_KERNEL = 5
+"""A moving average of up to 5 samples needs no counterpart."""
+
 FINE_SAMPLES = 250_000
 """Above this many moving samples at the full rate, evenly spread whole groups stand for all."""
 
@@ -61,10 +64,12 @@ class Session:
 
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
-        if fine or self.factor == 1:
-            return term.columns(self.fine.track)
+        track = self.fine.track
+        if fine or self.coarse is self.fine:
+            return term.columns(track)
         if term.effect.fast:
-            return block_mean(term.columns(self.fine.track), self.fine.track.bounds, self.factor)
+            smooth = averaged(term.columns(track), track.bounds, track.kernel)
+            return block_mean(smooth, track.bounds, self.factor)
         return term.columns(self.coarse.track)
 
     def grid(self, fine: bool) -> Grid:
@@ -75,7 +80,7 @@ class Session:
         """Put the fitted load and model currents, given at the full rate, on both grids."""
         bounds = self.fine.track.bounds
         fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
-        if self.factor == 1:
+        if self.coarse is self.fine:
             return replace(self, fine=fine, coarse=fine)
         coarse = replace(
             self.coarse,
@@ -106,11 +111,15 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     inside = int(np.count_nonzero(track.moving & (grouping.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
     factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
+    if track.kernel.size <= SMALLEST_KERNEL:
+        track = replace(track, kernel=np.ones(1))
+    # Blocks shorter than a quarter of the average would only repeat their neighbours.
+    factor = max(factor, track.kernel.size // 4)
     coarse_track = coarsen(track, factor)
     groups = [g for g in range(len(grouping.names)) if g not in grouping.sealed]
     share = FINE_SAMPLES / max(inside, 1)
     fine = _grid(track, _thinned(groups, share), _thinned(list(grouping.sealed), share))
-    coarse = fine if factor == 1 else _grid(coarse_track, groups, list(grouping.sealed))
+    coarse = fine if coarse_track is track else _grid(coarse_track, groups, list(grouping.sealed))
     return Session(fine, coarse, factor, grouping, tuple(groups))
 
 

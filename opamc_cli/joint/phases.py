@@ -8,22 +8,38 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import savgol_filter
 
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.angle_filter import smoothed_angle
+from opamc_cli.joint.normal import solve
+from opamc_cli.joint.track import Bools, Floats
 
-PERIODS_PER_WINDOW = 2.0
-SHORTEST_WINDOW_S = 0.01
-LONGEST_WINDOW_S = 0.12
+STRONG = 5.0
+"""A current vector counts where it is longer than this many times its noise."""
+
+LOST_S = 0.015
+"""After this long without current the side of the torque axis has to be found again."""
+
+SIDE_ROUNDS = 8
 
 
 @dataclass(frozen=True)
 class PhaseAngle:
-    """Smoothed electrical angle of one recording, and its derivatives."""
+    """Smoothed electrical angle of one recording, and its derivatives.
+
+    Attributes
+    ----------
+    angle_rad, velocity_rad_s, acceleration_rad_s2 : arrays of shape (n,)
+        Electrical.
+    strong : bool array of shape (n,)
+        Samples with enough current to tell an angle.
+    window : int
+        Samples over which it is smooth.
+    """
 
     angle_rad: Floats
     velocity_rad_s: Floats
     acceleration_rad_s2: Floats
+    strong: Bools
     window: int
 
     def aligned_with(self, position_rad: Floats, ratio: float | None) -> Floats:
@@ -45,10 +61,11 @@ class PhaseAngle:
         slope = float(np.dot(centred, self.angle_rad) / max(np.dot(centred, centred), 1e-300))
         if ratio is not None:
             slope = float(np.copysign(ratio, slope))
-        rest = self.angle_rad - slope * position_rad
-        if np.std(rest) > 0.5:
+        rest = np.exp(2j * (self.angle_rad - slope * position_rad))[self.strong]
+        mean = rest.mean() if rest.size else 0.0
+        if abs(mean) < 0.8:
             return self.angle_rad
-        return slope * position_rad + float(np.mean(rest))
+        return slope * position_rad + 0.5 * float(np.angle(mean))
 
 
 def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
@@ -71,47 +88,42 @@ def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
 
 
 def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
-    """Follow the angle of the squared current vector through zeros of the current.
-
-    Increments of the angle are averaged with the square's power as weight over about two
-    electrical periods (10 to 120 ms), so that moments without current lean on their neighbours;
-    then the remaining phase error, which is slow, is taken out.
+    """Follow the current vector's angle, modulo pi, through zeros and reversals of the current.
 
     Parameters
     ----------
     phases_a : array of shape (n, 3)
-        Finite phase currents, n > 16.
+        Finite phase currents, n > 16; the electrical frequency below a quarter of the rate.
     rate_hz : float
         Sampling rate.
 
     Returns
     -------
     PhaseAngle
+        Smoothed by `smoothed_angle`.
     """
-    square = current_vector(phases_a) ** 2
-    turns = square[1:] * np.conj(square[:-1])
-    strong = np.abs(square) > np.quantile(np.abs(square), 0.5)
-    steps = np.abs(np.angle(turns[strong[1:]]))
-    moving = steps[steps > np.quantile(steps, 0.5)] if steps.size else steps
-    typical = float(np.median(moving)) / 2 if moving.size else 0.1
-    period = 2 * np.pi / max(typical, 1e-6)
-    length = np.clip(
-        PERIODS_PER_WINDOW * period, SHORTEST_WINDOW_S * rate_hz, LONGEST_WINDOW_S * rate_hz
+    vector = current_vector(phases_a)
+    length = np.abs(vector)
+    # The third harmonic-free sum of three phases is noise alone where sensors have no offset;
+    # fourth differences of the vector's length hold no carrier either way.
+    noise = float(np.median(np.abs(np.diff(length, 4)))) / 0.6745 / np.sqrt(70.0)
+    strong = length > max(STRONG * noise, 0.02 * float(np.quantile(length, 0.95)))
+    turns = vector[1:] * np.conj(vector[:-1])
+    smooth = _centred_mean(turns, 15)
+    weight = _centred_mean(np.abs(turns).astype(np.complex128), 15).real
+    coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
+    rough = np.concatenate([[0.0], np.angle(smooth)]) * rate_hz
+    sure = np.concatenate([[False], coherence > 0.9]) & strong
+    angle, velocity, acceleration, window = smoothed_angle(
+        np.angle(vector), strong, rough, sure, rate_hz
     )
-    window = min(max(int(length) | 1, 7), (phases_a.shape[0] - 1) | 1)
-    kernel = np.hanning(window + 2)[1:-1]
-    kernel /= kernel.sum()
-    mean_turn = np.convolve(turns, kernel, mode="same")
-    increments = np.concatenate([[0.0], np.angle(mean_turn)])
-    angle = np.cumsum(increments)
-    rest = np.convolve(square * np.exp(-1j * angle), kernel, mode="same")
-    angle = (angle + np.unwrap(np.angle(rest))) / 2
-    return PhaseAngle(
-        angle,
-        savgol_filter(angle, window, 3, deriv=1, delta=1 / rate_hz),
-        savgol_filter(angle, window, 3, deriv=2, delta=1 / rate_hz),
-        window,
-    )
+    return PhaseAngle(angle, velocity, acceleration, strong, window)
+
+
+def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:
+    sums = np.cumsum(np.concatenate([np.zeros(width // 2 + 1), values, np.zeros(width // 2)]))
+    means: NDArray[np.complex128] = (sums[width:] - sums[:-width]) / width
+    return means
 
 
 def torque_current(
@@ -136,3 +148,83 @@ def torque_current(
     torque = rotated.real
     side = 1.0 if float(np.dot(torque, np.sign(velocity))) >= 0 else -1.0
     return side * torque, side * rotated.imag
+
+
+def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
+    """Find on which side of the torque axis every stretch of current lies.
+
+    Between stretches, where the current is too small to be followed, the angle may slip by pi.
+    The sides are those that fit best to dry and lubricant friction, inertia and a smooth function
+    of the position: starting from the sides on which the current does work, and from those as
+    followed, one stretch after the other is turned where that lowers the squared error.
+
+    Parameters
+    ----------
+    torque_a : array of shape (n,)
+        Current along the followed angle.
+    angle : PhaseAngle
+        The followed angle.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    array of shape (n,)
+        +1 or -1.
+    """
+    stretches = _stretches(angle.strong, max(int(LOST_S * rate_hz), 2))
+    speed = angle.velocity_rad_s
+    moving = angle.strong & (np.abs(speed) > 0.05 * float(np.quantile(np.abs(speed), 0.98)))
+    place = angle.angle_rad / max(float(np.ptp(angle.angle_rad)), 1e-9) * 2
+    place = place - place.mean()
+    columns = np.stack(
+        [np.sign(speed), speed, angle.acceleration_rad_s2, *(place**k for k in range(4))], axis=1
+    )
+    columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    sides = []
+    grams, moments = [], []
+    for start, stop in stretches:
+        rows = slice(start, stop)
+        part = columns[rows][moving[rows]]
+        values = torque_a[rows][moving[rows]]
+        work = float(np.dot(values, part[:, 0])) if values.size else 0.0
+        sides.append(1.0 if work >= 0 else -1.0)
+        grams.append(part.T @ part)
+        moments.append(part.T @ values)
+    gram, moment = np.array(grams), np.array(moments)
+    starts = (np.array(sides), np.ones(len(sides)))
+    signs = max((_turned(start, gram, moment) for start in starts), key=lambda found: found[0])[1]
+    side = np.ones(torque_a.size)
+    for (start, _), sign in zip(stretches, signs, strict=True):
+        side[start:] = sign
+    return side
+
+
+def _turned(signs: Floats, gram: Floats, moment: Floats) -> tuple[float, Floats]:
+    """Turn one stretch after the other while that explains more; also how much is explained."""
+    signs = signs.copy()
+    total = gram.sum(axis=0)
+    for _ in range(SIDE_ROUNDS):
+        turned = False
+        for k in range(signs.size):
+            coefficients = solve(total - gram[k], signs @ moment - signs[k] * moment[k])
+            better = 1.0 if float(coefficients @ moment[k]) >= 0 else -1.0
+            turned |= better != signs[k]
+            signs[k] = better
+        if not turned:
+            break
+    joint = signs @ moment
+    explained = float(solve(total, joint) @ joint)
+    # Friction resists: of two mirror images only one has it positive.
+    return explained, signs if solve(total, joint)[0] >= 0 else -signs
+
+
+def _stretches(strong: Bools, longest_gap: int) -> list[tuple[int, int]]:
+    """Half-open stretches of strong samples; short gaps are bridged."""
+    rows = np.flatnonzero(strong)
+    if not rows.size:
+        return []
+    breaks = np.flatnonzero(np.diff(rows) > longest_gap)
+    starts = [int(rows[0]), *(int(rows[b + 1]) for b in breaks)]
+    stops = [*(int(rows[b]) + 1 for b in breaks), int(rows[-1]) + 1]
+    return list(zip(starts, stops, strict=True))

@@ -8,7 +8,7 @@ from opamc_cli.joint.track import Floats
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
-ALLOWED_NOISE_SHARE = 0.02
+ALLOWED_NOISE_SHARE = 0.05
 
 
 def measurement_noise(path: Floats) -> float:
@@ -73,6 +73,31 @@ def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     """
     kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
     return float(np.linalg.norm(kernel))
+
+
+def averaging_kernel(window: int, derivative: int) -> Floats:
+    """Weights of the moving average that a local polynomial's derivative is a derivative of.
+
+    The second derivative of a Savitzky-Golay filter is the plain second difference of the path
+    averaged with these weights; what is fitted to that derivative has to be averaged alike.
+
+    Parameters
+    ----------
+    window : int
+        Odd number of samples.
+    derivative : int
+        1 or 2.
+
+    Returns
+    -------
+    array of shape (window,)
+        Sum 1.
+    """
+    weights = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, use="dot")
+    for _ in range(derivative):
+        weights = -np.cumsum(weights)
+    kernel: Floats = weights / weights.sum()
+    return kernel
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.model import Fit, Grid, Session, Term
 from opamc_cli.joint.normal import Normal, held_out_error, normal_equations, solve
-from opamc_cli.joint.track import Bools, Floats, block_mean
+from opamc_cli.joint.track import Bools, Floats
 from opamc_cli.joint.whitening import autoregression, settled, whitened
 
 SCORE_PER_PARAMETER = 6.0
@@ -154,11 +154,18 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
 
 
 def residual_on(fit: Fit, fine: bool) -> Floats:
-    """Residual of a fit on one of the session's grids."""
+    """Residual of a fit on one of the session's grids.
+
+    On the coarse grid it is the averaged current less the coarse regressors: the average of the
+    fine residual would have gone through the motion's smoothing twice.
+    """
     session = fit.session
-    if fine or session.factor == 1:
+    if fine or session.coarse is session.fine:
         return fit.residual_a
-    return block_mean(fit.residual_a, session.fine.track.bounds, session.factor)
+    residual = session.coarse.track.current_a.copy()
+    for term, values in zip(fit.terms, fit.coefficients, strict=True):
+        residual -= session.columns(term, fine=False) @ values
+    return residual
 
 
 def _orthonormal(columns: Floats) -> Floats:

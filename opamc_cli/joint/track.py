@@ -1,9 +1,10 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import oaconvolve
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -52,6 +53,9 @@ class Track:
         Regressors of the fitted terms that neither shift nor ripple.
     open_samples : bool array of shape (n,) or None
         Moving samples that a fit may look at: none that are sealed.
+    kernel : array of odd length
+        Moving average that the acceleration has gone through; the coarse grid puts the current
+        through it too.
     channels : frozenset of str
         What was logged or follows from it: position, scale, temperature, phases, electrical.
     period_samples : int or None
@@ -81,6 +85,7 @@ class Track:
     period_samples: int | None = None
     static_columns: Floats | None = None
     open_samples: Bools | None = None
+    kernel: Floats = field(default_factory=lambda: np.ones(1))
 
     @property
     def size(self) -> int:
@@ -124,8 +129,35 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
     return np.concatenate(parts)
 
 
+def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
+    """Put signals through a moving average inside each recording; ends keep their last value.
+
+    Parameters
+    ----------
+    values : array of shape (n,) or (n, m)
+        Samples on the grid of a track.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    kernel : array of odd length
+        Weights.
+    """
+    if kernel.size == 1:
+        return values
+    half = kernel.size // 2
+    smooth = np.empty_like(values)
+    for start, stop in bounds:
+        part = values[start:stop]
+        padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
+        padded = np.pad(part, padding, mode="edge")
+        shape = (-1,) + (1,) * (part.ndim - 1)
+        smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
+    return smooth
+
+
 def coarsen(track: Track, factor: int) -> Track:
     """Average a track over blocks of samples; a block moves if all of its samples move.
+
+    The current is first put through the moving average that the acceleration has gone through.
 
     Parameters
     ----------
@@ -139,7 +171,7 @@ def coarsen(track: Track, factor: int) -> Track:
     Track
         Track at ``rate_hz / factor``.
     """
-    if factor == 1:
+    if factor == 1 and track.kernel.size == 1:
         return track
 
     def mean(values: Floats) -> Floats:
@@ -164,7 +196,7 @@ def coarsen(track: Track, factor: int) -> Track:
         bounds=tuple(bounds),
         time_s=mean(track.time_s),
         run_time_s=mean(track.run_time_s),
-        current_a=mean(track.current_a),
+        current_a=mean(averaged(track.current_a, track.bounds, track.kernel)),
         position_rad=mean(track.position_rad),
         velocity=mean(track.velocity),
         acceleration=mean(track.acceleration),
