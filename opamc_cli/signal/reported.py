@@ -50,17 +50,22 @@ def velocity_from_position(
     Returns
     -------
     array, shape (n,), rad/s
-        Zero for fewer than three samples.
+        Zero for fewer than three samples, NaN if no angle is known.
 
     Notes
     -----
     Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
-    ends.
+    ends. NaN rule: missing angles are bridged by a straight line.
     """
     # Importing it takes as long as all else together, and few runs lack the velocity.
     from scipy.signal import savgol_filter
 
-    angle = np.unwrap(np.asarray(position_rad, dtype=np.float64))
+    angle = np.asarray(position_rad, dtype=np.float64)
+    known = np.flatnonzero(np.isfinite(angle))
+    if not known.size:
+        return np.full(angle.size, np.nan)
+    # one missing angle would spoil every angle behind it when turns are undone
+    angle = np.interp(np.arange(angle.size), known, np.unwrap(angle[known]))
     window = min(max(3, round(window_s * fs_hz) | 1), angle.size - 1 + angle.size % 2)
     if window < 3:
         return np.zeros(angle.size)

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import IdentifyConfig
-from opamc_cli.errors import InputError, OpamcError
+from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.signal.align import align
 from opamc_cli.signal.identification import (
     UNIDENTIFIED,
@@ -241,8 +241,11 @@ def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Refere
     sources = {source.name: source for source in read_sources(path, moved_to)}
     rows = table.filter(table.column("reference"))
     if rows.num_rows == 0:
-        msg = f"{path}: holds no reference cycle; make it with `opamc identify` on the baseline"
-        raise InputError(msg)
+        msg = (
+            f"{path}: holds no reference cycle: no motion repeats; record at least two cycles of "
+            "the baseline, or set identify.segments_per_cycle"
+        )
+        raise NotEnoughDataError(msg)
     return {
         part.axis: _Reference(
             part.source,

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
-from opamc_cli.errors import OpamcError
+from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
 from opamc_cli.stages.envelope import current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
@@ -87,6 +87,8 @@ def run(
     ------
     InputError
         If a table or run cannot be used.
+    NotEnoughDataError
+        If every segment is shorter than a pattern.
     """
     table = read_table(motions, "identify", MOTIONS)
     sources = read_sources(motions, moved_to)
@@ -106,6 +108,9 @@ def run(
         jobs,
     )
     patterns = pa.concat_tables([PATTERNS.empty_table(), *outcome.results]).combine_chunks()
+    too_long = _windows_too_long(motions, patterns)
+    if too_long and not any(patterns.column("n_patterns").to_pylist()):
+        raise too_long[0]
     path = out / FILE_NAME
     write_table(
         path,
@@ -115,7 +120,29 @@ def run(
         inputs=[table_input(motions)],
         extra=sources_record(sources, out),
     )
-    return PatternsOutcome(path, patterns, outcome.errors)
+    return PatternsOutcome(path, patterns, (*outcome.errors, *too_long))
+
+
+def _windows_too_long(motions: Path, patterns: pa.Table) -> list[OpamcError]:
+    """Return an error for each axis whose segments are all shorter than the pattern window."""
+    by_axis: dict[int, list[dict[str, Any]]] = {}
+    for row in patterns.drop_columns(["counts"]).to_pylist():
+        by_axis.setdefault(row["axis"], []).append(row)
+    errors: list[OpamcError] = []
+    for axis, rows in sorted(by_axis.items()):
+        if any(row["n_patterns"] or row["n_masked"] for row in rows):
+            continue
+        row = min(rows, key=lambda row: (row["order"] - 1) * row["tau"])
+        longest = max(row["stop"] - row["start"] for row in rows)
+        why = f" at f_d,max = {row['f_max_hz']:.3g} Hz" if row["gamma"] is not None else ""
+        msg = (
+            f"{motions}: axis {axis}: patterns of order {row['order']} at a delay of {row['tau']} "
+            f"samples{why} span {(row['order'] - 1) * row['tau'] + 1} samples, the longest segment "
+            f"has {longest}; set patterns.tau, or joint.gear_ratio and joint.pole_pairs where "
+            "currents are reported"
+        )
+        errors.append(NotEnoughDataError(msg))
+    return errors
 
 
 def aligned_span(row: dict[str, Any]) -> tuple[int, int]:

@@ -430,6 +430,10 @@ def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
         if kept.get(key) is not None and not isinstance(kept[key], int | float):
             msg = f"{path}: {key} is {kept[key]!r} in metadata key 'opamc'; it must be a number"
             raise InputError(msg)
+    for key in ("robot", "program", "started_at", "source_sha256"):
+        # a program called 7 in one run and "7" in another is the same program
+        if kept.get(key) is not None:
+            kept[key] = str(kept[key])
     kept["sampling_rate_hz"] = float(rate)
     return RunInfo(**kept)
 

@@ -182,6 +182,11 @@ def short(path: Path) -> Path:
     return path
 
 
+def part(path: Path, start: int, stop: int) -> Path:
+    save_run(path, INFO, {name: values[start:stop] for name, values in phases().items()})
+    return path
+
+
 def one_cycle(path: Path) -> Path:
     return good(path, cycles=1)
 

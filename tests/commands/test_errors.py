@@ -408,6 +408,34 @@ def test_a_diagnosis_of_what_is_left(opamc, tmp_path, pair):
     assert (tmp_path / "out" / "report.html").exists()
 
 
+def test_a_baseline_in_which_nothing_repeats(opamc, tmp_path, pair):
+    part = bad_runs.part(tmp_path / "part.parquet", 2000, 3000)
+    ended = opamc("diagnose", "--baseline", part, "--target", pair[0], "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "no motion repeats", "two cycles")
+
+
+def test_patterns_longer_than_the_motions(opamc, tmp_path):
+    run = bad_runs.moving_joint(tmp_path / "joint.parquet")
+    arguments = ["diagnose", "--baseline", run, "--target", run, "--out", tmp_path / "out"]
+    ended = opamc(*arguments)
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "axis 1", "patterns.tau", "joint.gear_ratio")
+    assert opamc(*arguments, "--set", "patterns.tau=20").code == ExitCode.DONE
+
+
+def test_missing_positions_are_bridged(opamc, tmp_path):
+    def change(columns: dict[str, np.ndarray]) -> None:
+        del columns["axis1_velocity"]
+        columns["axis1_position"][::50] = np.nan
+
+    whole = bad_runs.moving_joint(tmp_path / "whole.parquet")
+    holed = bad_runs.moving_joint(tmp_path / "holed.parquet", change)
+    ended = opamc("segment", whole, holed, "--out", tmp_path / "out", "--json")
+    assert ended.code == ExitCode.DONE
+    counts = [axis["segments"] for axis in json.loads(ended.out)["axes"]]
+    assert len(counts) == 2
+    assert counts[0] == counts[1]
+
+
 def test_a_table_of_one_stage_is_not_another(opamc, tmp_path, pair):
     out = tmp_path / "out"
     assert opamc("segment", pair[0], "--out", out).code == 0

@@ -178,6 +178,12 @@ def test_unknown_metadata_is_left_alone(tmp_path):
     assert Run(raw_run(tmp_path / "r.parquet", {"opamc": text})).sampling_rate_hz == 100
 
 
+def test_names_that_are_numbers_are_names(tmp_path):
+    text = json.dumps({"sampling_rate_hz": 100, "program": 7, "robot": 3, "started_at": 5})
+    info = Run(raw_run(tmp_path / "r.parquet", {"opamc": text})).info
+    assert (info.program, info.robot, info.started_at) == ("7", "3", "5")
+
+
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
