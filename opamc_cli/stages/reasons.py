@@ -16,6 +16,9 @@ INSPECT = (
     "and circular spline teeth, wave generator bearing, grease; then brake, motor connector and "
     "current sensor."
 )
+SUSPICION = 0.1
+"""Corrected p-value from which a healthy joint is said to be worth an eye."""
+
 CANNOT_TELL = (
     "The patterns say that the torque's course has changed, not what changed it: another payload, "
     "program, controller gain or temperature changes it too. Repeat the recording under the "
@@ -85,8 +88,13 @@ def _change(
         f"(order {worst.order}, delay {worst.tau} samples)"
     )
     ratio = f"{judgement.divergence_ratio:.3g} times what healthy sessions show"
+    if judgement.state == "healthy" and max(judgement.p_adjusted, judgement.p_alone) > SUSPICION:
+        return f"No change beyond what healthy sessions show: divergence {ratio}, most in {place}."
     if judgement.state == "healthy":
-        return f"No change that matters: divergence {ratio}, most in {place}."
+        return (
+            f"A change too small, too uncertain or too common to all joints to act on: divergence "
+            f"{ratio}, most in {place}; keep an eye on it."
+        )
     return (
         f"The course of the torque has changed: divergence {ratio}, most in {place}; pattern "
         f"probabilities changed by {judgement.effect:.0%} (root mean square)."
@@ -174,7 +182,8 @@ def _age(sources: Mapping[str, Sequence[RunSource]]) -> str:
     span = f"recorded {first:%Y-%m-%d}" + (f" to {last:%Y-%m-%d}" if last != first else "")
     if started.get("target"):
         days = (started["target"][0] - last).total_seconds() / 86400
-        span += f", {abs(days):.0f} days {'before' if days >= 0 else 'after'} the target"
+        side = "before" if days >= 0 else "after"
+        span += f", {_count(round(abs(days)), 'day')} {side} the target"
     return f" ({span})"
 
 
