@@ -9,7 +9,8 @@ and seed two recordings of six axes, four cycles each: one healthy, one of a lat
 the flexspline of axis 3 ground over a quarter of its perimeter. The axes do not influence each
 other in the testbed, so they are recorded at once instead of one after another.
 
-Seeds begin at 1000: the testbed's parameters were chosen on seeds below 100.
+Seeds begin at 2000: the testbed's parameters were chosen on seeds below 100, and how much sessions
+differ was corrected once after seeds 1000 to 1009 had been seen (all six results held there too).
 """
 
 import argparse
@@ -38,7 +39,7 @@ SPEEDS, PAYLOADS = (20, 50, 100), (0, 1, 2)
 CONDITIONS = ((20, 0), (50, 0), (100, 0), (100, 1), (100, 2))
 TAUS = tuple(range(1, 26))
 ORDERS = (4, 5)
-FIRST_SEED = 1000
+FIRST_SEED = 2000
 BEGIN, END = "<!-- thesis cases: begin -->", "<!-- thesis cases: end -->"
 
 
@@ -315,7 +316,7 @@ def document(study: Study, n_seeds: int) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--seeds", type=int, default=10, help="how many, from 1000 on")
+    parser.add_argument("--seeds", type=int, default=10, help="how many")
     parser.add_argument("--first-seed", type=int, default=FIRST_SEED)
     parser.add_argument("--quick", action="store_true", help="two seeds")
     parser.add_argument("--write", action="store_true", help="update docs/")

@@ -103,6 +103,7 @@ def feature_space(study: Any, path: Path, normal_axis: int, fault_axis: int) -> 
         panel.set_ylabel("Δσ²")
         panel.set_zlabel("KS")
         panel.set_title(f"order {order}")
+        panel.locator_params(nbins=4)
     panel.legend(frameon=False)
     _save(figure, path)
 
