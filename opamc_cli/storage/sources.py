@@ -114,8 +114,12 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
     Raises
     ------
     InputError
-        If the table names no runs.
+        If the table names no runs, or a folder of `moved_to` is not there.
     """
+    for folder in moved_to:
+        if not folder.exists():
+            msg = f"{folder}: no such folder; name the folder of the runs with --runs"
+            raise InputError(msg)
     try:
         metadata = pq.read_schema(table).metadata
     except (pa.ArrowException, OSError) as error:

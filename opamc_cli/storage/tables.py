@@ -9,7 +9,7 @@ inputs and config give the same bytes.
 import json
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -26,6 +26,14 @@ from opamc_cli.storage.runs import file_sha256
 
 TABLE_KEY = b"opamc_table"
 SCHEMA_VERSION = 1
+MAY_BE_NULL = frozenset(
+    {
+        *("temperature_c", "gamma", "lda"),
+        *("jsd", "chance", "excess", "delta_mu", "delta_var", "ks"),
+    }
+)
+"""Columns of stage tables in which null means unknown."""
+
 LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "scikit-learn")
 
 SEGMENTS = pa.schema(
@@ -199,7 +207,31 @@ def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Ta
                 f"run `opamc {stage}` again"
             )
             raise InputError(msg)
+    _check_rows(path, table, record, schema or ())
     return table
+
+
+def _check_rows(
+    path: Path, table: pa.Table, record: Mapping[str, Any], needed: Iterable[pa.Field]
+) -> None:
+    """Refuse rows that no stage writes: they were edited by hand."""
+    for field in needed:
+        n_null = table.column(field.name).null_count
+        if n_null and field.name not in MAY_BE_NULL:
+            msg = (
+                f"{path}: column {field.name} is null in {n_null} of {table.num_rows} rows; "
+                f"run `opamc {record['stage']}` again"
+            )
+            raise InputError(msg)
+    if "runs" in record and "run" in table.column_names:
+        known = {entry["name"] for entry in record["runs"]}
+        for name in table.column("run").unique().to_pylist():
+            if name not in known:
+                msg = (
+                    f"{path}: names run {name!r}, it was made from {', '.join(sorted(known))}; "
+                    f"run `opamc {record['stage']}` again"
+                )
+                raise InputError(msg)
 
 
 def table_record(path: Path, metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:

@@ -459,6 +459,8 @@ def test_runs_that_changed_or_went_after_their_segments_were_found(opamc, tmp_pa
     run.unlink()
     ended = opamc("patterns", "--out", out)
     check_refusal(ended, ExitCode.BAD_INPUT, str(run), "--runs")
+    ended = opamc("patterns", "--out", out, "--runs", tmp_path / "nowhere")
+    check_refusal(ended, ExitCode.BAD_INPUT, "nowhere", "no such folder")
 
 
 @pytest.mark.parametrize(

@@ -105,6 +105,26 @@ def test_files_that_are_not_parquet_are_refused(tmp_path, content):
         read_table(path, "segment", SEGMENTS)
 
 
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        ("stop", None, "column stop is null in 1 of 2 rows; run `opamc segment` again"),
+        ("run", "x", "names run 'x', it was made from r"),
+        ("temperature_c", None, None),
+    ],
+)
+def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected):
+    rows = [ROW, {**ROW, column: value}]
+    table = pa.Table.from_pylist(rows, schema=SEGMENTS)
+    path = write(tmp_path / "segments.parquet", table, extra={"runs": [{"name": "r"}]})
+    if expected is None:
+        assert read_table(path, "segment", SEGMENTS).num_rows == 2
+        return
+    with pytest.raises(InputError) as caught:
+        read_table(path, "segment", SEGMENTS)
+    assert expected in str(caught.value)
+
+
 def test_metadata_that_is_not_json_is_refused(tmp_path):
     path = tmp_path / "segments.parquet"
     pq.write_table(TABLE.replace_schema_metadata({TABLE_KEY: b"{"}), path)
