@@ -119,6 +119,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
             close = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
             msg = f"{source}: unknown key {key!r}; {hint}"
+        elif first["type"] == "value_error":
+            msg = f"{source}: {key}: {first['ctx']['error']}"
         elif first["type"] == "missing":
             msg = f"{source}: {key} is missing; add it"
         else:

@@ -6,9 +6,9 @@ The descriptions are the documentation: `configs/default.yaml` is made from them
 import hashlib
 import json
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -83,6 +83,16 @@ class SegmentConfig(Section):
         "windows are made otherwise.",
     )
 
+    @model_validator(mode="after")
+    def _thresholds_make_a_hysteresis(self) -> Self:
+        if self.threshold_off > self.threshold_on:
+            msg = (
+                f"threshold_off is {self.threshold_off:g}, threshold_on {self.threshold_on:g}; "
+                "a motion has to reach more than it has to keep"
+            )
+            raise ValueError(msg)
+        return self
+
 
 class IdentifyConfig(Section):
     """Identification of cycles and motions (thesis 3.3)."""
@@ -135,8 +145,8 @@ class PatternsConfig(Section):
 class ScoreConfig(Section):
     """Divergence, features and decision (thesis 4.3)."""
 
-    base: Positive = Field(
-        2.0, gt=1, description="Base of the logarithm in the Jensen-Shannon divergence."
+    base: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
+        2.0, description="Base of the logarithm in the Jensen-Shannon divergence."
     )
     false_alarm_rate: Annotated[float, Field(gt=0, lt=0.5)] = Field(
         0.01,

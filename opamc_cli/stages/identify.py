@@ -141,6 +141,8 @@ def run(
     for source in {part.source for part in parts} | {r.source for r in references.values()}:
         source.verify()
     outcome = map_items(_identify_part, work, jobs)
+    if outcome.errors and not outcome.results:
+        raise outcome.errors[0]
     motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
     path = out / FILE_NAME

@@ -107,6 +107,8 @@ def run(
         ],
         jobs,
     )
+    if outcome.errors and not outcome.results:
+        raise outcome.errors[0]
     patterns = pa.concat_tables([PATTERNS.empty_table(), *outcome.results]).combine_chunks()
     too_long = _windows_too_long(motions, patterns)
     if too_long and not any(patterns.column("n_patterns").to_pylist()):

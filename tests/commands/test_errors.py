@@ -84,6 +84,8 @@ def check_nothing_half_written(folder: Path) -> None:
         ("a: [", ["is not valid YAML"]),
         ("segment: {gamma: 3}\nsegment: {gamma: 4}", ["given twice (line 2)"]),
         ("score: {base: .nan}", ["score.base is nan"]),
+        ("score: {base: 1}", ["score.base is 1", "greater than 1"]),
+        ("segment: {threshold_on: 0.2}", ["threshold_off is 0.3, threshold_on 0.2"]),
         ("!!python/object/apply:os.system ['true']", ["is not valid YAML"]),
     ],
 )
@@ -420,6 +422,12 @@ def test_patterns_longer_than_the_motions(opamc, tmp_path):
     ended = opamc(*arguments)
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "axis 1", "patterns.tau", "joint.gear_ratio")
     assert opamc(*arguments, "--set", "patterns.tau=20").code == ExitCode.DONE
+
+
+def test_an_envelope_that_the_run_does_not_have(opamc, tmp_path, pair):
+    arguments = ["diagnose", "--baseline", pair[0], "--target", pair[1], "--out", tmp_path / "out"]
+    ended = opamc(*arguments, "--set", "patterns.envelope=reported")
+    check_refusal(ended, ExitCode.BAD_INPUT, str(pair[0]), "axis1_current")
 
 
 def test_missing_positions_are_bridged(opamc, tmp_path):
