@@ -22,9 +22,9 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
         If a parameter is unknown, or one that the data would decide is missing beside others.
     """
     given = declared.parameters
-    if not given:
-        return None
     searched = effect.limits(track)
+    if not given and (searched or declared.columns is None):
+        return None
     guesses = effect.guesses(track, np.zeros(track.size))
     defaults = {**(guesses[0] if guesses else {}), **dict.fromkeys(effect.forms, 0.0)}
     known = sorted({*searched, *defaults})

@@ -1,4 +1,5 @@
 import json
+from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -6,7 +7,12 @@ import pytest
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
+from opamc_cli.stages.model import CANDIDATES, FIT, RESIDUALS, SPECTRUM
+from opamc_cli.stages.score import FEATURES, SCORES
+from opamc_cli.stages.sweep import SWEEP
 from opamc_cli.storage.tables import (
+    MOTIONS,
+    PATTERNS,
     SEGMENTS,
     TABLE_KEY,
     Provenance,
@@ -155,3 +161,12 @@ def test_every_flipped_byte_is_noticed(tmp_path):
         except InputError:
             continue
         assert found.to_pylist() == TABLE.to_pylist(), f"byte {at} of {len(content)}"
+
+
+@pytest.mark.parametrize(
+    "schema",
+    [SEGMENTS, MOTIONS, PATTERNS, SCORES, FEATURES, SWEEP, FIT, CANDIDATES, RESIDUALS, SPECTRUM],
+)
+def test_every_column_is_documented(schema):
+    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    assert [name for name in schema.names if f"`{name}`" not in text] == []
