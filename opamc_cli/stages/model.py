@@ -435,8 +435,16 @@ def _each_axis(
     axes: Sequence[int],
     one: Any,
 ) -> tuple[list[dict[str, Any]], list[OpamcError], list[tuple[Path, str]]]:
-    runs = [Run(path, name) for name, path in paths]
-    results, errors = [], []
+    runs: list[Run] = []
+    results: list[dict[str, Any]] = []
+    errors: list[OpamcError] = []
+    for name, path in paths:
+        try:
+            runs.append(Run(path, name))
+        except OpamcError as error:
+            errors.append(error)
+    if not runs:
+        raise errors[0]
     try:
         wanted = list(axes) or axes_of(runs)
         if not wanted:

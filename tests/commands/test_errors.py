@@ -539,6 +539,15 @@ def test_models_of_too_little(opamc, tmp_path, model):
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, str(file))
 
 
+def test_a_model_of_the_runs_that_are_left(opamc, tmp_path, model):
+    good, bad = bad_runs.moving_joint(tmp_path / "r.parquet"), bad_runs.text(tmp_path / "b.parquet")
+    ended = opamc("model", "fit", good, bad, "--model", model, "--out", tmp_path / "out")
+    assert ended.code == ExitCode.PARTIAL, ended
+    assert len(ended.sentences) == 1
+    assert str(bad) in ended.sentences[0]
+    assert (tmp_path / "out" / "fit.parquet").exists()
+
+
 def test_models_of_an_axis_that_is_not_there(opamc, tmp_path, model):
     file = bad_runs.moving_joint(tmp_path / "r.parquet")
     ended = opamc("model", "fit", file, "--model", model, "--axis", 9, "--out", tmp_path / "out")
