@@ -78,9 +78,14 @@ class Output:
 
 
 def _write(text: str, stream: TextIO) -> None:
-    """Write at once; a reader that has seen enough, as ``| head``, changes no exit code."""
+    """Write at once, come what may: the exit code tells more than the text.
+
+    A reader that has seen enough, as ``| head``, is no error, nor is a terminal or a cron that
+    knows no Greek: what it cannot show becomes a question mark.
+    """
+    encoding = stream.encoding or "utf-8"
     try:
-        stream.write(text)
+        stream.write(text.encode(encoding, "replace").decode(encoding))
         stream.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -631,6 +631,19 @@ def test_a_reader_that_has_seen_enough_changes_no_exit_code(tmp_path, pair):
     assert (ended.returncode, ended.stderr) == (0, b"")
 
 
+def test_a_terminal_that_knows_no_greek_changes_no_exit_code(tmp_path):
+    runs = [bad_runs.good(tmp_path / f"µ{k}.parquet", seed=k) for k in range(2)]
+    arguments = ["segment", *map(str, runs), "--out", str(tmp_path / "out")]
+    ended = subprocess.run(
+        [sys.executable, "-m", "opamc_cli", *arguments],
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+        capture_output=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended
+    assert b"?0 axis 1: 12 motions" in ended.stdout
+
+
 def test_a_full_disk_leaves_nothing_half_written(tmp_path):
     log = tmp_path / "log.csv"
     log.write_text("".join(f"{k * 0.001}\n" for k in range(100_000)))

@@ -277,3 +277,14 @@ def test_the_maps_in_the_documentation_are_maps(tmp_path):
 @pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs/maps").glob("*")))
 def test_shipped_maps_are_maps(path):
     load_map(path)
+
+
+def test_ingesting_again_or_with_more_workers_gives_the_same_bytes(tmp_path):
+    files = [write_table(tmp_path / f"{name}.csv") for name in ("a", "b", "c")]
+    path = tmp_path / "map.yaml"
+    path.write_text("header: false\nsampling_rate_hz: 10\n" + phases())
+    one = ingest.run(files, load_map(path), tmp_path / "one")
+    two = ingest.run(files, load_map(path), tmp_path / "two", jobs=2)
+    assert [item.run.name for item in two.results] == ["a.parquet", "b.parquet", "c.parquet"]
+    for first, second in zip(one.results, two.results, strict=True):
+        assert first.run.read_bytes() == second.run.read_bytes()
