@@ -113,8 +113,8 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
-    # Blocks shorter than a quarter of the average would only repeat their neighbours.
-    factor = max(factor, track.kernel.size // 4)
+    # With shorter blocks the whitening would amplify what the average has taken away.
+    factor = max(factor, track.kernel.size // 2)
     coarse_track = coarsen(track, factor)
     groups = [g for g in range(len(grouping.names)) if g not in grouping.sealed]
     share = FINE_SAMPLES / max(inside, 1)

@@ -96,7 +96,9 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
     weights = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, use="dot")
     for _ in range(derivative):
         weights = -np.cumsum(weights)
-    kernel: Floats = weights / weights.sum()
+    # Two sums have moved the weights back by one sample, one sum by half a sample.
+    centred = np.roll(weights, 1) if derivative == 2 else weights + np.roll(weights, 1)
+    kernel: Floats = centred / centred.sum()
     return kernel
 
 

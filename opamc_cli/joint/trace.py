@@ -212,7 +212,7 @@ def _evaluate(
         coefficients[[keep.index(k) for k in new]] = solution
         whole = len(keep) == raw.shape[1]
         plausible = effect.plausible(coefficients, form)
-        term = Term(effect, form, None if whole or effect.name == "ripple" else keep)
+        term = Term(effect, form, None if whole or effect.flags_choose_columns else keep)
         free = len(new) + len(effect.limits(view.grid.track))
         score = likelihood - SCORE_PER_PARAMETER * free if plausible else -np.inf
         results.append((float(score), term, coefficients, columns[:, index] @ solution))
@@ -247,7 +247,7 @@ def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | No
     if best is None or not np.isfinite(best[0]):
         return None, len(guesses)
     limits = effect.limits(view.grid.track)
-    if limits and effect.name != "ripple":
+    if limits and not effect.flags_choose_columns:
         best = _refined(session, view, effect, best, limits, len(guesses))
     settled_parameters = effect.settled(best[1].parameters, view.grid.track)
     if settled_parameters != best[1].parameters:

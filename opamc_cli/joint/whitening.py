@@ -40,7 +40,8 @@ def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats
         covariance[lag] = float(np.dot(values[lag:], values[: values.size - lag])) / pairs
     if covariance[0] <= 0:
         return np.ones(1)
-    covariance[0] *= 1 + 1e-6
+    # A floor under the noise: where there is none, misfits of 1/1000 would count as signals.
+    covariance[0] *= 1 + 1e-3
     coefficients = solve_toeplitz(covariance[:-1], covariance[1:])
     taps: Floats = np.concatenate([[1.0], -coefficients])
     return taps

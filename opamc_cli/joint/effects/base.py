@@ -1,7 +1,5 @@
 """What every effect in the library says of itself."""
 
-from typing import ClassVar
-
 import numpy as np
 
 from opamc_cli.joint.track import Floats, Track
@@ -24,19 +22,21 @@ class Effect:
     what it needs, and its regressors. A user's effect is the same.
     """
 
-    name: ClassVar[str] = ""
-    domain: ClassVar[str] = ""
-    meaning: ClassVar[str] = ""
-    needs: ClassVar[tuple[str, ...]] = ()
-    fast: ClassVar[bool] = False
+    name: str = ""
+    domain: str = ""
+    meaning: str = ""
+    needs: tuple[str, ...] = ()
+    fast: bool = False
     """True where the regressors change too fast for a decimated grid."""
-    several: ClassVar[bool] = False
+    several: bool = False
     """True where a joint can have the effect more than once (several ripple orders)."""
-    static: ClassVar[bool] = True
+    static: bool = True
     """True where the effect takes part in the load or friction that other effects scale."""
-    forms: ClassVar[tuple[str, ...]] = ()
+    forms: tuple[str, ...] = ()
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
-    carries_load: ClassVar[bool] = False
+    flags_choose_columns: bool = False
+    """True where parameters say which columns `columns` returns."""
+    carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
 
     def untestable(self, track: Track) -> str | None:

@@ -20,6 +20,7 @@ class Ripple(Effect):
     needs = ("position",)
     fast = True
     several = True
+    flags_choose_columns = True
     forms = FORMS
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
