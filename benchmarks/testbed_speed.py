@@ -35,7 +35,9 @@ def main() -> None:
     recording = simulate(testbed.robot, testbed.program, seed=0, faults=faults)
     taken = time.process_time() - start
     length = len(recording.axes[1].iq_a) / recording.sampling_rate_hz
-    print(f"simulation alone, one core: {length:.0f} s in {taken:.2f} s, {length / taken:.0f} x real time")
+    print(
+        f"simulation alone, one core: {length:.0f} s in {taken:.2f} s, {length / taken:.0f} x real time"
+    )
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()
         stage.run(testbed, 0, Path(folder), truth_signals=False, jobs=arguments.jobs)
