@@ -87,17 +87,17 @@ def _change(
         f"motion {worst.motion}: mean divergence {target} against {baseline} of the baseline "
         f"(order {worst.order}, delay {worst.tau} samples)"
     )
-    ratio = f"{judgement.divergence_ratio:.3g} times what healthy sessions show"
+    ratio = f"patterns differ {judgement.distance_ratio:.3g} times as much as healthy sessions' do"
     if judgement.state == "healthy" and max(judgement.p_adjusted, judgement.p_alone) > SUSPICION:
-        return f"No change beyond what healthy sessions show: divergence {ratio}, most in {place}."
+        return f"No change beyond what healthy sessions show: {ratio}, most in {place}."
     if judgement.state == "healthy":
         return (
-            f"A change too small, too uncertain or too common to all joints to act on: divergence "
-            f"{ratio}, most in {place}; keep an eye on it."
+            f"A change too small, too uncertain or too common to all joints to act on: {ratio}, "
+            f"most in {place}; keep an eye on it."
         )
     return (
-        f"The course of the torque has changed: divergence {ratio}, most in {place}; pattern "
-        f"probabilities changed by {judgement.effect:.0%} (root mean square)."
+        f"The course of the torque has changed: {ratio}, most in {place}; pattern probabilities "
+        f"changed by {judgement.effect:.0%} (root mean square)."
     )
 
 
@@ -136,7 +136,10 @@ def _siblings(judgement: Judgement) -> list[str]:
     factor = math.exp(judgement.common_log_ratio)
     if factor < 1.5:
         return []
-    text = f"The other joints' divergence has risen too, {factor:.3g} times in the middle"
+    text = (
+        f"The other joints' patterns have moved too, {factor:.3g} times as far as usual in the "
+        "middle"
+    )
     if judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted:
         return [
             f"{text}: what moves all joints together (temperature, supply, logger, payload) is "

@@ -76,14 +76,14 @@ class Policy:
 
 @dataclass(frozen=True)
 class Shift:
-    """How far the target's divergence lies from the baseline's.
+    """How far the target lies from the baseline.
 
     Attributes
     ----------
     log_ratio : float
-        Log of the target's divergence over what a healthy session shows.
+        Log of the target's distance over that of a healthy session.
     unit : float
-        Standard deviation of a healthy session's log divergence.
+        Standard deviation of a healthy session's log distance.
     spread : Spread
         Standard deviation of `log_ratio` if nothing has changed.
     """
@@ -111,8 +111,8 @@ class Judgement:
         As `p_adjusted`, after what the siblings have in common is taken off.
     common_log_ratio : float
         What was taken off, not negative.
-    divergence_ratio : float
-        Target's divergence over what a healthy session shows.
+    distance_ratio : float
+        Target's distance from the baseline over that of a healthy session.
     effect : float
         Relative change of the pattern probabilities beyond the baseline's own (Cohen's w), in
         the motion and order where it is largest.
@@ -128,7 +128,7 @@ class Judgement:
     p_adjusted: float
     p_alone: float
     common_log_ratio: float
-    divergence_ratio: float
+    distance_ratio: float
     effect: float
     method: Method
     n_baseline_sessions: int
@@ -218,12 +218,12 @@ def judge(
         effect = float(np.nanmax(effect_by_cell(cells))) if known else math.nan
         judgements[axis] = Judgement(
             state=_state(adjusted[axis], alone[axis], effect, policy),
-            health_index=math.expm1(min(shift.log_ratio, 100.0)) / shift.unit,
+            health_index=_health_index(shift),
             p_value=p_values[axis],
             p_adjusted=adjusted[axis],
             p_alone=alone[axis],
             common_log_ratio=common[axis],
-            divergence_ratio=math.exp(min(shift.log_ratio, 100.0)),
+            distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
             effect=effect,
             method=methods[axis],
             n_baseline_sessions=_present(cells, "baseline"),
@@ -404,6 +404,13 @@ def _present(cells: Sequence[Cell], side: Literal["baseline", "target"]) -> int:
     """Return in how many sessions of one side the axis moves at all."""
     counts = [getattr(cell, side).sum(axis=1) > 0 for cell in cells]
     return int(np.any(counts, axis=0).sum()) if counts else 0
+
+
+def _health_index(shift: Shift) -> float:
+    """Place a shift on a scale with 0 at a healthy session's mean and its spread as unit."""
+    # The mean of a log-normal ratio lies above its median by half the variance of the logarithm.
+    log_mean = shift.spread.scale**2 / 2
+    return math.expm1(min(shift.log_ratio - log_mean, 100.0)) / shift.unit
 
 
 def _state(p_adjusted: float, p_alone: float, effect: float, policy: Policy) -> State:
