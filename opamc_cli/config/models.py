@@ -29,6 +29,12 @@ class JointConfig(Section):
     pole_pairs: Annotated[int, Field(ge=1)] | None = Field(
         None, description="Pole pairs of the motor; null if unknown."
     )
+    explain: bool = Field(
+        True, description="Whether a diagnosis traces the change of an unhealthy joint to a cause."
+    )
+    explain_minutes: Positive = Field(
+        2.0, description="Most minutes of recordings of each side that the cause is sought in."
+    )
 
 
 class SegmentConfig(Section):

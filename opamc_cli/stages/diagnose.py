@@ -7,11 +7,11 @@ from typing import Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, OpamcError
-from opamc_cli.stages import report, score, verdict
+from opamc_cli.stages import cause, report, score, verdict
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.latent import LatentModels
 from opamc_cli.storage.runs import Run, find_runs
-from opamc_cli.storage.sources import RunSource, check_comparable
+from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,17 @@ def run(
     other = run_chain(target, config, out / "target", reference=normal.motions, jobs=jobs)
     progress("score")
     scored = score.run(normal.patterns, other.patterns, config, out, models=models)
-    decided = verdict.run(
-        normal.patterns, other.patterns, scored.scores_path, scored.features_path, config, out
-    )
+    tables = (normal.patterns, other.patterns, scored.scores_path, scored.features_path)
+    decided = verdict.run(*tables, config, out)
+    unhealthy = [
+        entry["axis"] for entry in decided.verdict["axes"] if entry["state"] in ("changed", "fault")
+    ]
+    if unhealthy and config.joint.explain:
+        progress("cause")
+        sides = read_sources(normal.patterns), read_sources(other.patterns)
+        causes = {axis: cause.explain(axis, *sides, config.joint) for axis in unhealthy}
+        known = {axis: found for axis, found in causes.items() if found is not None}
+        decided = verdict.run(*tables, config, out, causes=known)
     progress("report")
     page = report.run(out, title=config.report.title)
     return DiagnoseOutcome(

@@ -152,8 +152,8 @@ def axes_of(runs: Sequence[Run]) -> list[int]:
     return sorted(common)
 
 
-def read_recording(run: Run, axis: int) -> Recording:
-    """Read one axis of a run.
+def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
+    """Read one axis of a run, up to sample `stop` (half-open) if that is given.
 
     Raises
     ------
@@ -182,7 +182,7 @@ def read_recording(run: Run, axis: int) -> Recording:
         "temperature": channels.temperature,
     }
     wanted = [name for name in named.values() if name] + list(channels.phases if three else ())
-    samples = run.read(wanted)
+    samples = run.read(wanted, 0, stop)
     arrays = {
         key: None if name is None else np.asarray(samples[name], dtype=np.float64)
         for key, name in named.items()
