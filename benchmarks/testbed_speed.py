@@ -36,7 +36,8 @@ def main() -> None:
     taken = time.process_time() - start
     length = len(recording.axes[1].iq_a) / recording.sampling_rate_hz
     print(
-        f"simulation alone, one core: {length:.0f} s in {taken:.2f} s, {length / taken:.0f} x real time"
+        f"simulation alone, one core: {length:.0f} s in {taken:.2f} s, "
+        f"{length / taken:.0f} x real time"
     )
     with tempfile.TemporaryDirectory() as folder:
         start = time.perf_counter()

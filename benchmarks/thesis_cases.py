@@ -312,8 +312,8 @@ def document(study: Study, n_seeds: int) -> str:
     lines += [
         "",
         "Features at the delay of (4-2) with γ = 2, baseline left out by cycle, JSD in bits. The "
-        "chain takes the current sensors' offset off (`patterns.remove_offset`), the thesis does not; "
-        "KS with the offset left in stands beside it:",
+        "chain takes the current sensors' offset off (`patterns.remove_offset`), the thesis does "
+        "not; KS with the offset left in stands beside it:",
         "",
         *feature_rows(study),
         "",
