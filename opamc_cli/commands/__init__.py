@@ -14,6 +14,7 @@ from opamc_cli.commands import (
     report,
     score,
     segment,
+    select,
     simulate,
     sweep,
 )
@@ -27,6 +28,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "report": report.report,
     "diagnose": diagnose.diagnose,
     "sweep": sweep.sweep,
+    "select": select.select,
     "simulate": simulate.simulate,
 }
 """Subcommands by name, in the order of the chain."""
