@@ -44,8 +44,10 @@ class SegmentConfig(Section):
         "band-limited",
         description="Wavelet transform: our streaming one, or the full one of ssqueezepy.",
     )
-    gamma: Positive = Field(3.0, description="Symmetry of the generalised Morse wavelet.")
-    beta: Positive = Field(
+    gamma: Annotated[float, Field(gt=0, le=20)] = Field(
+        3.0, description="Symmetry of the generalised Morse wavelet."
+    )
+    beta: Annotated[float, Field(gt=0, le=500)] = Field(
         20.0,
         description="Compactness of the Morse wavelet: 20 is the thesis's time-bandwidth of 60; "
         "ssqueezepy's own default is 60.",
@@ -53,7 +55,7 @@ class SegmentConfig(Section):
     voices_per_octave: Annotated[int, Field(ge=2, le=64)] = Field(
         16, description="Scales per octave of the wavelet transform."
     )
-    f_min_hz: Positive = Field(
+    f_min_hz: Annotated[float, Field(ge=0.1, allow_inf_nan=False)] = Field(
         8.0, description="Slowest carrier that counts as motion, Hz; slower ones cost time."
     )
     f_max_hz: Positive | None = Field(
