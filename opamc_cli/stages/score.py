@@ -93,6 +93,8 @@ class PatternRows:
 Key = tuple[int, int, int, int]
 """Axis, motion, order, tau."""
 
+KEY_COLUMNS = ("axis", "motion", "order", "tau")
+
 
 @dataclass(frozen=True)
 class ScoreOutcome:
@@ -195,20 +197,24 @@ def group_patterns(table: pa.Table, name: str = "patterns") -> dict[Key, Pattern
         for column in table.column_names
         if column != "counts"
     }
-    counts = table["counts"].to_pylist()
-    groups: dict[Key, list[int]] = {}
-    for row in np.flatnonzero((columns["motion"] >= 0) & (columns["n_patterns"] > 0)):
-        key = tuple(int(columns[part][row]) for part in ("axis", "motion", "order", "tau"))
-        groups.setdefault(key, []).append(int(row))  # type: ignore[arg-type]
+    lists = table["counts"].combine_chunks()
+    first = lists.offsets.to_numpy()
+    cells = lists.values.to_numpy(zero_copy_only=False)
+    length = np.diff(first)
+    used = np.flatnonzero((columns["motion"] >= 0) & (columns["n_patterns"] > 0))
+    keys = np.stack([columns[part][used].astype(np.int64) for part in KEY_COLUMNS], axis=1)
+    found, place = np.unique(keys, axis=0, return_inverse=True)
     result = {}
-    for key in sorted(groups):
-        rows = np.array(groups[key])
-        if len({len(counts[row]) for row in rows}) > 1:
-            msg = f"{name}: axis {key[0]}: counts of order {key[2]} differ in length; make it again"
+    for number, key in enumerate(found):
+        rows = used[place.ravel() == number]
+        axis, motion, order, tau = (int(part) for part in key)
+        if len(set(length[rows].tolist())) > 1:
+            msg = f"{name}: axis {axis}: counts of order {order} differ in length; make it again"
             raise InputError(msg)
-        result[key] = PatternRows(
+        counts = cells[first[rows][:, np.newaxis] + np.arange(length[rows[0]])]
+        result[axis, motion, order, tau] = PatternRows(
             {column: values[rows] for column, values in columns.items()},
-            np.array([counts[row] for row in rows], dtype=np.float64),
+            counts.astype(np.float64),
         )
     return result
 
@@ -236,7 +242,8 @@ def score_table(
         label = own.sessions if several else own.cycles
         pool = own.counts.sum(axis=0)
         n_own = own.counts.sum(axis=1)
-        n_rest = pool.sum() - np.array([n_own[label == each].sum() for each in label])
+        _, place = np.unique(label, return_inverse=True)
+        n_rest = pool.sum() - np.bincount(place, n_own)[place]
         cycles, session = cycle_counts(own)
         inflation = inflation_within_sessions(cycles, session)
         tables.append(
