@@ -73,7 +73,12 @@ def record(robot, program, seed: int, session: int, axis: int, severity: float) 
     """Record one axis in one session and reduce it to what the methods need."""
     faults = {axis: replace(robot.damage, severity=severity)} if severity else {}
     recording = simulate(
-        robot, program, seed=seed, session=session, axes=[axis], faults=faults,
+        robot,
+        program,
+        seed=seed,
+        session=session,
+        axes=[axis],
+        faults=faults,
         sampling_rate_hz=RATE_HZ,
     )
     segments = [s for s in recording.segments if s.axis == axis]
@@ -198,6 +203,22 @@ FEATURE_SLICES = {
 
 
 def evaluate(job) -> list[dict]:
+    """Judge a robot, or take what was judged by the same code before."""
+    path = CACHE / f"{key(job)}-{judge_digest()[:12]}.json"
+    if not path.exists():
+        CACHE.mkdir(parents=True, exist_ok=True)
+        temporary = path.with_suffix(".tmp")
+        temporary.write_text(json.dumps(judge_fleet(job)))
+        temporary.rename(path)
+    return json.loads(path.read_text())
+
+
+def judge_digest() -> str:
+    files = sorted((ROOT / "opamc_cli" / "stats").glob("*.py"))
+    return hashlib.sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
+
+
+def judge_fleet(job) -> list[dict]:
     """Score every axis of one robot at every severity of its faulty axis, by every method."""
     seed, speed, payload, n_sessions, *_ = job
     stored = record_fleet(job)
@@ -261,9 +282,7 @@ def rival_scores(stored, baseline: list[int], target: int, seed: int) -> dict[st
     ]
     other = np.mean([rivals.symmetric_kl(density[target], density[b]) for b in baseline])
     logs = np.log(own)
-    scores["kernel density KL"] = float(
-        (np.log(other) - logs.mean()) / max(logs.std(ddof=1), 0.1)
-    )
+    scores["kernel density KL"] = float((np.log(other) - logs.mean()) / max(logs.std(ddof=1), 0.1))
     flat = features[baseline].reshape(-1, features.shape[-1])
     scale = flat.std(axis=0) + 1e-12
     scores["isolation forest"] = rivals.isolation_score(
@@ -273,14 +292,15 @@ def rival_scores(stored, baseline: list[int], target: int, seed: int) -> dict[st
 
 
 def add_thesis_scores(results: list[dict]) -> None:
-    """The thesis's LDA, trained on the other half of the robots, normal and severity 1."""
+    """Score by the thesis's LDA, trained on the other half of the robots, normal and severity 1."""
     for order in ORDERS:
         name = f"thesis, order {order}"
         for half in (0, 1):
             train = [
                 r
                 for r in results
-                if r["seed"] // 100 % 2 != half and (r["severity"] == 1.0 if r["bad"] else r["severity"] == 0)
+                if r["seed"] // 100 % 2 != half
+                and (r["severity"] == 1.0 if r["bad"] else r["severity"] == 0)
             ]
             rows = np.array([r[f"thesis{order}"] for r in train])
             labels = np.array([r["bad"] for r in train])
@@ -298,47 +318,77 @@ def auc(healthy: NDArray[np.float64], faulty: NDArray[np.float64]) -> float:
     return float((ranks.sum() - len(faulty) * (len(faulty) + 1) / 2) / (len(healthy) * len(faulty)))
 
 
-def report(results: list[dict]) -> None:
+def report(results: list[dict], command: str) -> str:
+    """Return the figures as Markdown."""
     add_thesis_scores(results)
     methods = list(results[0]["scores"])
     conditions = sorted({(r["speed"], r["payload"]) for r in results})
     healthy = [r for r in results if r["severity"] == 0.0]
-    print(f"\n{len({r['seed'] for r in results})} robots, {len(conditions)} conditions,")
-    print(f"{len(healthy)} healthy joints judged\n")
-    print("All conditions together: AUC by severity, detection at 1 % false alarms, right axis")
-    head = "".join(f"  AUC {s:<5}" for s in SEVERITIES[1:]) + "".join(
-        f" det {s:<5}" for s in SEVERITIES[1:]
-    )
-    print(f"{'method':30}{head}  axis@1  earliest*")
-    for method in methods:
-        print(row_of(results, healthy, method))
-    print("* least severity found in at least 90 % of robots at 1 % false alarms")
-    print("\nAUC at severity 0.25 | 0.5 by speed % and payload kg")
-    print(f"{'method':30}" + "".join(f"{f'{s:g}/{p:g}':>14}" for s, p in conditions))
+    robots = {r["seed"] for r in results}
+    lines = [
+        f"{len(robots)} robots ({len(robots) // len(conditions)} at each of {len(conditions)} "
+        f"conditions), {len(healthy)} healthy joints; `{command}`",
+        "",
+        "AUC pools joints of all conditions; det: share found where 1 % of healthy joints are "
+        "called faulty; axis: right one of six named at severity 1.",
+        "",
+        table_head(
+            ["method"]
+            + [f"AUC {s:g}" for s in SEVERITIES[1:]]
+            + [f"det {s:g}" for s in SEVERITIES[1:]]
+            + ["axis", "found from"]
+        ),
+    ]
+    lines += [row_of(results, healthy, method) for method in methods]
+    lines += [
+        "",
+        "Found from: least severity found in at least 90 % of robots at 1 % false alarms. AUC at "
+        "severity 0.25 and 0.5 by speed (%) and payload (kg):",
+        "",
+        table_head(["method"] + [f"{s:g} %, {p:g} kg" for s, p in conditions]),
+    ]
     for method in methods:
         cells = []
         for condition in conditions:
             own = [r for r in results if (r["speed"], r["payload"]) == condition]
             a = np.array([r["scores"][method] for r in own if r["severity"] == 0.0])
-            both = [
-                auc(a, np.array([r["scores"][method] for r in own if r["bad"] and r["severity"] == s]))
+            faulty = {
+                s: np.array([r["scores"][method] for r in own if r["bad"] and r["severity"] == s])
                 for s in (0.25, 0.5)
-            ]
-            cells.append(f"{both[0]:6.3f}|{both[1]:.3f}")
-        print(f"{method:30}" + "".join(f"{c:>14}" for c in cells))
-    print("\nThe decision at its defaults")
-    alarms = [r["state"] in ("changed", "fault") for r in healthy]
-    one = [r["state_one"] in ("changed", "fault") for r in healthy]
-    print(f"false alarms on healthy joints: {sum(alarms)} of {len(alarms)} = {np.mean(alarms):.3%}")
-    print(f"  with one baseline session:    {sum(one)} of {len(one)} = {np.mean(one):.3%}")
+            }
+            cells.append(" / ".join(f"{auc(a, b):.3f}" for b in faulty.values()))
+        lines.append(f"| {method} | " + " | ".join(cells) + " |")
+    lines += ["", "The decision at its defaults:", ""]
+    for state, what in (("state", "six baseline sessions"), ("state_one", "one baseline session")):
+        alarms = np.array([r[state] in ("changed", "fault") for r in healthy])
+        found = [
+            np.mean(
+                [
+                    r[state] in ("changed", "fault")
+                    for r in results
+                    if r["bad"] and r["severity"] == severity
+                ]
+            )
+            for severity in SEVERITIES[1:]
+        ]
+        listed = ", ".join(f"{f:.1%} at {s:g}" for f, s in zip(found, SEVERITIES[1:], strict=True))
+        lines.append(
+            f"- {what}: false alarms on healthy joints {alarms.sum()} of {alarms.size} "
+            f"({alarms.mean():.2%}); damage found {listed}"
+        )
     p = np.array([r["p"] for r in healthy])
-    print(f"p-values of healthy joints: KS against uniform p = {kstest(p, 'uniform').pvalue:.3f},")
-    print("  share below 0.5, 0.1, 0.05, 0.01: " + ", ".join(f"{np.mean(p < q):.4f}" for q in (0.5, 0.1, 0.05, 0.01)))
-    for severity in SEVERITIES[1:]:
-        own = [r for r in results if r["bad"] and r["severity"] == severity]
-        found = np.mean([r["state"] in ("changed", "fault") for r in own])
-        alone = np.mean([r["state_one"] in ("changed", "fault") for r in own])
-        print(f"severity {severity}: found {found:.3f}, with one baseline session {alone:.3f}")
+    one_each = np.array([r["p"] for r in healthy if r["axis"] == faulty_axis(r["seed"])])
+    shares = ", ".join(f"{np.mean(p < q):.4f} below {q:g}" for q in (0.5, 0.1, 0.05, 0.01))
+    lines.append(
+        f"- p-values of healthy joints against uniform: KS p = "
+        f"{kstest(one_each, 'uniform').pvalue:.3f} with one joint of each robot (independent), "
+        f"{kstest(p, 'uniform').pvalue:.3f} with all; {shares}"
+    )
+    return "\n".join(lines)
+
+
+def table_head(names: list[str]) -> str:
+    return "| " + " | ".join(names) + " |\n" + "|---" * len(names) + "|"
 
 
 def row_of(results: list[dict], healthy: list[dict], method: str) -> str:
@@ -355,26 +405,38 @@ def row_of(results: list[dict], healthy: list[dict], method: str) -> str:
     for r in results:
         if r["severity"] == 1.0:
             groups.setdefault((r["seed"], r["speed"], r["payload"]), []).append(r)
-    named = np.mean(
-        [max(g, key=lambda r: r["scores"][method])["bad"] for g in groups.values()]
-    )
-    early = next((s for s, f in zip(SEVERITIES[1:], found, strict=True) if f >= 0.9), None)
-    text = "".join(f"  {x:9.4f}" for x in aucs) + "".join(f" {x:9.3f}" for x in found)
-    return f"{method:30}{text}  {named:6.3f}  {early}"
+    named = np.mean([max(g, key=lambda r: r["scores"][method])["bad"] for g in groups.values()])
+    early = next((f"{s:g}" for s, f in zip(SEVERITIES[1:], found, strict=True) if f >= 0.9), "-")
+    cells = [f"{x:.4f}" for x in aucs] + [f"{x:.2f}" for x in found] + [f"{named:.3f}", early]
+    return f"| {method} | " + " | ".join(cells) + " |"
+
+
+def write_section(path: Path, text: str) -> None:
+    """Put the figures between their markers in a document, or at its end."""
+    begin, end = "<!-- decision: begin -->", "<!-- decision: end -->"
+    document = path.read_text(encoding="utf-8")
+    if begin in document:
+        before, rest = document.split(begin, 1)
+        after = rest.split(end, 1)[1]
+    else:
+        before, after = document.rstrip() + "\n\n", "\n"
+    path.write_text(f"{before}{begin}\n\n{text}\n\n{end}{after}", encoding="utf-8")
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", default="1000:1040", help="first:stop")
     parser.add_argument("--conditions", default="20/0,20/1,20/2,50/0,50/1,50/2,100/0,100/1,100/2")
-    parser.add_argument("--sessions", type=int, default=8, help="baseline sessions")
+    parser.add_argument("--sessions", type=int, default=6, help="baseline sessions")
     parser.add_argument("--cycles", type=int, default=4)
     parser.add_argument(
         "--remount", action="store_true", help="take the gear apart between sessions"
     )
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--quick", action="store_true", help="4 robots, 3 conditions")
-    parser.add_argument("--save", type=Path, help="write the judged joints as JSON lines")
+    parser.add_argument(
+        "--write", action="store_true", help="put the figures in docs/validation.md"
+    )
     options = parser.parse_args()
     first, stop = map(int, options.seeds.split(":"))
     conditions = [tuple(map(float, c.split("/"))) for c in options.conditions.split(",")]
@@ -393,10 +455,13 @@ def main() -> None:
     else:
         nested = [evaluate(job) for job in jobs]
     results = [row for rows in nested for row in rows]
-    if options.save:
-        options.save.write_text("\n".join(json.dumps(r) for r in results))
-    report(results)
+    remount = " --remount" if options.remount else ""
+    command = f"python benchmarks/decision.py --seeds {first}:{stop}{remount}"
+    text = report(results, command)
+    print(text)
     print(f"\n{len(jobs)} fleets in {time.perf_counter() - started:.0f} s")
+    if options.write:
+        write_section(ROOT / "docs" / "validation.md", text)
 
 
 if __name__ == "__main__":

@@ -47,7 +47,7 @@ def sideband_features(
 
 
 def torque_histogram(torque_current_a: FloatArray) -> FloatArray:
-    """Counts of the torque current in the cells of `KDE_GRID_A`."""
+    """Count the torque current in the cells of `KDE_GRID_A`."""
     edges = np.append(KDE_GRID_A, KDE_GRID_A[-1] + 0.05) - 0.025
     return np.histogram(torque_current_a, edges)[0].astype(np.float64)
 
