@@ -11,6 +11,7 @@ from opamc_cli.joint.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
+    quiet_block,
     smoothing_window,
 )
 from opamc_cli.joint.track import Bools, Floats, Joint, Track
@@ -71,6 +72,8 @@ class Motion:
         Standard deviation of the speed's noise.
     kernel : array of odd length
         Moving average that the acceleration has gone through.
+    quiet : int
+        Samples over which the acceleration's noise averages to almost nothing.
     """
 
     position_rad: Floats
@@ -79,6 +82,7 @@ class Motion:
     window: int
     velocity_noise: float
     kernel: Floats
+    quiet: int = 1
 
 
 def motion_from_position(
@@ -109,17 +113,22 @@ def motion_from_position(
         agrees = spread > 0 and float(np.std(speed - velocity)) < 0.1 * spread
         own = smoothing_window(speed, rate_hz, derivative=1)
         if agrees and own < window:
+            acceleration = derivatives(speed, rate_hz, own, 1)
+            spread = float(np.std(acceleration))
             return Motion(
                 position,
                 derivatives(speed, rate_hz, own, 0),
-                derivatives(speed, rate_hz, own, 1),
+                acceleration,
                 own,
                 measurement_noise(speed) * noise_gain(rate_hz, own, 0),
                 averaging_kernel(own, 1),
+                quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
             )
     noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
     kernel = averaging_kernel(window, 2)
-    return Motion(position, velocity, acceleration, window, noise, kernel)
+    spread = float(np.std(acceleration))
+    quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -131,7 +140,9 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     noise = measurement_noise(velocity_rad_s) * noise_gain(rate_hz, window, 0)
     position = np.concatenate([[0.0], np.cumsum(steps)])
     kernel = averaging_kernel(window, 1)
-    return Motion(position, velocity, acceleration, window, noise, kernel)
+    spread = float(np.std(acceleration))
+    quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -155,16 +166,15 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     -------
     bool array of shape (n,)
     """
-    velocity = motion.velocity
-    speeds = np.abs(velocity)
-    moving: Bools = usable & (direction_of(motion) != 0)
-    moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
+    speeds = np.abs(motion.velocity)
+    direction = direction_of(motion)
     half = motion.window // 2
-    turns = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
-    for turn in turns if turns.size < velocity.size // 4 else []:
-        moving[max(turn - half, 0) : turn + half + 2] = False
+    uncertain = direction == 0
+    uncertain[1:] |= direction[1:] != direction[:-1]
+    moving: Bools = usable & ~widened(uncertain, half)
+    moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     moving[:half] = False
-    moving[velocity.size - half :] = False
+    moving[speeds.size - half :] = False
     return moving
 
 
@@ -254,6 +264,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         current_d_a=join("current_d_a") if with_phases else None,
         electrical_rad=join("electrical_rad") if with_angle else None,
         kernel=max((piece.kernel for piece in pieces), key=len),
+        quiet=max(piece.quiet for piece in pieces),
     )
 
 
@@ -355,6 +366,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
         current_d_a=current_d,
         electrical_rad=electrical,
         kernel=motion.kernel,
+        quiet=motion.quiet,
     )
 
 

@@ -8,7 +8,8 @@ from opamc_cli.joint.track import Floats
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
-ALLOWED_NOISE_SHARE = 0.05
+ALLOWED_NOISE_SHARE = 0.01
+QUIET_NOISE_SHARE = 0.004
 
 
 def measurement_noise(path: Floats) -> float:
@@ -100,6 +101,39 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
     centred = np.roll(weights, 1) if derivative == 2 else weights + np.roll(weights, 1)
     kernel: Floats = centred / centred.sum()
     return kernel
+
+
+def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivative: int) -> int:
+    """Count the samples per block over which a derivative's noise averages to almost nothing.
+
+    A regressor with noise invites every effect that is a smoother version of it. Blocks are long
+    enough when the noise that is left is below 0.4 % of the derivative.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the path's white noise.
+    scale : float
+        Standard deviation of the derivative.
+    rate_hz : float
+        Sampling rate.
+    window, derivative : int
+        Of the local polynomial.
+
+    Returns
+    -------
+    int
+        At least 1, at most 0.2 s.
+    """
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
+    block = 1
+    while block < longest:
+        left = float(np.linalg.norm(np.convolve(kernel, np.ones(block) / block)))
+        if noise * left <= QUIET_NOISE_SHARE * scale:
+            break
+        block += max(block // 4, 1)
+    return min(block, longest)
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:

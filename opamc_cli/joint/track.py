@@ -56,6 +56,8 @@ class Track:
     kernel : array of odd length
         Moving average that the acceleration has gone through; the coarse grid puts the current
         through it too.
+    quiet : int
+        Samples over which the acceleration's noise averages to almost nothing.
     channels : frozenset of str
         What was logged or follows from it: position, scale, temperature, phases, electrical.
     period_samples : int or None
@@ -86,6 +88,7 @@ class Track:
     static_columns: Floats | None = None
     open_samples: Bools | None = None
     kernel: Floats = field(default_factory=lambda: np.ones(1))
+    quiet: int = 1
 
     @property
     def size(self) -> int:
