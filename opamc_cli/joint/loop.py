@@ -13,10 +13,12 @@ from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.trace import (
     Candidate,
     Gate,
+    Held,
     View,
     decoy_likelihood,
     held_out,
     prepare,
+    prepare_held,
     refusal,
     search,
 )
@@ -258,8 +260,11 @@ def _candidates(
     found.sort(key=lambda candidate: -candidate.score)
     _simplest_first(found, library, session)
     checked: list[Candidate] = []
+    held: dict[bool, Held] = {}
     for candidate in found:
-        tested = held_out(fitted, candidate)
+        if candidate.fine not in held:
+            held[candidate.fine] = prepare_held(fitted, candidate.fine)
+        tested = held_out(fitted, candidate, held[candidate.fine])
         tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
         checked.append(replace(tested, why_not=refusal(tested, gate)))
     return checked, untestable, views

@@ -322,7 +322,24 @@ def _refined(
     return champion
 
 
-def held_out(fit: Fit, candidate: Candidate) -> Candidate:
+@dataclass(frozen=True)
+class Held:
+    """What leaving groups out needs of the model itself, once per round."""
+
+    base: Floats
+    residual: Floats
+
+
+def prepare_held(fit: Fit, fine: bool) -> Held:
+    """Collect the model's regressors and residual on the open samples of one grid."""
+    session = fit.session
+    rows = session.grid(fine).fit
+    blocks = [session.columns(term, fine)[rows] for term in fit.terms]
+    base = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(rows.sum()), 0))
+    return Held(base, residual_on(fit, fine)[rows])
+
+
+def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candidate:
     """Refit a candidate jointly with the model, each group left out in turn.
 
     Parameters
@@ -331,6 +348,8 @@ def held_out(fit: Fit, candidate: Candidate) -> Candidate:
         The model so far.
     candidate : Candidate
         Found by `search`.
+    held : Held, optional
+        From `prepare_held`, on the candidate's grid.
 
     Returns
     -------
@@ -340,11 +359,10 @@ def held_out(fit: Fit, candidate: Candidate) -> Candidate:
     """
     session = fit.session
     grid = session.grid(candidate.fine)
-    blocks = [session.columns(term, candidate.fine)[grid.fit] for term in fit.terms]
-    base = sum(block.shape[1] for block in blocks)
+    held = held or prepare_held(fit, candidate.fine)
+    base = held.base.shape[1]
     own = session.columns(candidate.term, candidate.fine)[grid.fit]
-    current = residual_on(fit, candidate.fine)[grid.fit]
-    normal = normal_equations(np.concatenate([*blocks, own], axis=1), current, grid.slices)
+    normal = normal_equations(np.concatenate([held.base, own], axis=1), held.residual, grid.slices)
     before = held_out_error(normal.taken(list(range(base))))
     after = held_out_error(normal)
     falls = before - after
