@@ -19,6 +19,10 @@ INSPECT = (
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
+CHECK_FIRST = (
+    "The change looks like {}: check that before the gear, and record a new baseline if it is "
+    "meant to stay."
+)
 CANNOT_TELL = (
     "The patterns say that the torque's course has changed, not what changed it: another payload, "
     "program, controller gain or temperature changes it too. Repeat the recording under the "
@@ -63,9 +67,9 @@ def reasons(
         _rest(judgement, sources),
         *_siblings(judgement),
     ]
-    if cause is not None and cause.get("interpretation"):
-        sentences.append(f"Likely cause: {cause['interpretation']}.")
-    if unhealthy:
+    if unhealthy and cause is not None and cause.get("harmless"):
+        sentences.append(CHECK_FIRST.format(cause.get("interpretation") or cause.get("effect")))
+    elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]
     return [*sentences, *_short(cells)]
 

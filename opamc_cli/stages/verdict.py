@@ -30,19 +30,8 @@ from opamc_cli.storage.tables import read_table
 
 FILE_NAME = "verdict.json"
 
-OUTSIDE_THE_GEAR = frozenset(
-    {
-        "payload_change",
-        "thermal_viscous",
-        "warmup",
-        "time_delay",
-        "sensor_offset",
-        "sensor_gain",
-        "dead_time",
-        "mains_hum",
-    }
-)
-"""Causes that change the current without anything being worn."""
+MAIN_SHARE = 0.5
+"""Share of the change from which a cause decides between changed and fault."""
 
 
 @dataclass(frozen=True)
@@ -186,10 +175,12 @@ def policy_of(config: ScoreConfig) -> Policy:
 
 
 def _with_cause(judgement: Judgement, cause: Mapping[str, Any] | None) -> Judgement:
-    """Call a change of known cause a fault only if the cause lies in the joint."""
+    """Call a change of known cause a fault only if that cause harms the joint."""
     if cause is None or judgement.state not in ("changed", "fault"):
         return judgement
-    state: State = "changed" if cause.get("effect") in OUTSIDE_THE_GEAR else "fault"
+    if float(cause.get("share", 1.0)) < MAIN_SHARE:
+        return judgement
+    state: State = "changed" if cause.get("harmless") else "fault"
     return replace(judgement, state=state)
 
 

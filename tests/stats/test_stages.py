@@ -161,14 +161,21 @@ def test_few_patterns_are_warned_of(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("effect", "state"), [("payload_change", "changed"), ("ripple", "fault"), (None, "fault")]
+    ("cause", "state", "said"),
+    [
+        ({"harmless": True, "share": 0.9, "interpretation": "a heavier payload"}, "changed", True),
+        ({"harmless": True, "share": 0.2, "interpretation": "a heavier payload"}, "fault", True),
+        ({"harmless": False, "share": 0.9, "interpretation": "tooth damage"}, "fault", False),
+        (None, "fault", False),
+    ],
 )
-def test_a_cause_outside_the_joint_makes_a_fault_a_change(tmp_path, effect, state):
-    causes = {3: {"effect": effect, "interpretation": "something known"}} if effect else None
+def test_a_harmless_cause_makes_a_fault_a_change(tmp_path, cause, state, said):
+    causes = {3: {"effect": "some", **cause}} if cause else None
     outcome = diagnose(tmp_path, Fleet(severity=1.0), causes=causes)
     axis = next(a for a in outcome.verdict["axes"] if a["axis"] == 3)
     assert axis["state"] == state
-    assert (axis["cause"] is None) == (effect is None)
+    assert (axis["cause"] is None) == (cause is None)
+    assert any("looks like a heavier payload" in reason for reason in axis["reasons"]) == said
 
 
 def test_a_cause_does_not_make_a_healthy_joint_ill(tmp_path):
