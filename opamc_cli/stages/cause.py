@@ -1,7 +1,8 @@
 """Why a joint has changed: the effect that target runs have and baseline runs lack."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 from opamc_cli.config.models import JointConfig
@@ -11,6 +12,7 @@ from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.track import Joint
 from opamc_cli.stages.model import read_recording
 from opamc_cli.storage.sources import RunSource
+from opamc_cli.storage.tables import read_table
 
 MAX_RUNS = 4
 """Runs of each side that are looked at, the newest ones: causes do not become clearer with more."""
@@ -21,6 +23,7 @@ def explain(
     baseline: Sequence[RunSource],
     target: Sequence[RunSource],
     config: JointConfig,
+    first_motion: Mapping[str, int] | None = None,
 ) -> dict[str, Any] | None:
     """Trace the change of one joint to an effect of the library.
 
@@ -32,6 +35,9 @@ def explain(
         Runs in which the axis moves, in time order.
     config
         Gear ratio and pole pairs, and how much is looked at.
+    first_motion
+        Sample at which the axis first moves, by run; where it waits for others, what is looked
+        at is counted from there.
 
     Returns
     -------
@@ -42,7 +48,7 @@ def explain(
     sides = []
     seconds = 60.0 * config.explain_minutes
     for sources in (baseline, target):
-        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds)
+        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, first_motion or {})
         if not recordings:
             return None
         sides.append(recordings)
@@ -50,10 +56,23 @@ def explain(
     return _entry(explain_change(sides[0], sides[1], joint))
 
 
-def _recordings(axis: int, sources: Sequence[RunSource], seconds: float) -> list[Recording]:
+def first_motions(patterns: Path) -> dict[int, dict[str, int]]:
+    """Return, by axis and run, where the first identified motion of a pattern table starts."""
+    found: dict[int, dict[str, int]] = {}
+    columns = read_table(patterns, "patterns").select(["axis", "run", "start"])
+    for row in columns.to_pylist():
+        runs = found.setdefault(row["axis"], {})
+        runs[row["run"]] = min(row["start"], runs.get(row["run"], row["start"]))
+    return found
+
+
+def _recordings(
+    axis: int, sources: Sequence[RunSource], seconds: float, first_motion: Mapping[str, int]
+) -> list[Recording]:
     found = []
     for source in sources:
         stop = round(seconds / len(sources) * source.info.sampling_rate_hz)
+        stop += first_motion.get(source.name, 0)
         try:
             with source.open() as run:
                 found.append(read_recording(run, axis, stop))

@@ -93,7 +93,16 @@ def run(
     if unhealthy and config.joint.explain:
         progress("cause")
         sides = read_sources(normal.patterns), read_sources(other.patterns)
-        causes = {axis: cause.explain(axis, *sides, config.joint) for axis in unhealthy}
+        starts = cause.first_motions(normal.patterns), cause.first_motions(other.patterns)
+        causes = {
+            axis: cause.explain(
+                axis,
+                *sides,
+                config.joint,
+                {**starts[0].get(axis, {}), **starts[1].get(axis, {})},
+            )
+            for axis in unhealthy
+        }
         known = {axis: found for axis, found in causes.items() if found is not None}
         decided = verdict.run(*tables, config, out, causes=known)
     progress("report")
