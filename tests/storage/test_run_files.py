@@ -248,10 +248,12 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
 
 
 KILLED = """
-import sys, time
+import signal, sys, time
 import numpy as np
 import pyarrow as pa
 from opamc_cli.storage.runs import RunInfo, write_run
+# a shell starts background jobs, and so what they start, with SIGINT ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)
 schema = pa.schema([("axis1_a", pa.float32())])
 with write_run({path!r}, RunInfo(1.0), schema) as writer:
     while True:
