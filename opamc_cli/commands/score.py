@@ -18,7 +18,7 @@ def score(
     ],
     model: Annotated[
         Path | None,
-        typer.Option("--model", metavar="FILE", help="Trained discriminant for column lda."),
+        typer.Option("--lda", metavar="FILE", help="Trained discriminant, from --learn."),
     ] = None,
     learn: Annotated[
         Path | None,

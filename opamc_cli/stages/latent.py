@@ -50,7 +50,7 @@ class LatentModels:
         if outside:
             msg = (
                 f"{self.path}: cannot judge axis {row['axis']}, {outside[0]} of its training; "
-                "leave out --model, or train it on labelled recordings of this condition (--learn)"
+                "leave out --lda, or train it on labelled recordings of this condition (--learn)"
             )
             raise InputError(msg)
         return float(model.project([row[name] for name in FEATURE_NAMES]))
