@@ -12,6 +12,7 @@ from opamc_cli.signal.analytic import AnalyticStream, clarke, envelope, temporal
 from opamc_cli.signal.boundaries import refine_boundaries
 from opamc_cli.signal.motion import MotionBand, MotionStream, join_frames
 from opamc_cli.signal.noise import noise_level
+from opamc_cli.signal.offset import turning_means, turning_offset
 from opamc_cli.signal.quality import clipped_share
 from opamc_cli.signal.rotation import RotationStream, join_rotation
 from opamc_cli.signal.segmentation import (
@@ -65,12 +66,16 @@ class _Probe:
         Standard deviation of the noise in each component of the current, A.
     floor_a
         Modulus below which the carrier's angle is noise, A.
+    offset_a
+        What the sensors add to the current vector, A; 0 for one phase. Left in, it stands still
+        where torque passes zero, and looks like a robot that stands.
     notes
         One sentence for each clipped phase.
     """
 
     noise_a: float
     floor_a: float
+    offset_a: complex
     notes: tuple[str, ...]
 
 
@@ -109,7 +114,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     if _never_stands(motions, evidence):
         segments = _windows(run, names, evidence, motions[0], config)
     else:
-        segments = _refined(run, names, motions, evidence)
+        segments = _refined(run, names, motions, evidence, probe.offset_a)
     signal = "phases" if len(names) == 3 else "phase"
     strongest = float(evidence.frames.strength.max(initial=0))
     return AxisSegments(
@@ -135,12 +140,14 @@ def frame_step(fs_hz: float) -> int:
 
 def _look(run: Run, names: Sequence[str], config: SegmentConfig) -> _Probe:
     starts = np.linspace(0, max(0, run.n_samples - ROW_GROUP_SAMPLES), PROBES).astype(int)
-    noise, moduli, notes = [], [], []
+    noise, means, moduli, notes = [], [], [], []
     clipped = dict.fromkeys(names, 0.0)
     for start in np.unique(starts // ROW_GROUP_SAMPLES * ROW_GROUP_SAMPLES).tolist():
         block = run.read(names, start, start + ROW_GROUP_SAMPLES)
         current = _current([block[name] for name in names])
         noise.append(noise_level(current))
+        if np.iscomplexobj(current):  # three phases
+            means.append(turning_means(current.astype(np.complex64), run.sampling_rate_hz))
         modulus = np.abs(current) if len(names) == 1 else envelope(current.astype(np.complex64))
         moduli.append(float(np.nanquantile(modulus, 0.95)) if np.isfinite(modulus).any() else 0.0)
         for name in names:
@@ -156,6 +163,7 @@ def _look(run: Run, names: Sequence[str], config: SegmentConfig) -> _Probe:
     return _Probe(
         noise_a,
         min(config.noise_floor * noise_a, MAX_FLOOR_SHARE * max(moduli)),
+        turning_offset(np.concatenate(means)) if means else 0j,
         tuple(notes),
     )
 
@@ -192,7 +200,10 @@ def _gather(
                 x = np.where(known, x, np.float32(0))
             lowest[name], highest[name] = min(lowest[name], low), max(highest[name], high)
             phases.append(x)
-        take(clarke(*phases) if hilbert is None else hilbert.push(phases[0]))
+        if hilbert is None:
+            take(clarke(*phases) - np.complex64(probe.offset_a))
+        else:
+            take(hilbert.push(phases[0]))
     if hilbert is not None:
         take(hilbert.finish())
     frames.append(motion.finish())
@@ -308,7 +319,11 @@ def _windows(
 
 
 def _refined(
-    run: Run, names: Sequence[str], motions: Sequence[Motion], evidence: Evidence
+    run: Run,
+    names: Sequence[str],
+    motions: Sequence[Motion],
+    evidence: Evidence,
+    offset_a: complex,
 ) -> list[Segment]:
     """Place each motion's boundaries between it and its neighbours to the sample."""
     step = evidence.frames.step
@@ -321,7 +336,10 @@ def _refined(
         first = max(start - context, (before + start) // 2 if i else 0)
         last = min(stop + context, (after + stop) // 2 if i + 1 < len(motions) else run.n_samples)
         block = run.read(names, first, last)
-        current = np.nan_to_num(_current([block[name] for name in names]), posinf=0, neginf=0)
+        current = _current([block[name] for name in names])
+        if len(names) == 3:
+            current = current - np.complex64(offset_a)
+        current = np.nan_to_num(current, posinf=0, neginf=0)
         lost_at_speed = motion.f_last_hz > LOST_SHARE * motion.f_max_hz
         refined = refine_boundaries(
             current,
