@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import factorial
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +108,8 @@ class ScoreOutcome:
     scores, features
         Their rows.
     notes
-        What is worth knowing: conditions that differ, motions that one side lacks.
+        What is worth knowing: conditions that differ, motions that one side lacks, orders with
+        more possible patterns than a segment holds.
     """
 
     scores_path: Path
@@ -161,8 +163,9 @@ def run(
     for name, table in ((SCORES_NAME, scores), (FEATURES_NAME, features)):
         write_table(out / name, table, stage="score", config=used, inputs=inputs)
     missing = _missing_notes(parts["baseline"], parts["target"])
+    short = _short_notes(parts["baseline"])
     return ScoreOutcome(
-        out / SCORES_NAME, out / FEATURES_NAME, scores, features, (*notes, *missing)
+        out / SCORES_NAME, out / FEATURES_NAME, scores, features, (*notes, *missing, *short)
     )
 
 
@@ -396,3 +399,16 @@ def _missing_notes(
     for axis, motion in sorted(have["t"] - have["b"]):
         notes.append(f"axis {axis}: motion {motion} of the target does not occur in the baseline")
     return notes
+
+
+def _short_notes(baseline: Mapping[Key, PatternRows]) -> Sequence[str]:
+    shortest: dict[int, tuple[float, int]] = {}
+    for (axis, _, order, _), part in baseline.items():
+        typical = float(np.median(part.counts.sum(axis=1)))
+        shortest[order] = min(shortest.get(order, (np.inf, axis)), (typical, axis))
+    return [
+        f"order {order}: axis {axis} has segments of {typical:.0f} patterns for "
+        f"{factorial(order)} possible ones; its divergence is mostly chance, use a lower order"
+        for order, (typical, axis) in sorted(shortest.items())
+        if typical < factorial(order)
+    ]

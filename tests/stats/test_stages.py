@@ -156,6 +156,9 @@ def test_one_baseline_session_is_said_to_be_one(tmp_path):
 
 
 def test_few_patterns_are_warned_of(tmp_path):
+    baseline, target = write_patterns(tmp_path, Fleet(independent=2, overlap=8), 0)
+    notes = score.run(baseline, target, CONFIG, tmp_path).notes
+    assert any("16 patterns for 24 possible ones" in note for note in notes)
     outcome = diagnose(tmp_path, Fleet(independent=2, overlap=8))
     assert "Order 4 has 24 patterns" in " ".join(outcome.verdict["axes"][0]["reasons"])
 
