@@ -62,6 +62,8 @@ def align(
         return Alignment(0, 0.0)
     x = x - x.mean()
     y = y - y.mean()
+    # beyond the longer one's length nothing overlaps
+    max_lag = min(max_lag, max(x.size, y.size))
     lags = np.arange(-max_lag, max_lag + 1)
     # overlap of reference samples i with segment samples i + lag
     first = np.maximum(0, -lags)
