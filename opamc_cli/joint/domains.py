@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import gamma
+from scipy.stats import t as student
 
 from opamc_cli.joint.model import Fit
 from opamc_cli.joint.normal import held_out_error, normal_equations
@@ -22,6 +23,9 @@ from opamc_cli.joint.spectra import (
 from opamc_cli.joint.trace import prepare, residual_on
 from opamc_cli.joint.track import Floats, Track
 
+LINE_P = 1e-4
+"""Probability with which noise alone shows a line."""
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -30,6 +34,7 @@ class Structure:
     domain: str
     gain: float
     t_value: float
+    p_value: float
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,7 @@ class Ceiling:
     ----------
     share : float
         Share of the residual's mean square that repeats, at least 0.
-    t_value : float
+    t_value, p_value : float
         Of that share.
     how : str
         "cycles" (covariance of cycles at equal times) or "domains" (best flexible basis).
@@ -48,6 +53,7 @@ class Ceiling:
 
     share: float
     t_value: float
+    p_value: float
     how: str
 
 
@@ -171,7 +177,8 @@ def structures(fit: Fit) -> list[Structure]:
 def _structure(domain: str, falls: Floats, before: Floats) -> Structure:
     spread = float(np.std(falls, ddof=1)) if falls.size > 1 else 0.0
     t_value = float(falls.mean() / (spread / np.sqrt(falls.size))) if spread > 0 else 0.0
-    return Structure(domain, float(falls.sum() / max(before.sum(), 1e-300)), t_value)
+    p_value = float(student.sf(t_value, max(falls.size - 1, 1)))
+    return Structure(domain, float(falls.sum() / max(before.sum(), 1e-300)), t_value, p_value)
 
 
 def _line_structures(fit: Fit) -> list[Structure]:
@@ -185,16 +192,16 @@ def _line_structures(fit: Fit) -> list[Structure]:
     if orders.size - first > 8:
         trials = (orders.size - first) / OVERSAMPLING
         height = float(power[first:].max())
-        if height > gamma.isf(1e-4 / trials, classes):
+        if height > gamma.isf(LINE_P / trials, classes):
             share = 2 * height / classes / max(int(view.valid.sum()), 1) * classes
-            found.append(Structure("motor-angle", min(share, 1.0), float(np.sqrt(height))))
+            found.append(Structure("motor-angle", min(share, 1.0), float(np.sqrt(height)), LINE_P))
     frequencies, lines = frequency_lines(view.residual, track.rate_hz)
     upper = frequencies > 5.0
     if upper.any():
         height = float(lines[upper].max())
-        if height > gamma.isf(1e-4 / upper.sum(), 1):
+        if height > gamma.isf(LINE_P / upper.sum(), 1):
             share = 2 * height / max(int(view.valid.sum()), 1)
-            found.append(Structure("frequency", min(share, 1.0), float(np.sqrt(height))))
+            found.append(Structure("frequency", min(share, 1.0), float(np.sqrt(height)), LINE_P))
     return found
 
 
@@ -214,8 +221,8 @@ def ceiling(fit: Fit, seen: list[Structure]) -> Ceiling:
         The larger of the cycles' covariance at equal times (unbiased: no cycle is compared with
         itself) and the best flexible basis.
     """
-    best = max(seen, key=lambda structure: structure.gain, default=Structure("", 0.0, 0.0))
-    by_domain = Ceiling(max(best.gain, 0.0), best.t_value, "domains")
+    best = max(seen, key=lambda structure: structure.gain, default=Structure("", 0.0, 0.0, 1.0))
+    by_domain = Ceiling(max(best.gain, 0.0), best.t_value, best.p_value, "domains")
     by_cycle = _cycle_ceiling(fit)
     if by_cycle is None or by_cycle.share < by_domain.share:
         return by_domain
@@ -249,4 +256,5 @@ def _cycle_ceiling(fit: Fit) -> Ceiling | None:
     shares = np.array(products) / max(energy, 1e-300)
     spread = float(np.std(shares, ddof=1))
     t_value = float(shares.mean() / (spread / np.sqrt(shares.size))) if spread > 0 else 0.0
-    return Ceiling(max(float(shares.mean()), 0.0), t_value, "cycles")
+    p_value = float(student.sf(t_value, max(shares.size - 1, 1)))
+    return Ceiling(max(float(shares.mean()), 0.0), t_value, p_value, "cycles")

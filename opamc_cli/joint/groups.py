@@ -8,6 +8,9 @@ from scipy.signal import correlate
 from opamc_cli.joint.track import Bools, Floats, Ints
 
 REPEAT_ERROR = 0.02
+COARSE_REPEAT_ERROR = 0.3
+"""At 50 Hz a cycle is rarely a whole number of samples: first look with a wide mesh."""
+MOST_DIPS = 30
 SEALED_SHARE = 0.27
 BLOCKS_WITHOUT_CYCLES = 12
 SHORTEST_BLOCK_S = 0.2
@@ -70,23 +73,22 @@ def cycle_length(path: Floats, rate_hz: float) -> int | None:
     away = np.flatnonzero(mismatch > 0.5)
     if not away.size:
         return None
-    good = np.flatnonzero((mismatch < REPEAT_ERROR) & (np.arange(lags.size) > away[0]))
-    if not good.size:
-        return None
-    first = good[0]
-    last = first
-    while last + 1 < mismatch.size and mismatch[last + 1] < 2 * REPEAT_ERROR:
-        last += 1
-    best = first + int(np.argmin(mismatch[first : last + 1]))
-    return _exact_lag(path, int(lags[best]) * factor, factor)
+    inner = mismatch[1:-1]
+    dips = np.flatnonzero((inner <= mismatch[:-2]) & (inner <= mismatch[2:])) + 1
+    dips = dips[(dips > away[0]) & (mismatch[dips] < COARSE_REPEAT_ERROR)]
+    for dip in dips[:MOST_DIPS]:
+        lag, error = _exact_lag(path, int(lags[dip]) * factor, factor)
+        if error < REPEAT_ERROR * 2 * float(np.var(path)):
+            return lag
+    return None
 
 
-def _exact_lag(path: Floats, near: int, reach: int) -> int:
-    if reach == 1:
-        return near
+def _exact_lag(path: Floats, near: int, reach: int) -> tuple[int, float]:
+    """Best lag at the full rate, and its mean square difference."""
     lags = [lag for lag in range(near - reach, near + reach + 1) if 0 < lag < path.size]
     errors = [float(np.mean((path[lag:] - path[:-lag]) ** 2)) for lag in lags]
-    return lags[int(np.argmin(errors))]
+    best = int(np.argmin(errors))
+    return lags[best], errors[best]
 
 
 def group_samples(

@@ -8,6 +8,7 @@ from opamc_cli.joint.angle_filter import smoothing_kernel
 from opamc_cli.joint.phases import PhaseAngle, follow_phases, side_of_torque, torque_current
 from opamc_cli.joint.smoothing import (
     averaging_kernel,
+    blurred,
     derivatives,
     measurement_noise,
     noise_gain,
@@ -74,6 +75,8 @@ class Motion:
         Moving average that the acceleration has gone through.
     quiet : int
         Samples over which the acceleration's noise averages to almost nothing.
+    blur : array of shape (n, 2) or None
+        What the acceleration would gain or lose by a third and by three times the window.
     """
 
     position_rad: Floats
@@ -83,6 +86,7 @@ class Motion:
     velocity_noise: float
     kernel: Floats
     quiet: int = 1
+    blur: Floats | None = None
 
 
 def motion_from_position(
@@ -123,12 +127,14 @@ def motion_from_position(
                 measurement_noise(speed) * noise_gain(rate_hz, own, 0),
                 averaging_kernel(own, 1),
                 quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
+                blurred(speed, rate_hz, own, 1),
             )
     noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
     kernel = averaging_kernel(window, 2)
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet)
+    blur = blurred(position_rad, rate_hz, window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -142,7 +148,8 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     kernel = averaging_kernel(window, 1)
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet)
+    blur = blurred(velocity_rad_s, rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -265,6 +272,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         electrical_rad=join("electrical_rad") if with_angle else None,
         kernel=max((piece.kernel for piece in pieces), key=len),
         quiet=max(piece.quiet for piece in pieces),
+        blur=join("blur") if all(piece.blur is not None for piece in pieces) else None,
     )
 
 
@@ -367,6 +375,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
         electrical_rad=electrical,
         kernel=motion.kernel,
         quiet=motion.quiet,
+        blur=motion.blur,
     )
 
 

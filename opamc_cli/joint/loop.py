@@ -28,9 +28,11 @@ TIE_LIKELIHOOD = 6.0
 TIE_SHARE = 0.03
 TIE_COLLINEARITY = 0.9
 STRUCTURE_GAIN = 0.02
-STRUCTURE_T = 3.0
+STRUCTURE_P = 1e-3
+"""Least gain and largest p of what counts as structure that is left."""
 STRUCTURE_KEPT = 0.3
 CLOSED_SHARE = 0.9
+TRIFLE_SHARE = 0.4
 PRUNE_GAIN = 0.003
 
 
@@ -165,6 +167,7 @@ def close_loop(
     fitted, steps, remains = _without_wrong_forms(
         before, fitted, steps, seen_before, remains, progress
     )
+    fitted, steps, remains = _without_trifles(before, fitted, steps, remains, progress)
     return _summary(before, fitted, tuple(steps), progress, seen_before, remains)
 
 
@@ -426,7 +429,7 @@ def _without_wrong_forms(
         for structure in remains
         if structure.domain in SHAPED_DOMAINS
         and structure.gain > STRUCTURE_GAIN
-        and structure.t_value > STRUCTURE_T
+        and structure.p_value < STRUCTURE_P
         and structure.gain * scale > STRUCTURE_KEPT * max(first.get(structure.domain, 0.0), 0.0)
     }
     kept = [step for step in steps if step.term.effect.domain not in wrong]
@@ -445,6 +448,39 @@ def _without_wrong_forms(
             )
     smaller = fit_terms(fitted.session, (*before.terms, *(step.term for step in kept)))
     return smaller, kept, structures(smaller)
+
+
+def _without_trifles(
+    before: Fit,
+    fitted: Fit,
+    steps: list[Step],
+    remains: list[Structure],
+    progress: _Progress,
+) -> tuple[Fit, list[Step], list[Structure]]:
+    """Take everything back where most of what repeats is still there.
+
+    What the library lacks leaks into whatever resembles it a little; a small part explained
+    beside a large part unexplained is no name.
+    """
+    left = ceiling(fitted, remains)
+    if not steps or left.p_value >= STRUCTURE_P or left.share < STRUCTURE_GAIN:
+        return fitted, steps, remains
+    first, last = before.rmse(sealed=False) ** 2, fitted.rmse(sealed=False) ** 2
+    explained, unexplained = first - last, left.share * last
+    if explained > TRIFLE_SHARE * (explained + unexplained):
+        return fitted, steps, remains
+    domain = remains[0].domain if remains else "unknown"
+    for step in steps:
+        effect = step.term.effect
+        progress.rejected[effect.name] = Rejected(
+            effect.name,
+            effect.domain,
+            step.term.parameters,
+            step.gain,
+            step.p_value,
+            f"explains little of what repeats; most is in the {domain} domain",
+        )
+    return before, [], structures(before)
 
 
 def _r2(fitted: Fit) -> float:
@@ -467,9 +503,9 @@ def _summary(
     structured = [
         structure
         for structure in remains
-        if structure.gain > STRUCTURE_GAIN and structure.t_value > STRUCTURE_T
+        if structure.gain > STRUCTURE_GAIN and structure.p_value < STRUCTURE_P
     ]
-    rest = last.share > STRUCTURE_GAIN and last.t_value > STRUCTURE_T
+    rest = last.share > STRUCTURE_GAIN and last.p_value < STRUCTURE_P
     # Only now are the sealed groups looked at.
     rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
     floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))

@@ -103,6 +103,36 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
     return kernel
 
 
+def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats | None:
+    """Compare the derivative with those of a third and of three times the window.
+
+    Where the motion is less smooth than the window, as at a step of the acceleration, the
+    current holds what the derivative lacks; these two span the lack.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Position or speed.
+    rate_hz : float
+        Sampling rate.
+    window, derivative : int
+        Of the local polynomial.
+
+    Returns
+    -------
+    array of shape (n, 2) or None
+        None where the window is the shortest there is.
+    """
+    if window <= SHORTEST_WINDOW:
+        return None
+    middle = derivatives(path, rate_hz, window, derivative)
+    narrow = max(window // 3 | 1, SHORTEST_WINDOW)
+    wide = min(3 * window, (path.size - 1) | 1)
+    return np.stack(
+        [derivatives(path, rate_hz, size, derivative) - middle for size in (narrow, wide)], axis=1
+    )
+
+
 def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivative: int) -> int:
     """Count the samples per block over which a derivative's noise averages to almost nothing.
 

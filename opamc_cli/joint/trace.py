@@ -17,6 +17,7 @@ SCORE_PER_PARAMETER = 6.0
 """What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
 
 BLOCKS_PER_GROUP = 8
+DECOY_BLOCKS_PER_GROUP = 2
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,7 @@ class Gate:
     smallest_consistency: float = 0.75
     decoy_ratio: float = 2.0
     largest_p: float = 5e-3
-    decoys: int = 3
+    decoys: int = 5
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,10 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
         grid.track.moving & (grid.track.group >= 0), grid.track.bounds, taps.size - 1
     )
     blocks = [session.columns(term, fine) for term in fit.terms]
+    blur = grid.track.blur
+    if fine and blur is not None:
+        # What smoothing took from the acceleration is no effect.
+        blocks.append(blur)
     base = (
         np.concatenate([whitened(block, taps)[valid] for block in blocks], axis=1)
         if blocks
@@ -335,6 +340,9 @@ def prepare_held(fit: Fit, fine: bool) -> Held:
     session = fit.session
     rows = session.grid(fine).fit
     blocks = [session.columns(term, fine)[rows] for term in fit.terms]
+    blur = session.grid(fine).track.blur
+    if fine and blur is not None:
+        blocks.append(blur[rows])
     base = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(rows.sum()), 0))
     return Held(base, residual_on(fit, fine)[rows])
 
@@ -403,18 +411,18 @@ def block_t_value(view: View, contribution: Floats) -> float:
         or step, and live in few groups, can show themselves too.
     """
     products = contribution * view.residual[view.valid]
-    sums = np.array([products[block].sum() for block in _blocks_of(view)])
+    sums = np.array([products[block].sum() for block in _blocks_of(view, BLOCKS_PER_GROUP)])
     length = float(np.linalg.norm(sums))
     return float(sums.sum() / length) if length > 0 else 0.0
 
 
-def _blocks_of(view: View) -> list[NDArray[np.int64]]:
-    """Positions among the valid samples, eight blocks per group."""
+def _blocks_of(view: View, per_group: int) -> list[NDArray[np.int64]]:
+    """Positions among the valid samples, in blocks of each group."""
     groups = view.grid.track.group[view.valid]
     edges = np.flatnonzero(np.diff(groups) != 0) + 1
     blocks: list[NDArray[np.int64]] = []
     for members in np.split(np.arange(groups.size), edges):
-        blocks += [block for block in np.array_split(members, BLOCKS_PER_GROUP) if block.size]
+        blocks += [block for block in np.array_split(members, per_group) if block.size]
     return blocks
 
 
@@ -423,9 +431,10 @@ def decoy_likelihood(
 ) -> float:
     """Best likelihood that the same search finds where the candidate's effect is not.
 
-    The candidate's contribution is taken out of the residual, every group is cut into eight
-    blocks, and their signs are drawn at random: what is left has the noise's size and colour but
-    follows no covariate. A chance candidate takes out little, so its decoys do as well as it did.
+    The candidate's contribution is taken out of the residual, every group is cut into two
+    blocks, and their signs are drawn at random: what is left has the noise's size and colour,
+    slow drifts included, but follows no covariate. A chance candidate takes out little, so its
+    decoys do as well as it did.
 
     Parameters
     ----------
@@ -447,7 +456,7 @@ def decoy_likelihood(
     """
     worst = 0.0
     rest = view.residual[view.valid] - candidate.contribution
-    blocks = _blocks_of(view)
+    blocks = _blocks_of(view, DECOY_BLOCKS_PER_GROUP)
     for _ in range(count):
         values = rest.copy()
         for block in blocks:

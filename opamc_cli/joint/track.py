@@ -56,6 +56,8 @@ class Track:
     kernel : array of odd length
         Moving average that the acceleration has gone through; the coarse grid puts the current
         through it too.
+    blur : array of shape (n, 2) or None
+        What the acceleration would gain or lose by a shorter and a longer window.
     quiet : int
         Samples over which the acceleration's noise averages to almost nothing.
     channels : frozenset of str
@@ -89,6 +91,7 @@ class Track:
     open_samples: Bools | None = None
     kernel: Floats = field(default_factory=lambda: np.ones(1))
     quiet: int = 1
+    blur: Floats | None = None
 
     @property
     def size(self) -> int:
@@ -212,5 +215,6 @@ def coarsen(track: Track, factor: int) -> Track:
         temperature_c=optional(track.temperature_c),
         current_d_a=optional(track.current_d_a),
         electrical_rad=optional(track.electrical_rad),
+        blur=None,
         period_samples=None if period is None else round(period / factor),
     )

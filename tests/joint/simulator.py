@@ -4,6 +4,7 @@ It shares no code with the package, so that what it calls an effect is written t
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter
@@ -83,7 +84,7 @@ def trajectory(rng, rate, kind, cycles, size):
     move = trapezoid if kind == "trapezoid" else quintic
     stops = [0.0, *(rng.uniform(-0.5, 0.5, rng.integers(2, 5)) * size), size / 2, 0.0]
     parts = []
-    for a, b in zip(stops[:-1], stops[1:], strict=True):
+    for a, b in pairwise(stops):
         if abs(b - a) < 0.1 * size:
             b = a + 0.1 * size * np.sign(b - a + 1e-9)
         speed = rng.uniform(0.25, 1.2) * size

@@ -1,0 +1,172 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from simulator import simulate
+
+from opamc_cli.errors import ConfigError
+from opamc_cli.joint.effects.hysteresis import dahl_state
+from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
+from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.kinematics import Recording, build_track
+from opamc_cli.joint.spectra import order_peaks
+from opamc_cli.joint.track import Joint
+
+VOCABULARY = [
+    "inertia",
+    "gravity",
+    "offset",
+    "coulomb",
+    "viscous",
+    "stribeck",
+    "quadratic_friction",
+    "sublinear_friction",
+    "asymmetric_friction",
+    "load_friction",
+    "thermal_viscous",
+    "warmup",
+    "spring",
+    "payload_change",
+    "position_drag",
+    "hysteresis",
+    "elasticity",
+    "ripple",
+    "time_delay",
+    "sensor_offset",
+    "sensor_gain",
+    "dead_time",
+    "mains_hum",
+]
+DOMAINS = {
+    "motor-angle",
+    "joint-angle",
+    "velocity",
+    "acceleration",
+    "load",
+    "temperature",
+    "time",
+    "frequency",
+    "electrical",
+}
+
+
+def track_of(joint=None, **options):
+    made = simulate(3, rate=500.0, cycles=4, kind="quintic", **options)
+    joint = joint or Joint(made.gear_ratio, made.pole_pairs)
+    recording = Recording(
+        "run",
+        made.rate_hz,
+        current_a=made.current,
+        position_rad=made.position,
+        temperature_c=made.temperature,
+    )
+    return made, build_track([recording], joint)
+
+
+def test_library_is_the_vocabulary():
+    library = built_in_library()
+    assert list(library) == VOCABULARY
+    assert {effect.domain for effect in library.values()} <= DOMAINS
+    assert all(effect.meaning for effect in library.values())
+
+
+@pytest.mark.parametrize("name", VOCABULARY)
+def test_regressors_are_finite_and_as_long_as_the_track(name):
+    _, track = track_of()
+    effect = built_in_library()[name]
+    noise = np.where(track.moving, np.random.default_rng(0).normal(size=track.size), 0.0)
+    noise += np.where(track.moving, np.cos(5 * track.machine_angle_rad), 0.0)
+    for guess in effect.guesses(track, noise):
+        columns = effect.columns(track, guess)
+        assert columns.shape[0] == track.size
+        assert np.all(np.isfinite(columns))
+        assert set(effect.limits(track)) <= set(guess)
+
+
+def slow_dahl(position, length):
+    state, states = 0.0, []
+    previous = position[0]
+    for place in position:
+        travelled = 0.0
+        step = (place - previous) / 2000
+        while abs(travelled) < abs(place - previous) - 1e-15:
+            state += (1 - state * np.sign(step)) * step / length
+            travelled += step
+        states.append(state)
+        previous = place
+    return np.array(states)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.sampled_from([-1.0, -0.3, 0.0, 0.2, 0.7, 1.0]), min_size=2, max_size=12))
+def test_dahl_state_solves_its_equation(places):
+    position = np.array(places)
+    np.testing.assert_allclose(dahl_state(position, 0.4), slow_dahl(position, 0.4), atol=2e-3)
+
+
+def test_unknown_effect_is_refused_with_the_nearest_name():
+    with pytest.raises(ConfigError, match="did you mean stribeck"):
+        effect_named(built_in_library(), "striebeck")
+
+
+def test_a_users_effect_joins_the_library(tmp_path):
+    path = tmp_path / "sticky.py"
+    path.write_text(
+        "from opamc_cli.joint.effects.base import Effect, stack\n"
+        "class Sticky(Effect):\n"
+        "    name = 'sticky'\n"
+        "    domain = 'velocity'\n"
+        "    meaning = 'mine'\n"
+        "    def columns(self, track, parameters):\n"
+        "        return stack(track.velocity**3)\n"
+    )
+    assert [effect.name for effect in load_user_effects(path)] == ["sticky"]
+    path.write_text("raise RuntimeError('no')\n")
+    with pytest.raises(ConfigError, match="does not run: RuntimeError: no"):
+        load_user_effects(path)
+    path.write_text("x = 1\n")
+    with pytest.raises(ConfigError, match="defines no class"):
+        load_user_effects(path)
+
+
+@pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 7.0])
+def test_order_peak_is_found_within_a_tenth_of_the_resolution(order):
+    _, track = track_of()
+    angle = order * track.machine_angle_rad
+    signal = np.cos(angle + 0.3 * track.direction) + np.random.default_rng(1).normal(
+        size=track.size
+    )
+    peak = order_peaks(track, np.where(track.moving, signal, 0.0), 1)[0]
+    travel = np.ptp(track.machine_angle_rad[track.moving])
+    assert abs(peak - order) < 0.1 * 2 * np.pi / travel
+
+
+def test_white_noise_has_no_order_peak():
+    _, track = track_of()
+    for seed in range(10):
+        noise = np.random.default_rng(seed).normal(size=track.size)
+        assert order_peaks(track, np.where(track.moving, noise, 0.0), 1) == []
+
+
+@pytest.mark.parametrize(
+    ("order", "reading"),
+    [
+        (1.0, "eccentricity"),
+        (2.0, "kinematic error, twice"),
+        (2.02, "flexspline tooth damage"),
+        (4.0, "kinematic error, four"),
+        (5.0, "electrical, 1p"),
+        (30.0, "electrical, 6p"),
+        (60.0, "cogging of 12 slots"),
+        (17.3, "unknown periodic source, order 17.3 per motor"),
+    ],
+)
+def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
+    _, track = track_of(Joint(100.0, 5))
+    assert reading in read_order(order, track)
+
+
+def test_without_gear_ratio_orders_are_counted_per_joint_revolution():
+    _, track = track_of(Joint())
+    assert track.angle_kind == "joint"
+    assert "per joint revolution" in read_order(202.0, track)

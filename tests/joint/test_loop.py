@@ -1,0 +1,71 @@
+"""The loop on the tests' own simulator: what it adds, what it names, and when it keeps quiet."""
+
+import pytest
+from closing import close_on
+from simulator import DECLARED
+
+FINDABLE = (
+    "stribeck",
+    "ripple",
+    "offset",
+    "quadratic_friction",
+    "sublinear_friction",
+    "asymmetric_friction",
+    "load_friction",
+    "thermal_viscous",
+    "warmup",
+    "spring",
+    "payload_change",
+    "position_drag",
+    "hysteresis",
+    "elasticity",
+    "time_delay",
+    "mains_hum",
+    *DECLARED,
+)
+
+
+def names_of(loop):
+    return [{step.term.effect.name, *step.ties} for step in loop.steps]
+
+
+@pytest.mark.parametrize("effect", FINDABLE)
+def test_a_missing_effect_is_found_named_and_removed(effect):
+    made, loop = close_on(1, (effect,), rate=250.0 if effect != "ripple" else 1000.0)
+    assert any(effect in names for names in names_of(loop))
+    assert loop.verdict == "closed"
+    gone = loop.rmse_before_a**2 - loop.rmse_after_a**2
+    assert gone > 0.8 * (loop.rmse_before_a**2 - made.noise_rms**2)
+
+
+@pytest.mark.parametrize("seed", [4, 7, 9, 21, 33])
+@pytest.mark.parametrize("quantum", [None, 1e-5])
+def test_nothing_is_added_where_nothing_is_missing(seed, quantum):
+    _, loop = close_on(seed, (), quantum=quantum, rate=500.0)
+    assert loop.steps == ()
+    assert loop.verdict == "nothing-missing"
+    assert loop.rmse_after_a == loop.rmse_before_a
+
+
+@pytest.mark.parametrize("pair", [("stribeck", "ripple"), ("position_drag", "warmup")])
+def test_two_missing_effects_are_both_found(pair):
+    _, loop = close_on(5, pair, rate=500.0)
+    for effect in pair:
+        assert any(effect in names for names in names_of(loop))
+
+
+@pytest.mark.parametrize(
+    ("effect", "domain"), [("ripple", "motor-angle"), ("mains_hum", "frequency")]
+)
+def test_an_effect_outside_the_library_is_not_given_another_name(effect, domain):
+    _, loop = close_on(5, (effect,), without=(effect,), rate=500.0)
+    assert loop.steps == ()
+    assert loop.verdict == "not-in-library"
+    assert loop.remaining_domain == domain
+
+
+def test_two_runs_of_the_loop_are_equal():
+    _, first = close_on(2, ("stribeck",), rate=250.0)
+    _, second = close_on(2, ("stribeck",), rate=250.0)
+    assert first.rmse_after_a == second.rmse_after_a
+    assert [s.p_value for s in first.steps] == [s.p_value for s in second.steps]
