@@ -16,6 +16,13 @@ from opamc_cli.signal.windows import carrier_windows
 from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows, mean_variance
 from opamc_cli.storage.runs import AxisChannels, Run
 
+USUAL_GEAR_RATIO = 100.0
+"""Stands in for an unknown ratio, to choose the pattern's time delay by and for nothing else.
+
+Strain wave gears of robot arms have 50 to 160; the delay is right to within that factor, where the
+joint's own revolutions would make it a hundred times too long.
+"""
+
 STILL_SHARE = 0.05
 """A recording that stands still for less than this share never stands still."""
 
@@ -74,6 +81,11 @@ def joint_segments(
         notes.append(
             f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
         )
+    if motions and joint.gear_ratio is None:
+        notes.append(
+            f"{run.path}: axis {channels.axis} reports current without a carrier and "
+            f"joint.gear_ratio is not set; {USUAL_GEAR_RATIO:g} is assumed for f_d,max"
+        )
     segments = _segments(run, current, motions, config, joint)
     return AxisSegments(
         run.name,
@@ -92,7 +104,8 @@ def _segments(
     joint: JointConfig,
 ) -> list[Segment]:
     def frequency(motion: JointMotion) -> float:
-        return motor_frequency(motion.speed_rad_s, joint.gear_ratio, joint.pole_pairs)
+        ratio = joint.gear_ratio or USUAL_GEAR_RATIO
+        return motor_frequency(motion.speed_rad_s, ratio, joint.pole_pairs)
 
     never_stands = (
         len(motions) == 1

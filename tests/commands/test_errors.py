@@ -419,9 +419,16 @@ def test_a_baseline_in_which_nothing_repeats(opamc, tmp_path, pair):
 def test_patterns_longer_than_the_motions(opamc, tmp_path):
     run = bad_runs.moving_joint(tmp_path / "joint.parquet")
     arguments = ["diagnose", "--baseline", run, "--target", run, "--out", tmp_path / "out"]
-    ended = opamc(*arguments)
+    ended = opamc(*arguments, "--set", "joint.gear_ratio=1")
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "axis 1", "patterns.tau", "joint.gear_ratio")
     assert opamc(*arguments, "--set", "patterns.tau=20").code == ExitCode.DONE
+
+
+def test_an_unknown_gear_ratio_is_assumed_and_said(opamc, tmp_path):
+    run = bad_runs.moving_joint(tmp_path / "joint.parquet")
+    ended = opamc("diagnose", "--baseline", run, "--target", run, "--out", tmp_path / "out")
+    assert ended.code == ExitCode.DONE
+    assert "joint.gear_ratio is not set; 100 is assumed" in ended.err
 
 
 def test_an_envelope_that_the_run_does_not_have(opamc, tmp_path, pair):
