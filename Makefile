@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types check samples bench clean
+.PHONY: help install demo test lint types check samples bench studies clean
 
 help:  ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -41,6 +41,19 @@ samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
 	  --out data/samples/normal
 	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \
 	  --first-session 4 --sessions 2 --fault 3 --out data/samples/fault
+
+bench: $(STAMP)  ## Speed, short form: kernels, commands, an hour from segment to score
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	$(BIN)/python benchmarks/kernels.py --quick
+	$(BIN)/python benchmarks/commands.py --times 3
+	$(BIN)/python benchmarks/pipeline.py --hours 0.25 0.5 1
+
+studies: $(STAMP)  ## The studies behind the documentation's figures; takes hours
+	$(BIN)/python benchmarks/itsc.py
+	$(BIN)/python benchmarks/thesis_cases.py --write
+	$(BIN)/python benchmarks/boundaries.py --write
+	$(BIN)/python benchmarks/decision.py
+	$(BIN)/python benchmarks/loop.py
 
 clean:  ## Remove the environment and every output
 	rm -rf $(VENV) opamc-out build *.egg-info .pytest_cache .mypy_cache .ruff_cache
