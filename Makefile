@@ -40,7 +40,7 @@ samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
 	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \
 	  --out data/samples/normal
 	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \
-	  --first-session 4 --sessions 2 --fault 3 --out data/samples/fault
+	  --first-session 8 --sessions 3 --fault 3 --out data/samples/fault
 
 bench: $(STAMP)  ## Speed, short form: kernels, commands, an hour from segment to score
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
