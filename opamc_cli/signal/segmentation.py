@@ -161,8 +161,10 @@ def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     joined: list[tuple[int, int]] = []
     for high in hysteresis(evidence.frames.strength, rule.on, rule.off):
         for part in _split_by_direction(high, evidence, rule):
-            # Noise may pass the threshold for a moment; a carrier is clear for a few frames.
-            turning = np.flatnonzero(clear[slice(*part)])
+            # Noise may pass the threshold for a moment; a carrier is clear for a few frames, and
+            # no frame of it is faster than the largest frequency that lasts.
+            slow_enough = ridge_hz[slice(*part)] < AGREEMENT * speed_hz(*part)
+            turning = np.flatnonzero(clear[slice(*part)] & slow_enough)
             if turning.size < MIN_CLEAR_FRAMES:
                 continue
             # Slow wavelets are long and still ring after the vector has come to rest.

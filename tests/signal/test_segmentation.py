@@ -7,7 +7,10 @@ from carriers import Move, Torque, record
 
 from opamc_cli.signal.analytic import clarke
 from opamc_cli.signal.boundaries import refine_boundaries
+from opamc_cli.signal.motion import MotionFrames
+from opamc_cli.signal.rotation import Rotation
 from opamc_cli.signal.segmentation import (
+    Evidence,
     MotionRule,
     find_motions,
     hysteresis,
@@ -154,3 +157,23 @@ def test_a_single_frame_does_not_make_the_largest_frequency():
     assert largest_frequency(ridge) == 100.0
     assert largest_frequency(np.zeros(0)) == 0.0
     assert largest_frequency(np.array([5.0, 7.0])) == 6.0
+
+
+def test_a_lone_frame_of_noise_behind_a_motion_is_not_its_end():
+    """The frame agrees with the vector by chance, at a frequency the motion never had."""
+    n, step, fs_hz = 60, 16, 2048.0
+    strength = np.r_[np.full(40, 0.9), np.full(n - 40, 0.35)].astype(np.float32)
+    strength[52] = 0.57
+    ridge_hz = np.full(n, 300.0, dtype=np.float32)
+    ridge_hz[40:] = 20.0
+    ridge_hz[52] = 580.0
+    turned = 2 * np.pi * ridge_hz / fs_hz
+    turned[51:54] = 2 * np.pi * 580.0 / fs_hz
+    size = np.r_[np.full(40, 100.0), np.full(n - 40, 0.1)]
+    rotation = Rotation(
+        (size * np.sin(turned)).astype(np.float32), (size * np.cos(turned)).astype(np.float32)
+    )
+    evidence = Evidence(MotionFrames(step, strength, ridge_hz), rotation, True, fs_hz, 0.01, 5.0)
+    (motion,) = find_motions(evidence, MotionRule())
+    assert (motion.first, motion.last) == (0, 40)
+    assert motion.f_last_hz == 300.0
