@@ -12,7 +12,7 @@ from scipy.stats import gamma
 from scipy.stats import t as student
 
 from opamc_cli.joint.model import Fit
-from opamc_cli.joint.normal import held_out_error, normal_equations
+from opamc_cli.joint.normal import held_out_error, normal_equations, solve
 from opamc_cli.joint.spectra import (
     LOWEST_ORDER,
     OVERSAMPLING,
@@ -229,17 +229,30 @@ def ceiling(fit: Fit, seen: list[Structure]) -> Ceiling:
     return by_cycle
 
 
+def _without_blur(fit: Fit) -> Floats:
+    """Fine residual without what smoothing took from the acceleration."""
+    grid = fit.session.fine
+    blur = grid.track.blur
+    if blur is None:
+        return fit.residual_a
+    part = blur[grid.fit]
+    coefficients = solve(part.T @ part, part.T @ fit.residual_a[grid.fit])
+    residual: Floats = fit.residual_a - blur @ coefficients
+    return residual
+
+
 def _cycle_ceiling(fit: Fit) -> Ceiling | None:
     grid = fit.session.fine
     period = grid.track.period_samples
     if period is None:
         return None
+    residual = _without_blur(fit)
     curves, masks = [], []
     for start, stop in grid.track.bounds:
         for begin in range(start, stop - period + 1, period):
             mask = grid.fit[begin : begin + period]
             if mask.any():
-                curves.append(np.where(mask, fit.residual_a[begin : begin + period], 0.0))
+                curves.append(np.where(mask, residual[begin : begin + period], 0.0))
                 masks.append(mask)
     if len(curves) < 2:
         return None

@@ -294,12 +294,12 @@ def _one(recording: Recording, joint: Joint) -> Track:
         motion = motion_from_position(
             filled(recording.position_rad), None if speed is None else filled(speed), rate
         )
-        channels |= {"position", "scale"}
+        channels |= {"position", "scale", "logged"}
         kind = "joint"
     elif recording.velocity_rad_s is not None:
         usable &= np.isfinite(recording.velocity_rad_s)
         motion = motion_from_velocity(filled(recording.velocity_rad_s), rate)
-        channels |= {"position", "scale"}
+        channels |= {"position", "scale", "logged"}
         kind = "joint"
     elif phase_angle is not None:
         scale = 1.0
@@ -387,4 +387,5 @@ def _scaled(phase_angle: PhaseAngle, scale: float, rate_hz: float) -> Motion:
         phase_angle.window,
         0.0,
         smoothing_kernel(rate_hz),
+        blur=phase_angle.blur * scale,
     )

@@ -114,7 +114,8 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
     # With shorter blocks the whitening would amplify what the average has taken away.
-    factor = max(factor, track.kernel.size // 2, track.quiet)
+    width = 1.0 / float(np.sum(track.kernel**2))
+    factor = max(factor, int(0.8 * width), track.quiet)
     coarse_track = coarsen(track, factor)
     groups = [g for g in range(len(grouping.names)) if g not in grouping.sealed]
     share = FINE_SAMPLES / max(inside, 1)

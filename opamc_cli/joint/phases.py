@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.joint.angle_filter import smoothed_angle
 from opamc_cli.joint.normal import solve
+from opamc_cli.joint.smoothing import derivatives
 from opamc_cli.joint.track import Bools, Floats
 
 STRONG = 5.0
@@ -34,6 +35,8 @@ class PhaseAngle:
         Samples with enough current to tell an angle.
     window : int
         Samples over which it is smooth.
+    blur : array of shape (n, 2)
+        What the acceleration would gain or lose by a shorter and a longer window.
     """
 
     angle_rad: Floats
@@ -41,6 +44,7 @@ class PhaseAngle:
     acceleration_rad_s2: Floats
     strong: Bools
     window: int
+    blur: Floats
 
     def aligned_with(self, position_rad: Floats, ratio: float | None) -> Floats:
         """Electrical angle from the logged position, with ratio and zero taken from the phases.
@@ -117,7 +121,17 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     angle, velocity, acceleration, window = smoothed_angle(
         np.angle(vector), strong, rough, sure, rate_hz
     )
-    return PhaseAngle(angle, velocity, acceleration, strong, window)
+    # The measured angle, on the branch that was followed.
+    error = np.where(strong, np.angle(vector) - angle, 0.0)
+    path = angle + error - np.pi * np.round(error / np.pi)
+    blur = np.stack(
+        [
+            derivatives(path, rate_hz, min(size, (path.size - 1) | 1), 2) - acceleration
+            for size in (window | 1, 4 * window | 1)
+        ],
+        axis=1,
+    )
+    return PhaseAngle(angle, velocity, acceleration, strong, window, blur)
 
 
 def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:

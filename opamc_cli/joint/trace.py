@@ -28,7 +28,7 @@ class Gate:
     smallest_t: float = 2.0
     smallest_consistency: float = 0.75
     decoy_ratio: float = 2.0
-    largest_p: float = 5e-3
+    largest_p: float = 2e-3
     decoys: int = 5
 
 

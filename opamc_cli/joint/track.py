@@ -61,7 +61,8 @@ class Track:
     quiet : int
         Samples over which the acceleration's noise averages to almost nothing.
     channels : frozenset of str
-        What was logged or follows from it: position, scale, temperature, phases, electrical.
+        What was logged or follows from it: position, logged (motion beside the current),
+        scale, temperature, phases, electrical.
     period_samples : int or None
         Length of a cycle, if the motion repeats.
     """

@@ -17,7 +17,7 @@ class Elasticity(Effect):
     name = "elasticity"
     domain = "acceleration"
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
-    needs = ("position",)
+    needs = ("position", "logged")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz to a quarter of the rate, three dampings."""

@@ -13,7 +13,7 @@ class TimeDelay(Effect):
     name = "time_delay"
     domain = "time"
     meaning = "current and motion are logged with a delay: check the logger's clocks"
-    needs = ("position",)
+    needs = ("position", "logged")
     static = False
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
