@@ -5,7 +5,8 @@
     python benchmarks/boundaries.py --write    # and updates docs/validation.md
 
 Every axis is recorded alone with sensor noise set to a signal-to-noise ratio: power of the phase
-current while the axis moves, over the power of the noise. Seeds begin at 1000.
+current while the axis moves, over the power of the noise. Seeds begin at 1010: on earlier ones two
+failings of the chain were found and mended.
 """
 
 import argparse
@@ -24,7 +25,7 @@ from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.testbed.robot import Recording, simulate
 
 ROOT = Path(__file__).parents[1]
-FIRST_SEED = 1000
+FIRST_SEED = 1010
 BEGIN, END = "<!-- boundaries: begin -->", "<!-- boundaries: end -->"
 
 

@@ -1,7 +1,8 @@
 """Configuration of the virtual testbed: `configs/testbed.yaml` as the testbed's dataclasses."""
 
 import difflib
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args, get_type_hints
@@ -11,7 +12,8 @@ from pydantic import Field
 from opamc_cli.config.files import read_values, read_yaml, validate
 from opamc_cli.config.models import Positive, Section
 from opamc_cli.errors import ConfigError
-from opamc_cli.testbed.parameters import Effect, Joint, Robot
+from opamc_cli.testbed.effects import complete
+from opamc_cli.testbed.parameters import Effect, Robot
 from opamc_cli.testbed.program import Program
 
 Column = Literal["phases", "current", "position", "velocity", "temperature"]
@@ -120,20 +122,26 @@ def _is_section(kind: Any) -> bool:
 
 def _check(config: TestbedConfig, path: Path) -> None:
     """Refuse values that no physical robot has."""
-    for index, joint in enumerate(config.robot.joints):
-        for place, value in _numbers(joint, f"robot.joints[{index}]"):
-            signed = place.endswith(("gravity_angle_rad", "ambient_c"))
-            positive = place.endswith(_POSITIVE)
-            if not signed and (value <= 0 if positive else value < 0):
-                limit = "positive" if positive else "0 or more"
-                msg = f"{path}: {place} is {value:g}; it must be {limit}"
-                raise ConfigError(msg)
+    for part in (config.robot, config.program):
+        for place, value in _numbers(part, "robot" if part is config.robot else "program"):
+            if not math.isfinite(value):
+                limit = "finite"
+            elif place.endswith(_POSITIVE) and value <= 0:
+                limit = "positive"
+            elif not place.endswith(_SIGNED) and value < 0:
+                limit = "0 or more"
+            else:
+                continue
+            msg = f"{path}: {place} is {value:g}; it must be {limit}"
+            raise ConfigError(msg)
     program = config.program
     limits = {
         "robot.joints": (len(config.robot.joints), 1, 100),
         "program.speed_percent": (program.speed_percent, 1, 100),
         "program.payload_kg": (program.payload_kg, 0, 100),
         "program.cycles": (program.cycles, 1, 1_000_000),
+        "robot.sensor.bits": (config.robot.sensor.bits, 2, 32),
+        "robot.sensor.filter_order": (config.robot.sensor.filter_order, 1, 12),
         "program.waypoints_rad": (len(program.waypoints_rad), 2, 1000),
         "program.dwell_s": (program.dwell_s - program.dwell_jitter_s, 0, 1e6),
         "robot.sensor.filter_share": (config.robot.sensor.filter_share, 0.01, 0.49),
@@ -144,6 +152,15 @@ def _check(config: TestbedConfig, path: Path) -> None:
             msg = f"{path}: {place} is {value:g}; it must lie in {least:g}..{most:g}"
             raise ConfigError(msg)
     count = len(config.robot.joints)
+    if len(set(program.axes)) < len(program.axes) or not program.axes:
+        msg = f"{path}: program.axes is {list(program.axes)}; name every axis that moves once"
+        raise ConfigError(msg)
+    for effect in config.effects:
+        try:
+            complete(effect)
+        except ValueError as error:
+            msg = f"{path}: {error}"
+            raise ConfigError(msg) from error
     named = [*program.axes, *(f.axis for f in config.faults), *(e.axis for e in config.effects)]
     for axis in named:
         if not 1 <= axis <= count:
@@ -160,20 +177,26 @@ _POSITIVE = (
     "torque_constant_nm_per_a",
     "pole_pairs",
     "stiffness_nm_per_rad",
-    "hysteresis_width_rad",
+    "width_rad",
     "velocity_rad_s",
-    "velocity_integral_time_s",
+    "integral_time_s",
     "time_constant_s",
+    "electrical_hz_full_speed",
+    "full_scale_a",
+    "acceleration_rad_s2",
+    "jerk_rad_s3",
 )
+_SIGNED = ("angle_rad", "ambient_c", "waypoints_rad", "acceleration_exponent")
 
 
-def _numbers(part: Joint, place: str) -> list[tuple[str, float]]:
-    found: list[tuple[str, float]] = []
-    for item in fields(part):
-        value = getattr(part, item.name)
-        name = f"{place}.{item.name}"
-        if is_dataclass(value):
-            found += _numbers(value, name)  # type: ignore[arg-type]
-        elif isinstance(value, int | float):
-            found.append((name, float(value)))
-    return found
+def _numbers(part: Any, place: str) -> Iterator[tuple[str, float]]:
+    """Every number of a dataclass with its place."""
+    if is_dataclass(part):
+        for item in fields(part):
+            yield from _numbers(getattr(part, item.name), f"{place}.{item.name}")
+    elif isinstance(part, tuple):
+        for index, value in enumerate(part):
+            # way points are one list, joints are many parts
+            yield from _numbers(value, f"{place}[{index}]" if is_dataclass(value) else place)
+    elif isinstance(part, int | float):
+        yield place, float(part)

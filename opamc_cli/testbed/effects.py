@@ -111,7 +111,7 @@ def complete(effect: Effect) -> Effect:
     Raises
     ------
     ValueError
-        For an unknown name or parameter; the message names it and what is known.
+        For an unknown name or parameter, or a value out of bounds; the message names it.
     """
     if effect.name not in KINDS:
         msg = f"effect {effect.name!r} is unknown; known: {', '.join(sorted(KINDS))}"
@@ -122,7 +122,28 @@ def complete(effect: Effect) -> Effect:
         have = ", ".join(known) or "none"
         msg = f"effect {effect.name!r} has no parameter {unknown[0]!r}; it has: {have}"
         raise ValueError(msg)
-    return Effect(effect.name, effect.axis, effect.magnitude, {**known, **effect.parameters})
+    completed = {**known, **effect.parameters}
+    _check_sizes(effect.name, {"magnitude": effect.magnitude, **completed})
+    return Effect(effect.name, effect.axis, effect.magnitude, completed)
+
+
+def _check_sizes(name: str, values: dict[str, float]) -> None:
+    for key, value in values.items():
+        if not np.isfinite(value):
+            limit = "finite"
+        elif key.endswith(_POSITIVE) and value <= 0:
+            limit = "positive"
+        elif key == "phase" and value not in (0, 1, 2):
+            limit = "0, 1 or 2"
+        elif (name, key) == ("elasticity", "magnitude") and not 0 <= value < 1:
+            limit = "at least 0 and below 1"
+        else:
+            continue
+        msg = f"effect {name!r}: {key} is {value:g}; it must be {limit}"
+        raise ValueError(msg)
+
+
+_POSITIVE = ("width_rad", "time_constant_s", "velocity_rad_s", "frequency_hz")
 
 
 def apply_to_constants(effects: Sequence[Effect], constants: Constants) -> NDArray[np.float64]:

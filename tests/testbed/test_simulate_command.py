@@ -7,9 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from opamc_cli.app import app
+from opamc_cli.app import app, main
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, ExitCode
 from opamc_cli.storage.runs import Run, find_runs
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -85,13 +85,26 @@ def test_drive_reported_runs(config: Path, tmp_path: Path) -> None:
         ("program.cycels=3", "did you mean 'cycles'"),
         ("robot.damage.shar=0.2", "did you mean 'share'"),
         ("program.speed_percent=130", "must lie in 1..100"),
-        ("program.payload_kg=-1", "must lie in 0..100"),
+        ("program.payload_kg=-1", "must be 0 or more"),
         ("faults=[{axis: 9}]", "axis 9 does not exist"),
         ("faults=[{axis: 3, severity: 2}]", "severity"),
         ("effects=[{axis: 1, name: ripple}]", "magnitude"),
         ("robot.sensor.noise_a=many", "noise_a"),
         ("program.waypoints_rad=[0.0]", "waypoints_rad"),
         ("robot.joint.gear.ratio=0", "must be positive"),
+        ("robot.sensor.noise_a=-1", "must be 0 or more"),
+        ("robot.joint.motor.resistance_ohm=.nan", "must be finite"),
+        ("program.axes=[3, 3]", "every axis that moves once"),
+        ("effects=[{axis: 1, name: gremlin, magnitude: 1}]", "known: asymmetric_friction"),
+        (
+            "effects=[{axis: 1, name: hysteresis, magnitude: 1, parameters: {width_rad: 0}}]",
+            "width_rad is 0; it must be positive",
+        ),
+        (
+            "effects=[{axis: 1, name: sensor_gain, magnitude: 1, parameters: {phase: 3}}]",
+            "0, 1 or 2",
+        ),
+        ("effects=[{axis: 1, name: elasticity, magnitude: 1}]", "below 1"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(override: str, message: str) -> None:
@@ -100,21 +113,22 @@ def test_what_cannot_be_simulated_is_refused(override: str, message: str) -> Non
     assert message in str(caught.value)
 
 
-def test_an_unknown_effect_is_refused(config: Path, tmp_path: Path) -> None:
-    result = CliRunner().invoke(
-        app,
-        [
-            "simulate",
-            "--config",
-            str(config),
-            "--out",
-            str(tmp_path / "o"),
-            "--set",
-            "effects=[{axis: 1, name: gremlin, magnitude: 1}]",
-        ],
-    )
-    assert isinstance(result.exception, ConfigError | SystemExit)
-    assert not list((tmp_path / "o").glob("*.parquet"))
+@pytest.mark.parametrize(
+    "options",
+    [
+        ["--set", "effects=[{axis: 1, name: gremlin, magnitude: 1}]"],
+        ["--fault", "three"],
+        ["--fault", "3:much"],
+    ],
+)
+def test_refusals_end_in_the_usage_exit_code(
+    config: Path, tmp_path: Path, options: list[str]
+) -> None:
+    out = tmp_path / "o"
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "--config", str(config), "--out", str(out), *options])
+    assert ended.value.code == ExitCode.USAGE
+    assert not list(out.glob("*.parquet"))
 
 
 def test_the_shipped_configurations_are_valid() -> None:
