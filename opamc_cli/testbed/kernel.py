@@ -16,7 +16,18 @@ from numpy.typing import NDArray
 
 from opamc_cli.testbed.mesh import damaged_share, zone_torque
 
-_TWO_PI = 2.0 * pi
+SIGNALS = (
+    "iq_a",
+    "motor_angle_rad",
+    "motor_velocity_rad_s",
+    "joint_angle_rad",
+    "joint_velocity_rad_s",
+    "temperature_c",
+    "alpha_a",
+    "beta_a",
+    "reported_a",
+)
+"""Columns of what `run_axis` returns."""
 
 
 class AxisConstants(NamedTuple):
@@ -273,9 +284,8 @@ def run_axis(
     Returns
     -------
     ndarray, shape (n_samples, 9)
-        i_q [A], motor angle [rad], motor velocity [rad/s], joint angle [rad], joint velocity
-        [rad/s], temperature [degC], alpha and beta current behind the anti-alias filter [A],
-        i_q as the drive reports it [A]. A row is the state at its sample's instant.
+        Columns are `SIGNALS`: truth, the current vector behind the anti-alias filter, and i_q as
+        the drive reports it. A row is the state at its sample's instant.
     """
     out = np.empty((n_samples, 9))
     n_sections = filter_sections.shape[0]

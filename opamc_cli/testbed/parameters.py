@@ -65,7 +65,7 @@ class Friction:
     load_coefficient: float  # motor-side N.m of friction per joint-side N.m of load
     viscous_per_kelvin: float  # relative fall of the viscous coefficient per kelvin
     coulomb_per_kelvin: float
-    fluctuation_nm: float  # standard deviation of what does not repeat, motor side
+    fluctuation_nm: float  # standard deviation of what does not repeat, at 2 kHz, motor side
     output_coulomb_nm: float
     output_viscous_nms_per_rad: float
 

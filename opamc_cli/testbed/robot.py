@@ -15,7 +15,7 @@ from opamc_cli.testbed.effects import (
     apply_to_sensors,
     complete,
 )
-from opamc_cli.testbed.kernel import AxisConstants, run_axis
+from opamc_cli.testbed.kernel import SIGNALS, AxisConstants, run_axis
 from opamc_cli.testbed.parameters import Damage, Effect, Joint, Robot
 from opamc_cli.testbed.program import Program, Schedule, reference, schedule
 from opamc_cli.testbed.sensors import phase_currents
@@ -212,8 +212,9 @@ def _record_axis(
     )
     ripples = apply_to_constants(effects, constants)
     constants["payload_change_s"] += settle / rate_hz
-    rest = sqrt(control_hz * 1e-3 / 2)  # white noise held over one control period -> about 1 kHz
-    fluctuation = joint.friction.fluctuation_nm * rest * rng.standard_normal(len(position))
+    # The same power per hertz whatever the control rate; the size is that at 2 kHz.
+    spread_nm = joint.friction.fluctuation_nm * sqrt(control_hz * 1e-3 / 2)
+    fluctuation = spread_nm * rng.standard_normal(len(position))
     sections = butter(
         sensor.filter_order,
         sensor.filter_share * rate_hz,
@@ -256,10 +257,13 @@ def _measure(
     rng: np.random.Generator,
 ) -> AxisRecording:
     sensor, ratio = robot.sensor, joint.gear.ratio
+    signal = {
+        name: np.ascontiguousarray(column) for name, column in zip(SIGNALS, out.T, strict=True)
+    }
     n = len(out)
     noise = sensor.noise_a * rng.standard_normal((n, 3))
-    vector = np.column_stack([out[:, 6], out[:, 7]])
-    gain, offset, disturbance, vector = apply_to_sensors(
+    vector = np.column_stack([signal["alpha_a"], signal["beta_a"]])
+    gain, offset, hum, vector = apply_to_sensors(
         effects, session.phase_gain, session.phase_offset_a, vector, rate_hz
     )
     phases = phase_currents(
@@ -267,27 +271,29 @@ def _measure(
         vector[:, 1],
         gain,
         offset,
-        noise + disturbance[:, None],
+        noise + hum[:, None],
         sensor.full_scale_a,
         sensor.bits,
     )
-    reported = apply_to_reported(effects, out[:, 8], rate_hz)
+    reported = apply_to_reported(effects, signal["reported_a"], rate_hz)
     reported = reported + sensor.reported_noise_a * rng.standard_normal(n)
     counts = joint.control.encoder_counts_per_turn
     step = 2.0 * pi / counts if counts else 0.0
-    motor = np.floor(out[:, 1] / step) * step if step else out[:, 1]
+    motor = signal["motor_angle_rad"]
+    encoder = np.floor(motor / step) * step if step else motor
     resolution = sensor.temperature_resolution_c
-    warm = np.rint(out[:, 5] / resolution) * resolution if resolution else out[:, 5]
+    warm = signal["temperature_c"]
+    shown = np.rint(warm / resolution) * resolution if resolution else warm
     return AxisRecording(
         phases_a=phases,
         reported_a=reported.astype(np.float32),
-        position_rad=motor / ratio,
-        velocity_rad_s=out[:, 2] / ratio,
-        temperature_c=warm.astype(np.float32),
-        iq_a=out[:, 0].copy(),
-        motor_angle_rad=out[:, 1].copy(),
-        motor_velocity_rad_s=out[:, 2].copy(),
-        joint_angle_rad=out[:, 3].copy(),
-        joint_velocity_rad_s=out[:, 4].copy(),
-        true_temperature_c=out[:, 5].copy(),
+        position_rad=encoder / ratio,
+        velocity_rad_s=signal["motor_velocity_rad_s"] / ratio,
+        temperature_c=shown.astype(np.float32),
+        iq_a=signal["iq_a"],
+        motor_angle_rad=motor,
+        motor_velocity_rad_s=signal["motor_velocity_rad_s"],
+        joint_angle_rad=signal["joint_angle_rad"],
+        joint_velocity_rad_s=signal["joint_velocity_rad_s"],
+        true_temperature_c=warm,
     )
