@@ -125,8 +125,11 @@ def main() -> None:
         options = {"rate": 2048.0}
     effects = EFFECTS if arguments.mode == "position" else PHASE_EFFECTS
     chosen = tuple(arguments.only.split(",")) if arguments.only else ("null", *effects, "removed")
-    seeds = range(arguments.first_seed, arguments.first_seed + per_effect)
     began = time.time()
+
+    def seeds_of(name: str) -> range:
+        first = arguments.first_seed + per_effect * effects.index(name)
+        return range(first, first + per_effect)
 
     if "null" in chosen:
         nulls = range(arguments.first_seed, arguments.first_seed + 20 * per_effect)
@@ -149,7 +152,7 @@ def main() -> None:
         shares: list[float] = []
         tried = [name for name in effects if name in chosen]
         for name in tried:
-            for seed in seeds:
+            for seed in seeds_of(name):
                 trial = run_trial(seed, (name,), ratio, mode=arguments.mode, **options)
                 detected[name] += bool(trial.added)
                 named[name] += trial.named and not trial.wrong
@@ -162,7 +165,7 @@ def main() -> None:
                         f"{trial.loop.remaining_domain}",
                         flush=True,
                     )
-        total = len(tried) * len(seeds)
+        total = len(tried) * per_effect
         if not total:
             continue
         found = sum(detected.values())
@@ -176,15 +179,15 @@ def main() -> None:
                 f"median {np.nanmedian(shares):.3f}"
             )
         for name in tried:
-            if detected[name] < len(seeds) or named[name] < len(seeds):
-                print(f"  {name}: detected {detected[name]}, named {named[name]} of {len(seeds)}")
+            if detected[name] < per_effect or named[name] < per_effect:
+                print(f"  {name}: detected {detected[name]}, named {named[name]} of {per_effect}")
 
     if "removed" in chosen:
         wrong = silent = total = 0
         for name in effects:
             if name in DECLARED:
                 continue
-            for seed in list(seeds)[: max(per_effect // 2, 1)]:
+            for seed in seeds_of(name)[: max(per_effect // 2, 1)]:
                 trial = run_trial(
                     seed, (name,), 0.6, mode=arguments.mode, without=(name,), **options
                 )

@@ -10,6 +10,7 @@ from opamc_cli.joint.track import Joint, Track
 
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
+SHORTEST_PATH = 3.0
 
 
 def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
@@ -35,9 +36,19 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     ]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
-    track = replace(track, period_samples=period)
+    channels = track.channels | ({"revisits"} if _revisits(track) else set())
+    track = replace(track, period_samples=period, channels=channels)
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def _revisits(track: Track) -> bool:
+    """Tell whether places are passed at different times: three times the travel, or more."""
+    inside = np.ones(track.size - 1, dtype=bool)
+    for start, _ in track.bounds[1:]:
+        inside[start - 1] = False
+    path = float(np.abs(np.diff(track.position_rad))[inside].sum())
+    return path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
 
 
 def is_moving(track: Track) -> bool:

@@ -28,7 +28,7 @@ class Gate:
     smallest_t: float = 2.0
     smallest_consistency: float = 0.75
     decoy_ratio: float = 2.0
-    largest_p: float = 2e-3
+    largest_p: float = 3e-3
     decoys: int = 5
 
 
@@ -432,7 +432,8 @@ def decoy_likelihood(
     """Best likelihood that the same search finds where the candidate's effect is not.
 
     The candidate's contribution is taken out of the residual, every group is cut into two
-    blocks, and their signs are drawn at random: what is left has the noise's size and colour,
+    blocks (eight for fast effects, since other lines of a spectrum would survive in long ones),
+    and their signs are drawn at random: what is left has the noise's size and colour,
     slow drifts included, but follows no covariate. A chance candidate takes out little, so its
     decoys do as well as it did.
 
@@ -456,7 +457,8 @@ def decoy_likelihood(
     """
     worst = 0.0
     rest = view.residual[view.valid] - candidate.contribution
-    blocks = _blocks_of(view, DECOY_BLOCKS_PER_GROUP)
+    fast = candidate.term.effect.fast
+    blocks = _blocks_of(view, BLOCKS_PER_GROUP if fast else DECOY_BLOCKS_PER_GROUP)
     for _ in range(count):
         values = rest.copy()
         for block in blocks:

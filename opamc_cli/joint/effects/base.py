@@ -11,6 +11,7 @@ CHANNEL_REASONS = {
     "scale": "the joint angle's scale is unknown: log the position, or give gear_ratio and "
     "pole_pairs",
     "temperature": "no temperature channel",
+    "revisits": "no place is passed at different times, so time cannot be told from place",
     "logged": "the motion comes from the phase currents themselves: log the position",
     "electrical": "no phase currents, and no pole_pairs to tell the electrical angle",
 }

@@ -12,7 +12,7 @@ class PayloadChange(Effect):
     name = "payload_change"
     domain = "load"
     meaning = "the payload has changed: check the tool, not the gear"
-    needs = ("scale",)
+    needs = ("scale", "revisits")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try a step between any two groups."""

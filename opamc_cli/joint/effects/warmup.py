@@ -12,7 +12,7 @@ class Warmup(Effect):
     name = "warmup"
     domain = "time"
     meaning = "friction falls while the joint warms up: not a fault"
-    needs = ("position",)
+    needs = ("position", "revisits")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Time constants from a twentieth to one and a half of the session's length."""

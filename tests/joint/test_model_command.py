@@ -1,0 +1,194 @@
+"""`opamc model` on run files, and what it says where it cannot."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+from simulator import simulate
+
+from opamc_cli.app import main
+
+MODEL = (
+    "joint: {gear_ratio: null, pole_pairs: null}\neffects: [inertia, gravity, coulomb, viscous]\n"
+)
+
+
+def write_run(path, rate, **columns):
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    record = json.dumps({"sampling_rate_hz": rate}).encode()
+    pq.write_table(table.replace_schema_metadata({b"opamc": record}), path)
+    return path
+
+
+def opamc(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main([str(argument) for argument in arguments])
+    return int(stopped.value.code or 0)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = simulate(3, ("stribeck",), 0.8, rate=250.0, cycles=6)
+    write_run(
+        tmp_path / "run.parquet",
+        250.0,
+        axis1_current=made.current.astype("f4"),
+        axis1_position=made.position,
+        axis2_current=np.random.default_rng(0).normal(size=made.current.size).astype("f4"),
+        axis2_position=np.zeros(made.current.size),
+    )
+    (tmp_path / "model.yaml").write_text(MODEL)
+    return tmp_path
+
+
+def close(folder, *more, model=None):
+    if model is not None:
+        (folder / "model.yaml").write_text(model)
+    return opamc(
+        "model", "close", folder / "run.parquet", "--model", folder / "model.yaml",
+        "--out", folder / "out", *more,
+    )  # fmt: skip
+
+
+def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):
+    assert close(folder, "--axis", "1") == 0
+    shown = capsys.readouterr().out
+    loop = json.loads((folder / "out" / "loop.json").read_text())["axes"][0]
+    assert loop["axis"] == 1
+    assert loop["declared"] == ["inertia", "gravity", "coulomb", "viscous"]
+    assert loop["verdict"] == "closed"
+    assert loop["sealed"] == ["run:4", "run:5"]
+    step = loop["steps"][0]
+    assert step["effect"] == "stribeck"
+    assert step["domain"] == "velocity"
+    for key in ("parameters", "interpretation", "gain", "p_value", "decoy_gain", "ties"):
+        assert key in step
+    assert loop["after"]["rmse_a"] < loop["before"]["rmse_a"]
+    assert f"{loop['before']['rmse_a']:.4g} A" in shown
+    assert f"{loop['after']['rmse_a']:.4g} A" in shown
+    assert {"effect": "thermal_viscous", "why": "no temperature channel"} in loop["untestable"]
+    for name in ("candidates", "fit", "residuals", "order_spectrum"):
+        assert pq.read_table(folder / "out" / f"{name}.parquet").num_rows > 0
+
+    extended = yaml.safe_load((folder / "out" / "model.yaml").read_text())
+    assert extended["effects"][-1]["effect"] == "stribeck"
+    (folder / "model.yaml").write_text((folder / "out" / "model.yaml").read_text())
+    assert close(folder, "--axis", "1") == 0
+    again = json.loads((folder / "out" / "loop.json").read_text())["axes"][0]
+    assert again["verdict"] == "nothing-missing"
+    assert again["before"]["rmse_a"] == pytest.approx(loop["after"]["rmse_a"], rel=0.01)
+
+
+def test_fit_and_trace_write_their_tables(folder):
+    for command, table in (("fit", "fit"), ("trace", "candidates")):
+        code = opamc(
+            "model", command, folder / "run.parquet", "--model", folder / "model.yaml",
+            "--axis", "1", "--out", folder / "out", "--json",
+        )  # fmt: skip
+        assert code == 0
+        assert pq.read_table(folder / "out" / f"{table}.parquet").num_rows > 3
+
+
+@pytest.mark.parametrize(
+    ("model", "axis", "code", "words"),
+    [
+        ("effects: [inertia, stribek]\n", 1, 2, "did you mean stribeck"),
+        ("effects: [inertia, thermal_viscous]\n", 1, 2, "no temperature channel"),
+        ("joint: {gear_ratio: -100}\n", 1, 2, "joint.gear_ratio is -100"),
+        ("joint: {gear_ration: 100}\n", 1, 2, "did you mean 'gear_ratio'"),
+        (MODEL, 2, 5, "axis 2 does not move"),
+        (MODEL, 7, 3, "axis 7"),
+    ],
+)
+def test_wrong_declarations_end_in_one_sentence(folder, capsys, model, axis, code, words):
+    assert close(folder, "--axis", axis, model=model) == code
+    error = capsys.readouterr().err.strip()
+    assert words in error
+    assert len(error.splitlines()) == 1
+
+
+def test_too_little_motion_to_seal_anything_off(folder, capsys):
+    made = simulate(3, (), 0.0, rate=250.0, cycles=6)
+    write_run(
+        folder / "run.parquet",
+        250.0,
+        axis1_current=made.current[:300],
+        axis1_position=made.position[:300],
+    )
+    assert close(folder, "--axis", "1") == 5
+    assert "too little to seal" in capsys.readouterr().err
+
+
+def test_a_users_effect_is_used_by_name(folder):
+    (folder / "mine.py").write_text(
+        "import numpy as np\n"
+        "from opamc_cli.joint.effects.base import Effect, stack\n"
+        "class Knee(Effect):\n"
+        "    name = 'knee'\n"
+        "    domain = 'velocity'\n"
+        "    meaning = 'mine'\n"
+        "    def columns(self, track, parameters):\n"
+        "        return stack(track.direction * np.exp(-np.abs(track.velocity)))\n"
+    )
+    model = "effects: [inertia, gravity, coulomb, viscous, knee]\nlibrary: [mine.py]\n"
+    assert close(folder, "--axis", "1", model=model) == 0
+    loop = json.loads((folder / "out" / "loop.json").read_text())["axes"][0]
+    assert loop["declared"][-1] == "knee"
+
+
+def test_phases_alone_are_enough(tmp_path):
+    made = simulate(6, ("stribeck",), 1.0, rate=2048.0, cycles=6)
+    write_run(
+        tmp_path / "run.parquet",
+        2048.0,
+        axis1_a=made.phases[:, 0].astype("f4"),
+        axis1_b=made.phases[:, 1].astype("f4"),
+        axis1_c=made.phases[:, 2].astype("f4"),
+    )
+    assert close(tmp_path, model="effects: [inertia, coulomb, viscous]\n") == 0
+    loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
+    assert loop["after"]["rmse_a"] <= loop["before"]["rmse_a"]
+
+
+DATA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
+
+
+@pytest.mark.measured
+@pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not at ../shared/data")
+@pytest.mark.parametrize(
+    ("joint", "effects", "before", "after"),
+    [(5, "[inertia, offset, viscous]", 0.060, 0.037),
+     (6, "[inertia, gravity, offset, viscous]", 0.070, 0.046)],
+)  # fmt: skip
+def test_ripple_of_a_measured_arm_is_found_without_its_gear_ratio(
+    tmp_path, joint, effects, before, after
+):
+    path = DATA / f"joint_{joint}_trapez.csv"
+    with path.open() as file:
+        names = file.readline().strip().split(",")
+    values = np.genfromtxt(path, delimiter=",", skip_header=1)
+
+    def column(name):
+        return values[:, names.index(f"{name}{joint}")]
+
+    write_run(
+        tmp_path / "run.parquet",
+        1000.0,
+        axis1_current=column("Cur"),
+        axis1_position=np.unwrap(column("Position")),
+        axis1_velocity=column("Velocity"),
+        axis1_temperature=column("Temp"),
+    )
+    assert close(tmp_path, model=f"effects: {effects}\n") == 0
+    loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
+    assert loop["before"]["rmse_a"] > before
+    assert loop["after"]["rmse_a"] < after
+    found = [s["parameters"]["order"] for s in loop["steps"] if s["effect"] == "ripple"]
+    for order in (200, 700, 1200, 1400, 2400, 2800):
+        near = [abs(order - other) for other in found]
+        # Joint 5 has hardly any of 200 and 2400.
+        assert min(near) < 4 or (joint == 5 and order in (200, 2400))
