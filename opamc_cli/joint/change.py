@@ -102,7 +102,8 @@ class InTarget(Effect):
         self.meaning = effect.meaning
         self.needs = effect.needs
         self.fast = effect.fast
-        self.several = effect.several
+        # The model may hold the effect already: what is sought is more of it.
+        self.several = True
         self.flags_choose_columns = effect.flags_choose_columns
 
     def untestable(self, track: Track) -> str | None:
@@ -196,17 +197,19 @@ def explain_change(
         terms = (*terms, step.term)
         rest = _excess(fit_terms(common.session, terms), None, since)
         now = float(np.clip(1.0 - rest / excess, 0.0, 1.0)) if excess > 0 else 0.0
-        name = step.term.effect.name
+        name, ties = _harmless_first(step.term.effect.name, step.ties)
+        effect = library[name]
+        same = name == step.term.effect.name
         causes.append(
             Cause(
                 effect=name,
-                domain=step.term.effect.domain,
-                parameters=step.term.parameters,
-                interpretation=step.interpretation,
+                domain=effect.domain,
+                parameters=step.term.parameters if same else {},
+                interpretation=step.interpretation if same else effect.meaning,
                 share=max(now - explained, 0.0),
                 p_value=step.p_value,
                 gain=step.gain,
-                ties=step.ties,
+                ties=ties,
                 benign=name in BENIGN,
             )
         )
@@ -218,6 +221,14 @@ def explain_change(
         benign=bool(causes) and explained >= 0.8 and all(cause.benign for cause in causes),
         domain=loop.remaining_domain,
     )
+
+
+def _harmless_first(name: str, ties: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Where a measured temperature or a payload explains as much, it is no fault."""
+    for tie in ties:
+        if name not in BENIGN and tie in ("thermal_viscous", "payload_change"):
+            return tie, (name, *(other for other in ties if other != tie))
+    return name, ties
 
 
 def _in_target(library: Library, since_s: float) -> Library:
