@@ -102,13 +102,14 @@ def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk,
             m02 = p02 + step * p12 + h * p22
             m11 = p11 + step * p12
             m12 = p12 + step * p22
-            p00 = m00 + step * m01 + h * m02 + q00
-            p01 = m01 + step * m02 + q01
-            p02 = m02 + q02
-            p11 = m11 + step * m12 + q11
-            p12 = m12 + q12
             # A long gap must not let the uncertainty grow until the numbers lose their digits.
-            p22 = min(p22 + q22, spread * spread)
+            grow = 0.0 if p22 > spread * spread else 1.0
+            p00 = m00 + step * m01 + h * m02 + grow * q00
+            p01 = m01 + step * m02 + grow * q01
+            p02 = m02 + grow * q02
+            p11 = m11 + step * m12 + grow * q11
+            p12 = m12 + grow * q12
+            p22 = p22 + grow * q22
         if sure[i]:
             total = p11 + rough_variance
             k0, k1, k2 = p01 / total, p11 / total, p12 / total
@@ -134,12 +135,13 @@ def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk,
         m01 = p01 + step * p11 + h * p12
         m02 = p02 + step * p12 + h * p22
         m10, m11, m12 = p01 + step * p02, p11 + step * p12, p12 + step * p22
-        u00 = m00 + step * m01 + h * m02 + q00
-        u01 = m01 + step * m02 + q01
-        u02 = m02 + q02
-        u11 = m11 + step * m12 + q11
-        u12 = m12 + q12
-        u22 = min(p22 + q22, spread * spread)
+        grow = 0.0 if p22 > spread * spread else 1.0
+        u00 = m00 + step * m01 + h * m02 + grow * q00
+        u01 = m01 + step * m02 + grow * q01
+        u02 = m02 + grow * q02
+        u11 = m11 + step * m12 + grow * q11
+        u12 = m12 + grow * q12
+        u22 = p22 + grow * q22
         a = x[i, 0] + step * x[i, 1] + h * x[i, 2]
         v = x[i, 1] + step * x[i, 2]
         d0, d1, d2 = x[i + 1, 0] - a, x[i + 1, 1] - v, x[i + 1, 2] - x[i, 2]

@@ -35,6 +35,8 @@ STRUCTURE_P = 1e-3
 STRUCTURE_KEPT = 0.3
 CLOSED_SHARE = 0.9
 TRIFLE_SHARE = 0.4
+PATCHWORK_KINDS = 3
+PATCHWORK_SHARE = 0.6
 PRUNE_GAIN = 0.003
 
 
@@ -493,6 +495,12 @@ def _without_trifles(
     beside a large part unexplained is no name.
     """
     left = ceiling(fitted, remains)
+    if _is_patchwork(steps):
+        return (
+            before,
+            [],
+            _given_up(before, steps, "is one of many that each explain a part", progress),
+        )
     if not steps or left.p_value >= STRUCTURE_P or left.share < STRUCTURE_GAIN:
         return fitted, steps, remains
     first, last = before.rmse(sealed=False) ** 2, fitted.rmse(sealed=False) ** 2
@@ -500,17 +508,29 @@ def _without_trifles(
     if explained > TRIFLE_SHARE * (explained + unexplained):
         return fitted, steps, remains
     domain = remains[0].domain if remains else "unknown"
+    why = f"explains little of what repeats; most is in the {domain} domain"
+    return before, [], _given_up(before, steps, why, progress)
+
+
+def _is_patchwork(steps: list[Step]) -> bool:
+    """Tell three or more kinds of effects, none of which explains most: no name at all."""
+    falls: dict[str, float] = {}
+    for step in steps:
+        name = step.term.effect.name
+        fall = step.rmse_before_a**2 - step.rmse_after_a**2
+        falls[name] = falls.get(name, 0.0) + max(fall, 0.0)
+    most = max(falls.values(), default=0.0)
+    return len(falls) >= PATCHWORK_KINDS and most < PATCHWORK_SHARE * sum(falls.values())
+
+
+def _given_up(before: Fit, steps: list[Step], why: str, progress: _Progress) -> list[Structure]:
+    """Note why steps were taken back; return the declared model's structures."""
     for step in steps:
         effect = step.term.effect
         progress.rejected[effect.name] = Rejected(
-            effect.name,
-            effect.domain,
-            step.term.parameters,
-            step.gain,
-            step.p_value,
-            f"explains little of what repeats; most is in the {domain} domain",
+            effect.name, effect.domain, step.term.parameters, step.gain, step.p_value, why
         )
-    return before, [], structures(before)
+    return structures(before)
 
 
 def _r2(fitted: Fit) -> float:
