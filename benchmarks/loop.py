@@ -31,6 +31,10 @@ PHASE_EFFECTS = (
 )  # fmt: skip
 
 
+class TooLittleError(Exception):
+    """A simulated joint that cannot be sealed; `opamc model` would refuse it."""
+
+
 @dataclass(frozen=True)
 class Trial:
     """One closed loop, and what was true."""
@@ -101,7 +105,9 @@ def run_trial(
         temperature_c=made.temperature,
     )
     track, grouping = grouped_track([recording], joint)
-    assert grouping is not None
+    if grouping is None:
+        msg = f"seed {seed} moves too little"
+        raise TooLittleError(msg)
     library = built_in_library(without)
     full = built_in_library()
     before = declared_fit(open_session(track, grouping), tuple((full[name], None) for name in base))
@@ -153,7 +159,11 @@ def main() -> None:
         tried = [name for name in effects if name in chosen]
         for name in tried:
             for seed in seeds_of(name):
-                trial = run_trial(seed, (name,), ratio, mode=arguments.mode, **options)
+                try:
+                    trial = run_trial(seed, (name,), ratio, mode=arguments.mode, **options)
+                except TooLittleError as error:
+                    print(f"  {name}: {error}")
+                    continue
                 detected[name] += bool(trial.added)
                 named[name] += trial.named and not trial.wrong
                 if trial.added and arguments.mode == "position":

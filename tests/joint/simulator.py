@@ -122,6 +122,9 @@ def simulate(
     rng = np.random.default_rng(seed)
     rate = rate or float(rng.choice([100.0, 250.0, 500.0, 1000.0, 2048.0]))
     kind = kind or rng.choice(["trapezoid", "quintic", "sines"])
+    if "elasticity" in effects:
+        # Sines that begin in full motion ring once, at the start, and never again.
+        kind = "trapezoid"
     cycles = cycles or int(rng.integers(4, 9))
     size = rng.uniform(0.8, 3.0)
     gear_ratio = float(rng.choice([50, 80, 100, 101, 120, 160]))
