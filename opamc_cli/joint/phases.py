@@ -187,6 +187,8 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
         +1 or -1.
     """
     stretches = _stretches(angle.strong, max(int(LOST_S * rate_hz), 2))
+    if not stretches:
+        return np.ones(torque_a.size)
     speed = angle.velocity_rad_s
     moving = angle.strong & (np.abs(speed) > 0.05 * float(np.quantile(np.abs(speed), 0.98)))
     place = angle.angle_rad / max(float(np.ptp(angle.angle_rad)), 1e-9) * 2

@@ -90,21 +90,23 @@ def run(
     unhealthy = [
         entry["axis"] for entry in decided.verdict["axes"] if entry["state"] in ("changed", "fault")
     ]
+    notes: list[str] = []
     if unhealthy and config.joint.explain:
         progress("cause")
         sides = read_sources(normal.patterns), read_sources(other.patterns)
         starts = cause.first_motions(normal.patterns), cause.first_motions(other.patterns)
-        causes = {
-            axis: cause.explain(
-                axis,
-                *sides,
-                config.joint,
-                {**starts[0].get(axis, {}), **starts[1].get(axis, {})},
-            )
-            for axis in unhealthy
-        }
-        known = {axis: found for axis, found in causes.items() if found is not None}
-        decided = verdict.run(*tables, config, out, causes=known)
+        causes: dict[int, dict[str, Any]] = {}
+        for axis in unhealthy:
+            first = {**starts[0].get(axis, {}), **starts[1].get(axis, {})}
+            try:
+                found = cause.explain(axis, *sides, config.joint, first)
+            except (ArithmeticError, LookupError, ValueError) as error:
+                # a verdict must not be lost because its explanation failed on odd recordings
+                notes.append(f"axis {axis}: no cause could be sought ({error})")
+                continue
+            if found is not None:
+                causes[axis] = found
+        decided = verdict.run(*tables, config, out, causes=causes)
     progress("report")
     page = report.run(out, title=config.report.title)
     return DiagnoseOutcome(
@@ -114,7 +116,7 @@ def run(
         exit_code=decided.exit_code,
         n_runs=len(normal.runs_done) + len(other.runs_done),
         errors=(*normal.errors, *other.errors),
-        notes=(*normal.notes, *other.notes, *scored.notes),
+        notes=(*normal.notes, *other.notes, *scored.notes, *notes),
     )
 
 
