@@ -12,9 +12,8 @@ from opamc_cli.stages.report.figure import (
     grid_shape,
     hide_surplus,
     style,
-    to_png,
 )
-from opamc_cli.stages.report.focus import Focus, axis_scores, choose_focus, need_divergences
+from opamc_cli.stages.report.focus import Focus, axis_scores, need_divergences
 from opamc_cli.stages.report.inputs import ROLES, ReportInputs, time_order
 from opamc_cli.stages.report.palette import colour, state_sign
 
@@ -28,7 +27,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     """Draw the divergences of all axes."""
     need_divergences(inputs)
     with style():
-        drawing, thinned = draw(inputs, focus)
+        drawing, thinned = _draw(inputs, focus)
         caption = (
             "One point is one segment, runs in time order: baseline against the pool without its "
             "own cycle, then target against the whole baseline pool. The dotted line is the "
@@ -46,13 +45,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         )
 
 
-def picture(inputs: ReportInputs) -> bytes:
-    """Return the figure as PNG on the light page's ground, for a README."""
-    with style():
-        return to_png(draw(inputs, choose_focus(inputs))[0])
-
-
-def draw(inputs: ReportInputs, focus: Focus) -> tuple[Canvas, bool]:
+def _draw(inputs: ReportInputs, focus: Focus) -> tuple[Canvas, bool]:
     """Return the drawing, to be finished within `style`, and whether points were left out."""
     axes = inputs.axes
     rows, columns = grid_shape(len(axes))
