@@ -32,7 +32,10 @@ TIE_COLLINEARITY = 0.9
 STRUCTURE_GAIN = 0.02
 STRUCTURE_P = 1e-3
 """Least gain and largest p of what counts as structure that is left."""
-STRUCTURE_KEPT = 0.3
+FORM_GAIN = 0.01
+FORM_P = 0.02
+FORM_KEPT = 0.2
+"""What an added effect may not leave of its own domain's structure."""
 CLOSED_SHARE = 0.9
 TRIFLE_SHARE = 0.4
 PATCHWORK_KINDS = 3
@@ -460,9 +463,9 @@ def _without_wrong_forms(
         structure.domain
         for structure in remains
         if structure.domain in SHAPED_DOMAINS
-        and structure.gain > STRUCTURE_GAIN
-        and structure.p_value < STRUCTURE_P
-        and structure.gain * scale > STRUCTURE_KEPT * max(first.get(structure.domain, 0.0), 0.0)
+        and structure.gain > FORM_GAIN
+        and structure.p_value < FORM_P
+        and structure.gain * scale > FORM_KEPT * max(first.get(structure.domain, 0.0), 0.0)
     }
     kept = [step for step in steps if step.term.effect.domain not in wrong]
     if len(kept) == len(steps):
