@@ -45,7 +45,7 @@ samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
 bench: $(STAMP)  ## Speed, short form: kernels, commands, an hour from segment to score
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
 	$(BIN)/python benchmarks/kernels.py --quick
-	$(BIN)/python benchmarks/commands.py --times 3
+	$(BIN)/python benchmarks/commands.py --times 3 --minutes 2
 	$(BIN)/python benchmarks/pipeline.py --hours 0.25 0.5 1
 
 studies: $(STAMP)  ## The studies behind the documentation's figures; takes hours

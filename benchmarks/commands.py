@@ -65,7 +65,7 @@ def main() -> None:
         show(
             f"`opamc model close`, {arguments.minutes:g} min of one axis at 2048 Hz",
             "20 s",
-            median(close, 1),
+            measure(close),
         )
 
 
