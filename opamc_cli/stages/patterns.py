@@ -92,21 +92,11 @@ def run(
     """
     table = read_table(motions, "identify", MOTIONS)
     sources = read_sources(motions, moved_to)
-    by_name = {source.name: source for source in sources}
-    work: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for row in table.to_pylist():
-        if row["motion"] >= 0:
-            work.setdefault((row["run"], row["axis"]), []).append(row)
-    for name in dict.fromkeys(name for name, _ in work):
-        by_name[name].verify()
-    outcome = map_items(
-        count_patterns,
-        [
-            _Job(by_name[name], axis, tuple(rows), config.patterns)
-            for (name, axis), rows in work.items()
-        ],
-        jobs,
-    )
+    work = [
+        _Job(part.source, part.axis, part.rows, config.patterns)
+        for part in identified_parts(table, sources)
+    ]
+    outcome = map_items(count_patterns, work, jobs)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     patterns = pa.concat_tables([PATTERNS.empty_table(), *outcome.results]).combine_chunks()
@@ -145,6 +135,45 @@ def _windows_too_long(motions: Path, patterns: pa.Table) -> list[OpamcError]:
         )
         errors.append(NotEnoughDataError(msg))
     return errors
+
+
+@dataclass(frozen=True)
+class IdentifiedPart:
+    """The identified segments of one axis of one run.
+
+    Attributes
+    ----------
+    source
+        Where their samples are.
+    axis
+        Counted from 1.
+    rows
+        Rows of the motion table, in its order.
+    """
+
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+
+
+def identified_parts(motions: pa.Table, sources: Sequence[RunSource]) -> list[IdentifiedPart]:
+    """Group the identified segments of a motion table by run and axis.
+
+    Raises
+    ------
+    InputError
+        If a run that is needed is gone or has changed.
+    """
+    by_name = {source.name: source for source in sources}
+    rows_of: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in motions.to_pylist():
+        if row["motion"] >= 0:
+            rows_of.setdefault((row["run"], row["axis"]), []).append(row)
+    for name in dict.fromkeys(name for name, _ in rows_of):
+        by_name[name].verify()
+    return [
+        IdentifiedPart(by_name[name], axis, tuple(rows)) for (name, axis), rows in rows_of.items()
+    ]
 
 
 def aligned_span(row: dict[str, Any]) -> tuple[int, int]:

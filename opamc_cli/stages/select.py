@@ -15,7 +15,7 @@ from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import ordinal_counts, time_delay
 from opamc_cli.stages.envelope import current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
-from opamc_cli.stages.patterns import aligned_span
+from opamc_cli.stages.patterns import aligned_span, identified_parts
 from opamc_cli.stats.selection import self_consistency
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
@@ -105,21 +105,12 @@ def run(
     NotEnoughDataError
         If no axis has two motions and two cycles.
     """
-    by_name = {source.name: source for source in read_sources(motions, moved_to)}
-    work: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for row in read_table(motions, "identify", MOTIONS).to_pylist():
-        if row["motion"] >= 0:
-            work.setdefault((row["run"], row["axis"]), []).append(row)
-    for name in dict.fromkeys(name for name, _ in work):
-        by_name[name].verify()
-    outcome = map_items(
-        _count,
-        [
-            _Job(by_name[name], axis, tuple(rows), tuple(orders), tuple(gammas), config.patterns)
-            for (name, axis), rows in work.items()
-        ],
-        jobs,
-    )
+    table = read_table(motions, "identify", MOTIONS)
+    work = [
+        _Job(part.source, part.axis, part.rows, tuple(orders), tuple(gammas), config.patterns)
+        for part in identified_parts(table, read_sources(motions, moved_to))
+    ]
+    outcome = map_items(_count, work, jobs)
     rated = _rate([part for parts in outcome.results for part in parts])
     known = [row for row in rated if row["self_consistency"] is not None]
     if not known:

@@ -15,7 +15,7 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal import ordinal_counts, time_delay
 from opamc_cli.stages.envelope import EnvelopeKind, current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
-from opamc_cli.stages.patterns import aligned_span
+from opamc_cli.stages.patterns import aligned_span, identified_parts
 from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
 from opamc_cli.stats.features import ks_statistic
 from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
@@ -180,24 +180,17 @@ def _work(
     taus: Sequence[int],
     orders: Sequence[int],
 ) -> list[_Job]:
-    by_name = {source.name: source for source in sources}
-    work: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for row in read_table(path, "identify", MOTIONS).to_pylist():
-        if row["motion"] >= 0:
-            work.setdefault((row["run"], row["axis"]), []).append(row)
-    for name in dict.fromkeys(name for name, _ in work):
-        by_name[name].verify()
     return [
         _Job(
-            by_name[name],
-            axis,
-            tuple(rows),
+            part.source,
+            part.axis,
+            part.rows,
             tuple(taus),
             tuple(orders),
             config.patterns.envelope,
             config.patterns.remove_offset,
         )
-        for (name, axis), rows in work.items()
+        for part in identified_parts(read_table(path, "identify", MOTIONS), sources)
     ]
 
 
