@@ -10,7 +10,7 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change import Change, explain_change
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.track import Joint
-from opamc_cli.stages.model import read_recording
+from opamc_cli.stages.axis_recording import read_recording
 from opamc_cli.storage.sources import RunSource
 from opamc_cli.storage.tables import read_table
 

@@ -1,0 +1,99 @@
+"""One axis of a run, as a model of the joint needs it."""
+
+from collections.abc import Sequence
+from datetime import datetime
+
+import numpy as np
+
+from opamc_cli.errors import InputError
+from opamc_cli.joint.kinematics import Recording
+from opamc_cli.storage.runs import Array, Run
+
+
+def axes_of(runs: Sequence[Run]) -> list[int]:
+    """Axes that every run holds."""
+    common = set(runs[0].axes)
+    for run in runs[1:]:
+        common &= set(run.axes)
+    return sorted(common)
+
+
+def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
+    """Read one axis of a run, up to sample `stop` (half-open) if that is given.
+
+    Raises
+    ------
+    InputError
+        If the run has no such axis, or neither a signed current nor three phases.
+    """
+    channels = run.channels(axis)
+    run.check_time()
+    three = len(channels.phases) == 3
+    if channels.current is None and not three:
+        msg = (
+            f"{run.path}: axis {axis} has {len(channels.phases)} phase current(s) and no "
+            f"axis{axis}_current; a model needs the signed current or all three phases"
+        )
+        raise InputError(msg)
+    if not three and channels.position is None and channels.velocity is None:
+        msg = (
+            f"{run.path}: axis {axis} has no axis{axis}_position, no axis{axis}_velocity and not "
+            "three phases; log one of them, a model needs the motion"
+        )
+        raise InputError(msg)
+    named = {
+        "current": None if three else channels.current,
+        "position": channels.position,
+        "velocity": channels.velocity,
+        "temperature": channels.temperature,
+    }
+    wanted = [name for name in named.values() if name] + list(channels.phases if three else ())
+    samples = run.read(wanted, 0, stop)
+    arrays = {
+        key: None if name is None else np.asarray(samples[name], dtype=np.float64)
+        for key, name in named.items()
+    }
+    phases = None
+    if three:
+        phases = np.stack(
+            [np.asarray(samples[name], dtype=np.float64) for name in channels.phases], axis=1
+        )
+    for channel, values in samples.items():
+        _check_channel(run, channel, values)
+    return Recording(
+        name=run.name,
+        rate_hz=run.sampling_rate_hz,
+        current_a=arrays["current"],
+        phases_a=phases,
+        position_rad=arrays["position"],
+        velocity_rad_s=arrays["velocity"],
+        temperature_c=arrays["temperature"],
+        started_s=_seconds(run),
+    )
+
+
+def _check_channel(run: Run, name: str, values: Array) -> None:
+    known = np.isfinite(values)
+    if not known.any():
+        msg = f"{run.path}: column {name} holds no number; check the sensor or leave the column out"
+        raise InputError(msg)
+    is_current = not name.endswith(("position", "velocity", "temperature"))
+    if is_current and np.ptp(values[known]) == 0:
+        msg = (
+            f"{run.path}: column {name} is constant at {float(values[known][0]):g} A in all "
+            f"{len(values)} samples; check the sensor"
+        )
+        raise InputError(msg)
+
+
+def _seconds(run: Run) -> float | None:
+    if run.info.started_at is None:
+        return None
+    try:
+        return datetime.fromisoformat(run.info.started_at).timestamp()
+    except ValueError as error:
+        msg = (
+            f"{run.path}: started_at is {run.info.started_at!r}, an ISO 8601 time is needed; "
+            "correct it or leave it out"
+        )
+        raise InputError(msg) from error
