@@ -85,11 +85,22 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     """
     if moment.shape[-1] == 0:
         return moment
+    if moment.shape == (1,):
+        return moment / np.maximum(gram[0], 1e-200)
     scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
     scaled = gram / (scale[..., :, None] * scale[..., None, :])
-    inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
-    solution: Floats = np.einsum("...ij,...j->...i", inverse, moment / scale) / scale
+    solution: Floats = np.einsum("...ij,...j->...i", _inverse(scaled), moment / scale) / scale
     return solution
+
+
+def _inverse(gram: Floats) -> Floats:
+    """Pseudo-inverse of symmetric matrices, shape (..., k, k), by their eigenvectors."""
+    values, vectors = np.linalg.eigh(gram)
+    sizes = np.abs(values)
+    large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
+    factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
+    inverse: Floats = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return inverse
 
 
 def fitted_error(normal: Normal) -> float:
@@ -121,8 +132,7 @@ def held_out_error(normal: Normal, ridged: int = 0) -> Floats:
     rest = gram.sum(axis=0) - gram
     if ridged:
         rest = rest + np.diag(np.where(np.arange(unit.size) >= unit.size - ridged, 1e-3, 0.0))
-    inverse = np.linalg.pinv(rest, rcond=SINGULAR_BELOW, hermitian=True)
-    coefficients = np.einsum("gij,gj->gi", inverse, moment.sum(axis=0) - moment)
+    coefficients = np.einsum("gij,gj->gi", _inverse(rest), moment.sum(axis=0) - moment)
     quadratic = np.einsum("gi,gij,gj->g", coefficients, gram, coefficients)
     linear = np.einsum("gi,gi->g", coefficients, moment)
     error: Floats = np.maximum(normal.power - 2 * linear + quadratic, 0.0)

@@ -1,6 +1,7 @@
 """Trace a residual to its cause: candidates refitted with the model, gated, and compared."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,6 +79,62 @@ class View:
     span: Floats
     residual: Floats
     variance: float
+
+    @cached_property
+    def rows(self) -> NDArray[np.int64]:
+        """Places of the valid samples on the grid."""
+        return np.flatnonzero(self.valid)
+
+    @cached_property
+    def values(self) -> Floats:
+        """Residual on the valid samples; the model's span explains nothing of it."""
+        values: Floats = self.residual[self.rows]
+        return values
+
+    @cached_property
+    def power(self) -> float:
+        """Sum of squares of the residual."""
+        return float(np.dot(self.values, self.values))
+
+    def whitened_rows(self, columns: Floats) -> Floats:
+        """Regressors of the whole grid as they are on the valid samples, whitened."""
+        return whitened(columns, self.taps)[self.rows]
+
+
+@dataclass(frozen=True)
+class Scored:
+    """One form of an effect with given parameters, fitted to a view.
+
+    Attributes
+    ----------
+    score : float
+        Likelihood less what its parameters must earn; minus infinity where it is implausible.
+    term : Term
+        Effect, parameters, columns.
+    coefficients : array
+        One per column of the form.
+    columns, inside : arrays of shape (m, k) and (s, k)
+        Whitened columns of the full form, and their products with the model's span.
+    new : list of int
+        Columns of the form that the model does not span.
+    solution : array of shape (len(new),)
+        Their coefficients.
+    """
+
+    score: float
+    term: Term
+    coefficients: Floats
+    columns: Floats
+    inside: Floats
+    new: list[int]
+    solution: Floats
+
+    def contribution(self, view: View) -> Floats:
+        """Whitened contribution, without what the model's span could make of it."""
+        solution = np.zeros(self.columns.shape[1])
+        solution[self.new] = self.solution
+        part: Floats = self.columns @ solution - view.span @ (self.inside @ solution)
+        return part
 
 
 def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
@@ -184,43 +241,40 @@ def _orthonormal(columns: Floats) -> Floats:
     return span
 
 
-def _evaluate(
-    session: Session, view: View, effect: Effect, parameters: Parameters
-) -> list[tuple[float, Term, Floats, Floats]]:
+def _evaluate(session: Session, view: View, effect: Effect, parameters: Parameters) -> list[Scored]:
     """Score of an effect's full form and of its smaller forms, with given parameters."""
     raw = session.columns(Term(effect, parameters), view.fine)
     if not np.all(np.isfinite(raw)):
         return []
-    columns = whitened(raw, view.taps)[view.valid]
-    before = np.einsum("ij,ij->j", columns, columns)
-    columns = columns - view.span @ (view.span.T @ columns)
-    gram = columns.T @ columns
-    moment = columns.T @ view.residual[view.valid]
+    columns = view.whitened_rows(raw)
+    # What the span explains is taken out of the products: the columns themselves stay as they are.
+    inside = view.span.T @ columns
+    whole = columns.T @ columns
+    gram = whole - inside.T @ inside
+    moment = columns.T @ view.values
     forms: list[tuple[Parameters, tuple[int, ...]]] = [
         (parameters, tuple(range(raw.shape[1]))),
         *effect.variants(parameters),
     ]
-    total = float(np.dot(view.residual, view.residual))
+    limits = len(effect.limits(view.grid.track))
     results = []
     for form, keep in forms:
         # A column that the model already spans leaves only rounding.
-        new = [k for k in keep if gram[k, k] > 1e-6 * before[k]]
+        new = [k for k in keep if gram[k, k] > 1e-6 * whole[k, k]]
         if not new:
             continue
-        index = np.asarray(new)
-        part = gram[np.ix_(index, index)]
-        solution = solve(part, moment[index])
-        fall = float(solution @ moment[index])
-        left = max(total - fall, 1e-12 * total)
-        likelihood = view.residual[view.valid].size * np.log(total / left)
+        part = gram[np.ix_(new, new)]
+        solution = solve(part, moment[new])
+        fall = float(solution @ moment[new])
+        left = max(view.power - fall, 1e-12 * view.power)
+        likelihood = view.values.size * np.log(view.power / left)
         coefficients = np.zeros(len(keep))
         coefficients[[keep.index(k) for k in new]] = solution
-        whole = len(keep) == raw.shape[1]
         plausible = effect.plausible(coefficients, form)
-        term = Term(effect, form, None if whole or effect.flags_choose_columns else keep)
-        free = len(new) + len(effect.limits(view.grid.track))
-        score = likelihood - SCORE_PER_PARAMETER * free if plausible else -np.inf
-        results.append((float(score), term, coefficients, columns[:, index] @ solution))
+        full = len(keep) == raw.shape[1]
+        term = Term(effect, form, None if full or effect.flags_choose_columns else keep)
+        score = likelihood - SCORE_PER_PARAMETER * (len(new) + limits) if plausible else -np.inf
+        results.append(Scored(float(score), term, coefficients, columns, inside, new, solution))
     return results
 
 
@@ -244,35 +298,37 @@ def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | No
         Number of guesses.
     """
     guesses = effect.guesses(view.grid.track, view.residual)
-    best: tuple[float, Term, Floats, Floats] | None = None
+    best: Scored | None = None
     for guess in guesses:
         for result in _evaluate(session, view, effect, guess):
-            if best is None or result[0] > best[0]:
+            if best is None or result.score > best.score:
                 best = result
-    if best is None or not np.isfinite(best[0]):
+    if best is None or not np.isfinite(best.score):
         return None, len(guesses)
     limits = effect.limits(view.grid.track)
     if limits and not effect.flags_choose_columns:
         best = _refined(session, view, effect, best, limits, len(guesses))
-    settled_parameters = effect.settled(best[1].parameters, view.grid.track)
-    if settled_parameters != best[1].parameters:
+    settled_parameters = effect.settled(best.term.parameters, view.grid.track)
+    if settled_parameters != best.term.parameters:
         for result in _evaluate(session, view, effect, settled_parameters):
-            if result[1].keep == best[1].keep and result[1].parameters == settled_parameters:
+            same_form = result.term.keep == best.term.keep
+            if same_form and result.term.parameters == settled_parameters:
                 best = result
-    free = best[2].size + len(limits)
-    likelihood = best[0] + SCORE_PER_PARAMETER * free
+    free = best.coefficients.size + len(limits)
+    likelihood = best.score + SCORE_PER_PARAMETER * free
     tried = max(len(guesses), 1)
     log_p = float(chi2.logsf(max(likelihood, 0.0), free)) + np.log(tried)
     p_value = float(np.exp(np.clip(log_p, -700.0, 0.0)))
+    contribution = best.contribution(view)
     candidate = Candidate(
-        term=best[1],
+        term=best.term,
         likelihood=likelihood,
-        score=best[0],
+        score=best.score,
         p_value=p_value,
-        coefficients=best[2],
-        contribution=best[3],
+        coefficients=best.coefficients,
+        contribution=contribution,
         fine=view.fine,
-        t_value=block_t_value(view, best[3]),
+        t_value=block_t_value(view, contribution),
     )
     return candidate, tried
 
@@ -281,27 +337,27 @@ def _refined(
     session: Session,
     view: View,
     effect: Effect,
-    best: tuple[float, Term, Floats, Floats],
+    best: Scored,
     limits: dict[str, tuple[float, float]],
     guesses: int,
-) -> tuple[float, Term, Floats, Floats]:
-    names = [name for name in limits if name in best[1].parameters]
-    start = np.array([best[1].parameters[name] for name in names])
+) -> Scored:
+    names = [name for name in limits if name in best.term.parameters]
+    start = np.array([best.term.parameters[name] for name in names])
     low = np.array([limits[name][0] for name in names])
     high = np.array([limits[name][1] for name in names])
     champion = best
-    keep = best[1].keep
+    keep = best.term.keep
 
     def cost(values: Floats) -> float:
         nonlocal champion
         inside = np.clip(values, low, high)
-        parameters = best[1].parameters | dict(zip(names, inside.tolist(), strict=True))
+        parameters = best.term.parameters | dict(zip(names, inside.tolist(), strict=True))
         top = -np.inf
         for result in _evaluate(session, view, effect, parameters):
-            if result[1].keep != keep:
+            if result.term.keep != keep:
                 continue
-            top = max(top, result[0])
-            if result[0] > champion[0]:
+            top = max(top, result.score)
+            if result.score > champion.score:
                 champion = result
         penalty = float(np.sum(np.abs(values - inside) / (high - low)))
         return -top + 1e3 * penalty if np.isfinite(top) else 1e12
@@ -313,7 +369,7 @@ def _refined(
             length = float(np.ptp(view.grid.track.time_s)) + 1e-9
             step = 0.2 / length
         elif name in ("place_rad",):
-            step = 0.3 * best[1].parameters.get("width_rad", high[i] - low[i])
+            step = 0.3 * best.term.parameters.get("width_rad", high[i] - low[i])
         elif name == "resonance_hz":
             step = 0.06 * start[i]
         step = step or 0.05 * (high[i] - low[i])
@@ -410,7 +466,7 @@ def block_t_value(view: View, contribution: Floats) -> float:
         gives 1, n equal ones the root of n. Eight blocks per group, so that effects that fade
         or step, and live in few groups, can show themselves too.
     """
-    products = contribution * view.residual[view.valid]
+    products = contribution * view.values
     sums = np.array([products[block].sum() for block in _blocks_of(view, BLOCKS_PER_GROUP)])
     length = float(np.linalg.norm(sums))
     return float(sums.sum() / length) if length > 0 else 0.0
@@ -456,7 +512,7 @@ def decoy_likelihood(
         Largest likelihood.
     """
     worst = 0.0
-    rest = view.residual[view.valid] - candidate.contribution
+    rest = view.values - candidate.contribution
     fast = candidate.term.effect.fast
     blocks = _blocks_of(view, BLOCKS_PER_GROUP if fast else DECOY_BLOCKS_PER_GROUP)
     for _ in range(count):

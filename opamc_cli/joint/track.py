@@ -1,6 +1,7 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +100,7 @@ class Track:
         """Number of samples on the grid."""
         return int(self.time_s.size)
 
-    @property
+    @cached_property
     def speed_scale(self) -> float:
         """Speed that moving samples reach at their 95th percentile."""
         speeds = np.abs(self.velocity[self.moving])

@@ -2,7 +2,6 @@
 
 import numpy as np
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from opamc_cli.joint.track import Bools, Floats
 
@@ -64,7 +63,11 @@ def whitened(values: Floats, taps: Floats) -> Floats:
     """
     if taps.size == 1:
         return values
-    filtered: Floats = lfilter(taps, [1.0], values, axis=0)
+    if values.ndim == 1:
+        return np.convolve(values, taps)[: values.size]
+    filtered = np.empty(values.shape, order="F")
+    for k in range(values.shape[1]):
+        filtered[:, k] = np.convolve(values[:, k], taps)[: values.shape[0]]
     return filtered
 
 

@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.signal import bilinear
 from simulator import simulate
 
 from opamc_cli.errors import ConfigError
+from opamc_cli.joint.effects.elasticity import discrete
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
 from opamc_cli.joint.effects.ripple import read_order
@@ -102,6 +104,15 @@ def slow_dahl(position, length):
 def test_dahl_state_solves_its_equation(places):
     position = np.array(places)
     np.testing.assert_allclose(dahl_state(position, 0.4), slow_dahl(position, 0.4), atol=2e-3)
+
+
+@pytest.mark.parametrize("damping", [0.005, 0.1, 0.4])
+@pytest.mark.parametrize("above", [(-1.0, -0.5, 0.0), (0.0, 3.0, 0.0), (1.0, 2.0, 3.0)])
+def test_filters_of_second_order_become_discrete_as_scipy_makes_them(above, damping):
+    w = 2 * np.pi * 7.0
+    below = (1.0, 2 * damping * w, w * w)
+    expected = bilinear(above, below, 100.0)
+    np.testing.assert_allclose(discrete(above, below, 100.0), expected, rtol=1e-12, atol=1e-14)
 
 
 def test_unknown_effect_is_refused_with_the_nearest_name():

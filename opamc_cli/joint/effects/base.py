@@ -86,8 +86,8 @@ class Effect:
 
 
 def stack(*columns: Floats) -> Floats:
-    """Put regressors side by side."""
-    stacked: Floats = np.stack(columns, axis=1)
+    """Put regressors side by side, each contiguous in memory: they are filtered one by one."""
+    stacked: Floats = np.stack(columns, axis=0).T
     return stacked
 
 

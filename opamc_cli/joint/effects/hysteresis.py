@@ -65,12 +65,19 @@ def dahl_state(position_rad: Floats, length_rad: float) -> Floats:
     # Stand-still keeps the direction of the last move, so that stretches are few.
     index = np.maximum.accumulate(np.where(direction != 0, np.arange(steps.size), 0))
     direction = direction[index]
-    edges = np.flatnonzero(np.diff(direction) != 0) + 1
-    state = np.zeros(position_rad.size)
-    before = 0.0
-    for start, stop in zip([0, *edges], [*edges, position_rad.size], strict=True):
-        travelled = np.cumsum(np.abs(steps[start:stop]))
-        target = direction[start]
-        state[start:stop] = target + (before - target) * np.exp(-travelled / length_rad)
-        before = state[stop - 1]
-    return state
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(direction) != 0) + 1])
+    path = np.cumsum(np.abs(steps))
+    begun = np.concatenate([[0.0], path[edges[1:] - 1]])
+    length = np.diff(begun, append=path[-1:])
+    # Only the states at the reversals follow from one another; the rest is one expression.
+    before, state = [], 0.0
+    for target, decay in zip(
+        direction[edges].tolist(), np.exp(-length / length_rad).tolist(), strict=True
+    ):
+        before.append(state)
+        state = target + (state - target) * decay
+    counts = np.diff(edges, append=position_rad.size)
+    travelled = path - np.repeat(begun, counts)
+    away = np.repeat(np.array(before) - direction[edges], counts)
+    settled: Floats = direction + away * np.exp(-travelled / length_rad)
+    return settled
