@@ -86,7 +86,8 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     if moment.shape[-1] == 0:
         return moment
     if moment.shape == (1,):
-        return moment / np.maximum(gram[0], 1e-200)
+        alone: Floats = moment / np.maximum(gram[0], 1e-200)
+        return alone
     scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
     scaled = gram / (scale[..., :, None] * scale[..., None, :])
     solution: Floats = np.einsum("...ij,...j->...i", _inverse(scaled), moment / scale) / scale
