@@ -119,6 +119,10 @@ class InTarget(Effect):
         """As the effect itself."""
         return self.effect.limits(track)
 
+    def is_constant(self, parameters: Parameters) -> bool:
+        """As the effect itself."""
+        return self.effect.is_constant(parameters)
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Regressors of the effect, zero in the baseline."""
         return self.effect.columns(track, parameters) * self._target(track)[:, None]

@@ -195,7 +195,7 @@ def _line_structures(fit: Fit) -> list[Structure]:
         if height > gamma.isf(LINE_P / trials, classes):
             share = 2 * height / classes / max(int(view.valid.sum()), 1) * classes
             found.append(Structure("motor-angle", min(share, 1.0), float(np.sqrt(height)), LINE_P))
-    frequencies, lines = frequency_lines(view.residual, track.rate_hz)
+    frequencies, lines = frequency_lines(track, view.residual)
     upper = frequencies > 5.0
     if upper.any():
         height = float(lines[upper].max())

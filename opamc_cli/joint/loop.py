@@ -21,6 +21,7 @@ from opamc_cli.joint.trace import (
     prepare,
     prepare_held,
     refusal,
+    removal_gains,
     search,
 )
 
@@ -414,21 +415,9 @@ def _pruned(fitted: Fit, before: Fit, progress: _Progress) -> tuple[Fit, list[St
     """Remove, one after the other, added effects that later ones have made superfluous."""
     steps = list(progress.steps)
     while len(steps) > 1:
-        worth: list[tuple[float, int]] = []
-        for i in range(len(steps) - 1):
-            rest = (*before.terms, *(s.term for j, s in enumerate(steps) if j != i))
-            smaller = fit_terms(fitted.session, rest)
-            candidate = Candidate(
-                steps[i].term,
-                0.0,
-                0.0,
-                1.0,
-                np.zeros(0),
-                np.zeros(0),
-                fine=steps[i].term.effect.fast,
-            )
-            worth.append((held_out(smaller, candidate).gain, i))
-        gain, index = min(worth, default=(1.0, -1))
+        first = len(before.terms)
+        gains = removal_gains(fitted, range(first, first + len(steps) - 1))
+        gain, index = min((gain, i) for i, gain in enumerate(gains))
         if gain >= PRUNE_GAIN:
             break
         gone = steps.pop(index)
@@ -537,10 +526,11 @@ def _given_up(before: Fit, steps: list[Step], why: str, progress: _Progress) -> 
 
 
 def _r2(fitted: Fit) -> float:
-    grid = fitted.session.fine
+    opened = fitted.opened
+    grid = opened.session.fine
     current = grid.track.current_a[grid.sealed]
     power = float(np.sum((current - current.mean()) ** 2))
-    rest = float(np.sum(fitted.residual_a[grid.sealed] ** 2))
+    rest = float(np.sum(opened.residual_a[grid.sealed] ** 2))
     return 1.0 - rest / power if power > 0 else 0.0
 
 

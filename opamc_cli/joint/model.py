@@ -1,21 +1,22 @@
 """A model of the current: terms, their regressors on both grids, and the joint fit."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
-from opamc_cli.joint.normal import Normal, normal_equations, solve
+from opamc_cli.joint.kept import Kept
+from opamc_cli.joint.normal import Normal, solve
+from opamc_cli.joint.thinning import MOST_SAMPLES, cut, thinned, whole_groups
 from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 20_000
 SMALLEST_KERNEL = 5
 """A moving average of up to 5 samples needs no counterpart."""
-
-FINE_SAMPLES = 250_000
-"""Above this many moving samples at the full rate, evenly spread whole groups stand for all."""
 
 
 @dataclass(frozen=True)
@@ -51,21 +52,49 @@ class Grid:
     sealed: Bools
     slices: tuple[tuple[int, int], ...]
 
+    @property
+    def rows(self) -> list[NDArray[np.int64]]:
+        """Places of each open group's `fit` samples on the grid."""
+        places = np.flatnonzero(self.fit)
+        return [places[start:stop] for start, stop in self.slices]
+
 
 @dataclass(frozen=True)
 class Session:
-    """Everything the loop works on: the fine and the coarse grid of the same recordings."""
+    """Everything the loop works on: the fine and the coarse grid of the same recordings.
+
+    Attributes
+    ----------
+    fine, coarse : Grid
+        At the full rate and averaged; of a long recording, a sample of the open groups.
+    opened : Session or None
+        The same open samples with all sealed groups beside them, where `fine` has none.
+    factor : int
+        Fine samples per coarse one.
+    grouping : Grouping
+    fit_groups : tuple of int
+        Groups that may be looked at before the end.
+    kept : Kept
+        What fits share.
+    """
 
     fine: Grid
     coarse: Grid
     factor: int
     grouping: Grouping
     fit_groups: tuple[int, ...]
+    opened: "Session | None" = None
+    kept: Kept = field(default_factory=Kept, repr=False, compare=False)
 
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
+        fine = fine or self.coarse is self.fine
+        follows = None if term.effect.is_constant(term.parameters) else self.fine.track
+        return self.kept.columns(term, fine, follows, lambda: self._columns(term, fine))
+
+    def _columns(self, term: Term, fine: bool) -> Floats:
         track = self.fine.track
-        if fine or self.coarse is self.fine:
+        if fine:
             return term.columns(track)
         if term.effect.fast:
             smooth = averaged(term.columns(track), track.bounds, track.kernel)
@@ -76,7 +105,7 @@ class Session:
         """Return the fine or the coarse grid."""
         return self.fine if fine else self.coarse
 
-    def with_model(self, load: Floats, model: Floats, static: Floats) -> "Session":
+    def with_model(self, load: Floats, model: Floats, static: tuple[Floats, ...]) -> "Session":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
         bounds = self.fine.track.bounds
         fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
@@ -87,7 +116,7 @@ class Session:
             track=self.coarse.track.with_model(
                 block_mean(load, bounds, self.factor),
                 block_mean(model, bounds, self.factor),
-                block_mean(static, bounds, self.factor),
+                self.kept.means(static, lambda block: block_mean(block, bounds, self.factor)),
             ),
         )
         return replace(self, fine=fine, coarse=coarse)
@@ -108,31 +137,32 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     Session
     """
     track = replace(track, group=grouping.group)
-    inside = int(np.count_nonzero(track.moving & (grouping.group >= 0)))
-    by_rate = int(track.rate_hz // COARSE_RATE_HZ)
-    factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
+    groups = tuple(g for g in range(len(grouping.names)) if g not in grouping.sealed)
+    if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
+        return _session(track, grouping, groups)
+    pieces = thinned(track, grouping, groups)
+    sealed = whole_groups(track, grouping.sealed)
+    grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
+    opened = Session(grid, grid, 1, grouping, groups)
+    return replace(_session(cut(track, pieces), grouping, groups), opened=opened)
+
+
+def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Session:
+    inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
+    by_rate = int(track.rate_hz // COARSE_RATE_HZ)
+    factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
     # With shorter blocks the whitening would amplify what the average has taken away.
     width = 1.0 / float(np.sum(track.kernel**2))
     factor = max(factor, int(0.8 * width), track.quiet)
     coarse_track = coarsen(track, factor)
-    groups = [g for g in range(len(grouping.names)) if g not in grouping.sealed]
-    share = FINE_SAMPLES / max(inside, 1)
-    fine = _grid(track, _thinned(groups, share), _thinned(list(grouping.sealed), share))
-    coarse = fine if coarse_track is track else _grid(coarse_track, groups, list(grouping.sealed))
-    return Session(fine, coarse, factor, grouping, tuple(groups))
+    fine = _grid(track, groups, grouping.sealed)
+    coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
+    return Session(fine, coarse, factor, grouping, groups)
 
 
-def _thinned(groups: list[int], share: float) -> list[int]:
-    if share >= 1:
-        return groups
-    count = min(max(int(len(groups) * share), 4), len(groups))
-    picks = np.unique(np.linspace(0, len(groups) - 1, count).round().astype(int))
-    return [groups[i] for i in picks]
-
-
-def _grid(track: Track, groups: list[int], sealed: list[int]) -> Grid:
+def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
     member = track.moving & (track.group >= 0)
     fit = member & np.isin(track.group, groups)
     counts = np.bincount(track.group[fit], minlength=max([*groups, 0]) + 1)
@@ -167,10 +197,21 @@ class Fit:
     residual_a: Floats
     normal: Normal
 
+    @cached_property
+    def opened(self) -> "Fit":
+        """The same fit with the sealed samples beside the open ones: itself, if they are there.
+
+        Of a long recording the fine grid holds a sample of the open groups alone; the terms are
+        fitted once more, to the same samples, where all sealed groups can be predicted.
+        """
+        session = self.session.opened
+        return self if session is None else fit_terms(session, self.terms)
+
     def rmse(self, sealed: bool) -> float:
         """Root mean square residual on the open or on the sealed samples."""
-        grid = self.session.fine
-        values = self.residual_a[grid.sealed if sealed else grid.fit]
+        fit = self.opened if sealed else self
+        grid = fit.session.fine
+        values = fit.residual_a[grid.sealed if sealed else grid.fit]
         return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
@@ -188,14 +229,10 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
     -------
     Fit
     """
-    circular = any(
-        term.effect.name
-        in ("load_friction", "time_delay", "sensor_gain", "dead_time", "ripple", "payload_change")
-        or not term.effect.static
-        for term in terms
-    )
+    circular = not all(term.effect.is_constant(term.parameters) for term in terms)
     plain = not np.any(session.fine.track.model_a)
     rounds = 3 if circular and plain else 2 if circular else 1
+    session.kept.keep(terms)
     for _ in range(rounds):
         fitted = _fit_once(session, terms)
         session = fitted.session
@@ -205,25 +242,22 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
     grid = session.fine
     current = grid.track.current_a
-    blocks = [term.columns(grid.track)[grid.fit] for term in terms]
-    widths = [block.shape[1] for block in blocks]
-    design = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(grid.fit.sum()), 0))
-    normal = normal_equations(design, current[grid.fit], grid.slices)
-    del design, blocks
+    columns = [session.columns(term, fine=True) for term in terms]
+    normal = session.kept.products(columns, current, grid.rows)
     solution = solve(normal.gram.sum(axis=0), normal.moment.sum(axis=0))
+    widths = [block.shape[1] for block in columns]
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     total = np.zeros(grid.track.size)
     model = np.zeros(grid.track.size)
     load = np.zeros(grid.track.size)
-    static = [np.zeros((grid.track.size, 0))]
-    for term, values in zip(terms, coefficients, strict=True):
-        columns = term.columns(grid.track)
-        part = columns @ values
+    static = []
+    for term, block, values in zip(terms, columns, coefficients, strict=True):
+        part = block @ values
         total += part
         if term.effect.static and not term.effect.fast:
             model += part
-            static.append(columns)
+            static.append(block)
         if term.effect.carries_load:
             load += part
-    session = session.with_model(load, model, np.concatenate(static, axis=1))
+    session = session.with_model(load, model, tuple(static))
     return Fit(terms, coefficients, session, current - total, normal)

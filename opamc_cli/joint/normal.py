@@ -1,8 +1,10 @@
 """Least squares from sums per group, so that leaving a group out is cheap."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from opamc_cli.joint.track import Floats
 
@@ -66,6 +68,101 @@ def normal_equations(
         power[g] = values @ values
         count[g] = stop - start
     return Normal(gram, moment, power, count)
+
+
+def extended(
+    known: Normal | None,
+    places: Sequence[int | None],
+    columns: Sequence[Floats],
+    signal: Floats,
+    rows: Sequence[NDArray[np.int64]],
+) -> Normal:
+    """Sum products over each group, taking what is known from an earlier sum.
+
+    Parameters
+    ----------
+    known : Normal or None
+        Of other regressors and the same signal and rows.
+    places : sequence of (int or None)
+        For each block its first regressor's place in `known`, or None where it is new.
+    columns : sequence of arrays of shape (n, k)
+        Blocks of regressors on the whole grid.
+    signal : array of shape (n,)
+        Current or residual on the whole grid.
+    rows : sequence of int arrays
+        Samples of each group on the grid.
+    """
+    widths = [block.shape[1] for block in columns]
+    total = sum(widths)
+    starts = np.concatenate([[0], np.cumsum(widths)]).astype(int)
+    new = [i for i, place in enumerate(places) if place is None or known is None]
+    fresh = [k for i in new for k in range(starts[i], starts[i + 1])]
+    old = [k for k in range(total) if k not in set(fresh)]
+    gram = np.zeros((len(rows), total, total))
+    moment = np.zeros((len(rows), total))
+    if known is not None and old:
+        before = [
+            place + k
+            for place, width in zip(places, widths, strict=True)
+            if place is not None
+            for k in range(width)
+        ]
+        gram[:, np.array(old)[:, None], old] = known.gram[:, np.array(before)[:, None], before]
+        moment[:, old] = known.moment[:, before]
+    power = np.zeros(len(rows))
+    for g, members in enumerate(rows):
+        values = signal[members]
+        power[g] = values @ values
+        if not fresh:
+            continue
+        part = np.empty((members.size, total), order="F")
+        for block, start in zip(columns, starts[:-1], strict=True):
+            for k in range(block.shape[1]):
+                np.take(block[:, k], members, out=part[:, start + k])
+        mine = part[:, fresh]
+        products = mine.T @ part
+        gram[g, fresh, :] = products
+        gram[g, :, fresh] = products
+        moment[g, fresh] = values @ mine
+    count = np.array([float(members.size) for members in rows])
+    return Normal(gram, moment, power, count)
+
+
+def appended(
+    known: Normal,
+    base: Floats,
+    columns: Floats,
+    signal: Floats,
+    slices: tuple[tuple[int, int], ...],
+) -> Normal:
+    """Add regressors to sums that are known.
+
+    Parameters
+    ----------
+    known : Normal
+        Of `base` and `signal`.
+    base : array of shape (n, k)
+        Regressors that are in the sums already.
+    columns : array of shape (n, m)
+        Those that are not.
+    signal : array of shape (n,)
+        Current or residual.
+    slices : tuple of (int, int)
+        Half-open sample ranges of the groups.
+    """
+    width, more = base.shape[1], columns.shape[1]
+    gram = np.zeros((len(slices), width + more, width + more))
+    gram[:, :width, :width] = known.gram
+    moment = np.zeros((len(slices), width + more))
+    moment[:, :width] = known.moment
+    for g, (start, stop) in enumerate(slices):
+        part = columns[start:stop]
+        cross = base[start:stop].T @ part
+        gram[g, :width, width:] = cross
+        gram[g, width:, :width] = cross.T
+        gram[g, width:, width:] = part.T @ part
+        moment[g, width:] = part.T @ signal[start:stop]
+    return Normal(gram, moment, known.power, known.count)
 
 
 def solve(gram: Floats, moment: Floats) -> Floats:

@@ -8,6 +8,8 @@ from opamc_cli.joint.track import Floats, Track
 
 OVERSAMPLING = 4
 MOST_BINS = 2**21
+MOST_TIME = 8
+"""Pieces of a recording are put on its clock if it is at most so many times as long."""
 NYQUIST_SHARE = 0.9
 LOWEST_ORDER = {"motor": 0.4, "joint": 8.0, "electrical": 0.05}
 FALSE_PEAK = 1e-3
@@ -141,22 +143,35 @@ def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
     return peaks
 
 
-def frequency_lines(residual: Floats, rate_hz: float) -> tuple[Floats, Floats]:
+def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
     """Power of a residual over frequency, oversampled twice.
 
     Parameters
     ----------
+    track : Track
+        Gives the rate, and the time that passes between its recordings or pieces.
     residual : array of shape (n,)
         Whitened residual, zero where samples do not count.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
     frequencies_hz, power : arrays
         Power in units of white noise's.
     """
+    residual = _on_the_clock(track, residual)
     length = next_fast_len(2 * residual.size, real=True)
     energy = float(np.dot(residual, residual))
     power = np.abs(rfft(residual, length)) ** 2 / max(energy, 1e-300)
-    return np.arange(power.size) * rate_hz / length, power
+    return np.arange(power.size) * track.rate_hz / length, power
+
+
+def _on_the_clock(track: Track, residual: Floats) -> Floats:
+    """Put zeros where a track leaves time out, unless that is far more than it holds."""
+    if len(track.bounds) == 1:
+        return residual
+    places = np.round((track.time_s - track.time_s[0]) * track.rate_hz).astype(np.int64)
+    if places[-1] >= MOST_TIME * residual.size:
+        return residual
+    values = np.zeros(places[-1] + 1)
+    values[places] = residual
+    return values

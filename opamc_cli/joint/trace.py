@@ -1,5 +1,6 @@
 """Trace a residual to its cause: candidates refitted with the model, gated, and compared."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,7 +11,13 @@ from scipy.stats import chi2
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.model import Fit, Grid, Session, Term
-from opamc_cli.joint.normal import Normal, held_out_error, normal_equations, solve
+from opamc_cli.joint.normal import (
+    Normal,
+    appended,
+    held_out_error,
+    normal_equations,
+    solve,
+)
 from opamc_cli.joint.track import Bools, Floats
 from opamc_cli.joint.whitening import autoregression, settled, whitened
 
@@ -75,7 +82,6 @@ class View:
     fine: bool
     taps: Floats
     valid: Bools
-    base: Floats
     span: Floats
     residual: Floats
     variance: float
@@ -200,11 +206,13 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
     if fine and blur is not None:
         # What smoothing took from the acceleration is no effect.
         blocks.append(blur)
-    base = (
-        np.concatenate([whitened(block, taps)[valid] for block in blocks], axis=1)
-        if blocks
-        else np.zeros((int(valid.sum()), 0))
-    )
+    rows = np.flatnonzero(valid)
+    base = np.empty((rows.size, sum(block.shape[1] for block in blocks)), order="F")
+    place = 0
+    for block in blocks:
+        for column in block.T:
+            np.take(whitened(column, taps), rows, out=base[:, place])
+            place += 1
     span = _orthonormal(base)
     signal = whitened(own if residual is None else residual, taps)
     values = signal[valid]
@@ -212,7 +220,7 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
     full = np.zeros(grid.track.size)
     full[valid] = values
     variance = float(values @ values) / max(values.size - span.shape[1], 1)
-    return View(grid, fine, taps, valid, base, span, full, max(variance, 1e-300))
+    return View(grid, fine, taps, valid, span, full, max(variance, 1e-300))
 
 
 def residual_on(fit: Fit, fine: bool) -> Floats:
@@ -233,11 +241,11 @@ def residual_on(fit: Fit, fine: bool) -> Floats:
 def _orthonormal(columns: Floats) -> Floats:
     if columns.shape[1] == 0:
         return columns
-    scale = np.sqrt(np.maximum(np.einsum("ij,ij->j", columns, columns), 1e-300))
-    unit = columns / scale
-    values, vectors = np.linalg.eigh(unit.T @ unit)
+    gram = columns.T @ columns
+    scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     good = values > 1e-9 * values[-1]
-    span: Floats = unit @ (vectors[:, good] / np.sqrt(values[good]))
+    span: Floats = columns @ (vectors[:, good] / np.sqrt(values[good]) / scale[:, None])
     return span
 
 
@@ -385,22 +393,73 @@ def _refined(
 
 @dataclass(frozen=True)
 class Held:
-    """What leaving groups out needs of the model itself, once per round."""
+    """What leaving groups out needs of the model itself, once per round.
+
+    Attributes
+    ----------
+    base : array of shape (n, k)
+        The model's regressors on the open samples of one grid.
+    residual : array of shape (n,)
+        Likewise.
+    normal : Normal
+        Their sums per group.
+    """
 
     base: Floats
     residual: Floats
+    normal: Normal
 
 
 def prepare_held(fit: Fit, fine: bool) -> Held:
     """Collect the model's regressors and residual on the open samples of one grid."""
+    grid = fit.session.grid(fine)
+    base = _model_rows(fit, fine)
+    residual = residual_on(fit, fine)[grid.fit]
+    return Held(base, residual, normal_equations(base, residual, grid.slices))
+
+
+def _model_rows(fit: Fit, fine: bool) -> Floats:
     session = fit.session
     rows = session.grid(fine).fit
     blocks = [session.columns(term, fine)[rows] for term in fit.terms]
     blur = session.grid(fine).track.blur
     if fine and blur is not None:
         blocks.append(blur[rows])
-    base = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(rows.sum()), 0))
-    return Held(base, residual_on(fit, fine)[rows])
+    return np.concatenate(blocks, axis=1) if blocks else np.zeros((int(rows.sum()), 0))
+
+
+def removal_gains(fit: Fit, places: Sequence[int]) -> list[float]:
+    """Held-out share of the mean square that each of some terms of a fit takes off.
+
+    Parameters
+    ----------
+    fit : Fit
+        The model.
+    places : sequence of int
+        Which of its terms.
+
+    Returns
+    -------
+    list of float
+        As `held_out` finds for the term where all others are fitted; fast terms on the fine
+        grid, others on the coarse one.
+    """
+    session = fit.session
+    normals: dict[bool, Normal] = {}
+    owner = np.repeat(np.arange(len(fit.terms)), [values.size for values in fit.coefficients])
+    gains = []
+    for place in places:
+        fine = fit.terms[place].effect.fast
+        if fine not in normals:
+            grid = session.grid(fine)
+            signal = grid.track.current_a[grid.fit]
+            normals[fine] = normal_equations(_model_rows(fit, fine), signal, grid.slices)
+        normal = normals[fine]
+        others = [k for k in range(normal.moment.shape[1]) if k >= owner.size or owner[k] != place]
+        before = held_out_error(normal.taken(others)).sum()
+        after = held_out_error(normal).sum()
+        gains.append(float((before - after) / max(before, 1e-300)))
+    return gains
 
 
 def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candidate:
@@ -426,8 +485,8 @@ def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candid
     held = held or prepare_held(fit, candidate.fine)
     base = held.base.shape[1]
     own = session.columns(candidate.term, candidate.fine)[grid.fit]
-    normal = normal_equations(np.concatenate([held.base, own], axis=1), held.residual, grid.slices)
-    before = held_out_error(normal.taken(list(range(base))))
+    normal = appended(held.normal, held.base, own, held.residual, grid.slices)
+    before = held_out_error(held.normal)
     after = held_out_error(normal)
     falls = before - after
     gain = float(falls.sum() / max(before.sum(), 1e-300))

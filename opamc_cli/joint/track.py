@@ -12,6 +12,28 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
+SAMPLED = (
+    "time_s",
+    "run_time_s",
+    "current_a",
+    "position_rad",
+    "velocity",
+    "acceleration",
+    "machine_angle_rad",
+    "direction",
+    "moving",
+    "group",
+    "load_a",
+    "model_a",
+    "temperature_c",
+    "current_d_a",
+    "electrical_rad",
+    "open_samples",
+    "blur",
+)
+"""Attributes of a track that have a value per sample, or are None."""
+
+
 @dataclass(frozen=True)
 class Joint:
     """Constants of the joint; None where nobody knows them."""
@@ -50,8 +72,8 @@ class Track:
         Current that carries the load, and the whole fitted current (zero before a fit).
     temperature_c, current_d_a, electrical_rad : array of shape (n,) or None
         Where known: temperature, current in the flux axis, electrical angle.
-    static_columns : array of shape (n, k) or None
-        Regressors of the fitted terms that neither shift nor ripple.
+    static_columns : tuple of arrays of shape (n, k), or None
+        Regressors of the fitted terms that neither shift nor ripple, term by term.
     open_samples : bool array of shape (n,) or None
         Moving samples that a fit may look at: none that are sealed.
     kernel : array of odd length
@@ -89,7 +111,7 @@ class Track:
     current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
     period_samples: int | None = None
-    static_columns: Floats | None = None
+    static_columns: tuple[Floats, ...] | None = None
     open_samples: Bools | None = None
     kernel: Floats = field(default_factory=lambda: np.ones(1))
     quiet: int = 1
@@ -106,7 +128,9 @@ class Track:
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
 
-    def with_model(self, load_a: Floats, model_a: Floats, static_columns: Floats) -> "Track":
+    def with_model(
+        self, load_a: Floats, model_a: Floats, static_columns: tuple[Floats, ...]
+    ) -> "Track":
         """Return the same track with the fitted load and model currents."""
         return replace(self, load_a=load_a, model_a=model_a, static_columns=static_columns)
 
@@ -160,6 +184,29 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
         shape = (-1,) + (1,) * (part.ndim - 1)
         smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
     return smooth
+
+
+def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:
+    """Cut spans out of a track; each becomes a recording of its own.
+
+    Parameters
+    ----------
+    track : Track
+        Any track.
+    inside : bool array of shape (n,)
+        Samples that keep their group; all others get none.
+    spans : tuple of (int, int)
+        Half-open, ascending, each inside one recording.
+    """
+    rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
+    stops = np.cumsum([stop - start for start, stop in spans])
+    lengths = [stop - start for start, stop in spans]
+    bounds = tuple((int(b) - n, int(b)) for b, n in zip(stops, lengths, strict=True))
+    group = np.where(inside, track.group, -1)
+    track = replace(track, group=group, static_columns=None)
+    sampled = {name: getattr(track, name) for name in SAMPLED}
+    taken = {name: values[rows] for name, values in sampled.items() if values is not None}
+    return replace(track, bounds=bounds, **taken)
 
 
 def coarsen(track: Track, factor: int) -> Track:

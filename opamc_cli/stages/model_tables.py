@@ -243,7 +243,8 @@ def extended_model(model: JointModelConfig, after: Fit) -> dict[str, Any]:
 
 def residual_table(axis: int, loop: Loop) -> pa.Table:
     """Sealed residuals before and after, at most 20 000 rows."""
-    grid = loop.after.session.fine
+    before, after = loop.before.opened, loop.after.opened
+    grid = after.session.fine
     rows = np.flatnonzero(grid.sealed)
     rows = rows[:: max(-(-rows.size // MOST_RESIDUALS), 1)]
     track = grid.track
@@ -251,8 +252,8 @@ def residual_table(axis: int, loop: Loop) -> pa.Table:
         "time_s": track.time_s[rows],
         "position_rad": track.position_rad[rows],
         "velocity_rad_s": track.velocity[rows],
-        "residual_before_a": loop.before.residual_a[rows],
-        "residual_after_a": loop.after.residual_a[rows],
+        "residual_before_a": before.residual_a[rows],
+        "residual_after_a": after.residual_a[rows],
     }
     axes = pa.array(np.full(rows.size, axis), pa.int16())
     return pa.table([axes, *(pa.array(values) for values in columns.values())], schema=RESIDUALS)

@@ -3,7 +3,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.joint.normal import held_out_error, normal_equations, solve
+from opamc_cli.joint.normal import (
+    appended,
+    extended,
+    held_out_error,
+    normal_equations,
+    solve,
+)
 
 
 def slow_held_out(columns, signal, slices):
@@ -39,3 +45,31 @@ def test_a_column_of_zeros_gets_nothing_and_breaks_nothing():
     columns = np.stack([np.ones(20), np.zeros(20)], axis=1)
     normal = normal_equations(columns, np.full(20, 3.0), ((0, 10), (10, 20)))
     assert held_out_error(normal) == pytest.approx([0, 0], abs=1e-12)
+
+
+def blocks_of(columns, widths):
+    return np.split(columns, np.cumsum(widths)[:-1], axis=1)
+
+
+def test_sums_are_the_same_whether_terms_come_together_or_one_after_the_other():
+    rng = np.random.default_rng(0)
+    columns, signal = rng.normal(size=(60, 6)), rng.normal(size=60)
+    rows = [np.arange(5, 20), np.arange(25, 31), np.arange(40, 60)]
+    inside = np.concatenate(rows)
+    slices = ((0, 15), (15, 21), (21, 41))
+    wanted = normal_equations(columns[inside], signal[inside], slices)
+    blocks = blocks_of(columns, [2, 1, 3])
+    first = extended(None, [None, None], [blocks[2], blocks[0]], signal, rows)
+    later = extended(first, [3, None, 0], blocks, signal, rows)
+    beside = appended(
+        normal_equations(columns[inside][:, :4], signal[inside], slices),
+        columns[inside][:, :4],
+        columns[inside][:, 4:],
+        signal[inside],
+        slices,
+    )
+    for found in (later, beside):
+        np.testing.assert_allclose(found.gram, wanted.gram, atol=1e-12)
+        np.testing.assert_allclose(found.moment, wanted.moment, atol=1e-12)
+        np.testing.assert_allclose(found.power, wanted.power, atol=1e-12)
+        np.testing.assert_allclose(found.count, wanted.count)

@@ -13,6 +13,7 @@ class AsymmetricFriction(Effect):
     domain = "velocity"
     meaning = "friction differs between directions: check bearing preload and seal lips"
     needs = ("position",)
+    from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Half the difference of dry (a constant) and of lubricant friction."""

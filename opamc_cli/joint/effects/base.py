@@ -40,6 +40,9 @@ class Effect:
     """True where parameters say which columns `columns` returns."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
+    from_motion: bool = False
+    """True where regressors never look at what was fitted (load, model, static columns): they
+    are computed once and kept from one fit to the next."""
 
     def untestable(self, track: Track) -> str | None:
         """Why the recording cannot show this effect, or None where it can."""
@@ -63,6 +66,10 @@ class Effect:
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Bounds of the non-linear parameters that may be refined."""
         return {}
+
+    def is_constant(self, parameters: Parameters) -> bool:
+        """Tell whether the regressors stay the same whatever the fitted model is."""
+        return self.from_motion
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Regressors, shape (n, m), for given non-linear parameters."""

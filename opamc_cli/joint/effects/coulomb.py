@@ -11,6 +11,7 @@ class Coulomb(Effect):
     domain = "velocity"
     meaning = "dry friction of bearings and seals: check the preload"
     needs = ("position",)
+    from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction of motion."""

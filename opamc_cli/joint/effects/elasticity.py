@@ -18,6 +18,7 @@ class Elasticity(Effect):
     domain = "acceleration"
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
     needs = ("position", "logged")
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz to a quarter of the rate, three dampings."""

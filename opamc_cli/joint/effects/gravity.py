@@ -13,6 +13,7 @@ class Gravity(Effect):
     domain = "joint-angle"
     meaning = "weight of the links; not a fault in itself"
     needs = ("scale",)
+    from_motion = True
     carries_load = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

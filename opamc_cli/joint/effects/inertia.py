@@ -11,6 +11,7 @@ class Inertia(Effect):
     domain = "acceleration"
     meaning = "mass that is accelerated; not a fault in itself"
     needs = ("position",)
+    from_motion = True
     carries_load = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

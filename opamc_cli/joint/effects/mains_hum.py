@@ -17,13 +17,14 @@ class MainsHum(Effect):
     name = "mains_hum"
     domain = "frequency"
     meaning = "mains pick-up in the current reading: check shielding and grounding"
+    from_motion = True
     fast = True
     several = True
     static = False
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest line near each multiple that the rate can show."""
-        frequencies, power = frequency_lines(residual, track.rate_hz)
+        frequencies, power = frequency_lines(track, residual)
         found: list[tuple[float, float]] = []
         for mains in MAINS_HZ:
             for harmonic in range(1, HIGHEST_HARMONIC + 1):

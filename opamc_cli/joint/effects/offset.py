@@ -12,6 +12,7 @@ class Offset(Effect):
     name = "offset"
     domain = "load"
     meaning = "zero error of the current reading, or a constant force: check the sensor's zero"
+    from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Ones."""

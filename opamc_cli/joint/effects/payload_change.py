@@ -13,6 +13,7 @@ class PayloadChange(Effect):
     domain = "load"
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try a step between any two groups."""

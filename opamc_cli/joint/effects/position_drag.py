@@ -13,6 +13,7 @@ class PositionDrag(Effect):
     domain = "joint-angle"
     meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Places over the whole travel, widths from a sixtieth to a fifth of it."""

@@ -13,6 +13,7 @@ class QuadraticFriction(Effect):
     domain = "velocity"
     meaning = "churning losses: too much grease"
     needs = ("position",)
+    from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Signed square of the speed."""

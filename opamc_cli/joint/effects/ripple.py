@@ -32,6 +32,10 @@ class Ripple(Effect):
         """Anything above joint-angle orders."""
         return {"order": (0.0, 1e6)}
 
+    def is_constant(self, parameters: Parameters) -> bool:
+        """Only the sign of the load's current follows the model."""
+        return not parameters["load"]
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Pairs of cosine and sine: constant, with speed, with direction, with load's sign."""
         angle = parameters["order"] * track.machine_angle_rad

@@ -13,6 +13,7 @@ class SensorOffset(Effect):
     domain = "electrical"
     meaning = "zero error of a phase current sensor: recalibrate it"
     needs = ("electrical",)
+    from_motion = True
     fast = True
     electrical_order = 1
 

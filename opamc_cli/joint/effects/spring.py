@@ -13,6 +13,7 @@ class Spring(Effect):
     domain = "joint-angle"
     meaning = "a force grows with the angle: check balancing spring and cable package"
     needs = ("position",)
+    from_motion = True
     carries_load = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

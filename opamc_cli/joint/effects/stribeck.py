@@ -18,6 +18,7 @@ class Stribeck(Effect):
     domain = "velocity"
     meaning = "mixed lubrication at low speed: check the grease film"
     needs = ("position",)
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Stribeck speeds from 1.5 % to 60 % of the top speed, both exponents."""

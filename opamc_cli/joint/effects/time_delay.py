@@ -33,9 +33,10 @@ class TimeDelay(Effect):
 
         The coefficients of the unshifted fit would not do: they have already bent to the delay.
         """
-        columns, rows = track.static_columns, track.open_samples
-        if columns is None or rows is None or columns.shape[1] == 0:
+        rows = track.open_samples
+        if not track.static_columns or rows is None:
             return np.zeros((track.size, 1))
+        columns = np.concatenate(track.static_columns, axis=1)
         shifted = np.empty_like(columns)
         for start, stop in track.bounds:
             times = np.arange(stop - start) / track.rate_hz

@@ -11,6 +11,7 @@ class Viscous(Effect):
     domain = "velocity"
     meaning = "lubricant friction: check grease amount and grade"
     needs = ("position",)
+    from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Speed."""

@@ -13,11 +13,12 @@ class Warmup(Effect):
     domain = "time"
     meaning = "friction falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Time constants from a twentieth to one and a half of the session's length."""
         length = float(np.ptp(track.time_s)) + 1e-9
-        clocks = (0.0, 1.0) if len(track.bounds) > 1 else (0.0,)
+        clocks = (0.0, 1.0) if np.any(track.run_time_s != track.time_s) else (0.0,)
         return [
             {"time_constant_s": constant, "per_recording": clock}
             for clock in clocks
