@@ -319,7 +319,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
     if phases is not None and phase_angle is not None:
         if recording.position_rad is not None or recording.velocity_rad_s is not None:
             known = poles * ratio if poles and ratio else None
-            electrical = phase_angle.aligned_with(motion.position_rad, known)
+            electrical = phase_angle.aligned_with(motion.position_rad, motion.velocity, known)
         else:
             electrical = phase_angle.angle_rad
         current, current_d = torque_current(phases, electrical, motion.velocity)
