@@ -83,7 +83,8 @@ class PhaseAngle:
         if abs(means[best]) < 0.8:
             return self.angle_rad
         path = slope * (position_rad + delays_s[best] * velocity_rad_s)
-        return path + 0.5 * float(np.angle(means[best]))
+        aligned: Floats = path + 0.5 * float(np.angle(means[best]))
+        return aligned
 
 
 def current_vector(phases_a: Floats) -> NDArray[np.complex128]:

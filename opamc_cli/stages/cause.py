@@ -7,15 +7,16 @@ from typing import Any
 
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import OpamcError
-from opamc_cli.joint.change import Change, explain_change
+from opamc_cli.joint.change.explain import Cause, Change, explain_change
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.track import Joint
 from opamc_cli.stages.axis_recording import read_recording
 from opamc_cli.storage.sources import RunSource
 from opamc_cli.storage.tables import read_table
 
-MAX_RUNS = 4
-"""Runs of each side that are looked at, the newest ones: causes do not become clearer with more."""
+MAX_RUNS = 8
+"""Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
+much better from more."""
 
 
 def explain(
@@ -94,8 +95,45 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "p_value": first.p_value,
         "ties": list(first.ties),
         "harmless": change.benign,
+        "evidence": dict(first.evidence),
+        "why": _why(first, change),
         "others": [
             {key: asdict(cause)[key] for key in ("effect", "parameters", "share", "interpretation")}
             for cause in others
         ],
     }
+
+
+def _why(cause: Cause, change: Change) -> list[str]:
+    """Say in a maintainer's words what was measured, how sure it is, and what it cannot tell."""
+    before, after = change.units
+    kind = "sessions" if change.sessions else "cycles"
+    sentences = []
+    seen = cause.evidence
+    if "measured_order" in seen:
+        turn = "turn of the motor" if change.angle == "motor" else f"{change.angle} revolution"
+        sentences.append(
+            f"Torque ripple at {seen['measured_order']:.4g} ± {seen['order_error']:.1g} per {turn} "
+            f"has grown {seen['power_ratio']:.3g}-fold in power over the baseline's {kind}; "
+            f"two orders must differ by {seen['order_resolution']:.2g} to be told apart within a "
+            "stroke."
+        )
+    chance = "below 0.0001" if cause.p_value < 1e-4 else f"{cause.p_value:.2g}"
+    sentences.append(
+        f"{_effect_name(cause)} explains {cause.share:.0%} of what the current changed beyond the "
+        f"{kind}' own differences; healthy {kind} show as much with probability {chance} "
+        f"({before} {kind} against {after})."
+    )
+    if cause.ties:
+        sentences.append(f"The recordings cannot tell it from: {'; '.join(cause.ties)}.")
+    if not change.sessions:
+        sentences.append(
+            "With fewer than three baseline recordings it is assumed, not known, how much healthy "
+            "sessions differ."
+        )
+    return sentences
+
+
+def _effect_name(cause: Cause) -> str:
+    name = cause.effect.replace("_", " ")
+    return name[0].upper() + name[1:]

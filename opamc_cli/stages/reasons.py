@@ -16,6 +16,14 @@ INSPECT = (
     "and circular spline teeth, wave generator bearing, grease; then brake, motor connector and "
     "current sensor."
 )
+FOUND = (
+    "What changed is read as {}. After that look at the rest of the strain wave gear, brake, "
+    "motor connector and current sensor."
+)
+REPEAT = (
+    "Repeat the recording under the baseline's conditions before taking the joint apart: what is "
+    "found is the effect in the current, not the part that is worn."
+)
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
@@ -67,8 +75,10 @@ def reasons(
         _rest(judgement, sources),
         *_siblings(judgement),
     ]
-    if unhealthy and cause is not None and cause.get("harmless"):
-        sentences.append(CHECK_FIRST.format(cause.get("interpretation") or cause.get("effect")))
+    if unhealthy and cause is not None:
+        meaning = cause.get("interpretation") or cause.get("effect")
+        known = [CHECK_FIRST] if cause.get("harmless") else [FOUND, REPEAT]
+        sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
     elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]
     return [*sentences, *_short(cells)]

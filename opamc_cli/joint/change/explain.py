@@ -1,0 +1,240 @@
+"""What changed between two sets of recordings of one joint, as effects of the library."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of
+from opamc_cli.joint.change.lines import fast_residuals, grown_lines, order_spectra
+from opamc_cli.joint.change.reading import Reading, read_lines
+from opamc_cli.joint.change.search import SlowCause, find_slow_causes
+from opamc_cli.joint.change.slow import Population, learn
+from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
+from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
+from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.track import Floats, Joint
+
+DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
+
+BENIGN = frozenset(
+    {"thermal_viscous", "warmup", "payload_change", "sensor_offset", "sensor_gain", "dead_time"}
+)
+"""Causes that are no fault of the gear."""
+
+FEWEST_SESSIONS = 3
+"""Fewer baseline recordings say nothing of how sessions differ: their cycles stand for them."""
+
+SESSIONS_DIFFER = 0.02**2
+LINES_DIFFER = 0.3**2
+"""What is then allowed for: 2 % of the slow current, 0.3 in the logarithm of a line's power."""
+
+SMALLEST_LINE_SHARE = 0.15
+"""A line of unknown meaning that carries less of the fast change is a part of something else."""
+
+SMALLEST_SHARE = 0.03
+"""What explains less of the change is not worth a maintainer's time."""
+
+BENIGN_SHARE = 0.5
+FAULT_SHARE = 0.2
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One effect that the target has and the baseline has not, or has less of.
+
+    Attributes
+    ----------
+    effect, domain : str
+        From the library.
+    parameters : dict
+        Non-linear parameters.
+    evidence : dict
+        What was measured, by name.
+    interpretation : str
+        What it means to a maintainer.
+    share : float
+        Share of the change of the current's mean square beyond the sessions' own differences
+        that it explains, 0 to 1.
+    p_value : float
+        Probability with which healthy units show as much, corrected for what was tried.
+    ties : tuple of str
+        Effects or readings that explain the change as well.
+    benign : bool
+        True where it is no fault of the joint (temperature, payload, sensors).
+    """
+
+    effect: str
+    domain: str
+    parameters: Parameters
+    interpretation: str
+    share: float
+    p_value: float
+    ties: tuple[str, ...]
+    benign: bool
+    evidence: Parameters = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Change:
+    """What `explain_change` found.
+
+    Attributes
+    ----------
+    causes : tuple of Cause
+        Largest share first; empty where nothing lies outside what healthy units show.
+    excess_a : float
+        Root of how much larger the mean square residual is in the target than in the baseline,
+        beyond the sessions' own differences.
+    explained_share : float
+        Share of that excess which all causes explain together.
+    benign : bool
+        True where harmless causes explain at least half of the excess and no fault a fifth.
+    units : tuple of int
+        Baseline and target units that were compared.
+    sessions : bool
+        True where these are recordings, False where they are cycles.
+    angle : str
+        What orders are counted by: a revolution of the "motor", of the "joint", or "electrical".
+    why_not : str or None
+        Why nothing could be said, where nothing could.
+    """
+
+    causes: tuple[Cause, ...]
+    excess_a: float
+    explained_share: float
+    benign: bool
+    units: tuple[int, int] = (0, 0)
+    sessions: bool = False
+    angle: str = "motor"
+    why_not: str | None = None
+
+
+def explain_change(
+    baseline: list[Recording],
+    target: list[Recording],
+    joint: Joint,
+    declared: tuple[str, ...] = DECLARED,
+    library: Library | None = None,
+) -> Change:
+    """Trace what changed between a baseline and a target of one joint.
+
+    Every recording is fitted by itself: its coefficients, and its power by motor order, are one
+    sample. An effect is a cause where the target's samples lie outside what the baseline's differ
+    by. With fewer than three baseline recordings their cycles are the samples, and an allowance
+    is made for what sessions differ by.
+
+    Parameters
+    ----------
+    baseline, target : list of Recording
+        Recordings of one joint at one rate, each with a signed current and its motion, or three
+        phases.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    declared : tuple of str
+        Effects of the joint's model; those that the recordings cannot show are left out.
+    library : Library, optional
+        Effects that may be causes; the built-in ones by default.
+
+    Returns
+    -------
+    Change
+    """
+    library = library or built_in_library()
+    cycles = len(baseline) < FEWEST_SESSIONS
+    before = read_side(baseline, joint, after=False, cycles=cycles)
+    after = read_side(target, joint, after=True, cycles=cycles)
+    if not before or not after:
+        side = "target" if before else "baseline"
+        return Change((), 0.0, 0.0, False, why_not=f"too little motion in the {side}")
+    terms = usable_terms(before + after, [effect_named(library, name) for name in declared])
+    before, after = followed(before, terms), followed(after, terms)
+    if len(before) < 2:
+        why = "the baseline has fewer than two cycles or recordings that can be followed"
+        return Change((), 0.0, 0.0, False, why_not=why)
+    population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
+    units = [unit.with_model(terms, population.mean) for unit in before + after]
+
+    plain, white = fast_residuals(units, terms)
+    spectra = order_spectra(units, white)
+    reading = None
+    if spectra is not None:
+        lines = grown_lines(spectra, LINES_DIFFER if cycles else 0.0)
+        reading = read_lines(lines, units[0].fine, spectra.resolution)
+    slow = find_slow_causes(units, population, library)
+
+    energy = energy_of(units, population, slow_found=bool(slow))
+    causes = _slow_entries(units, population, energy, slow, library)
+    ripple = _ripple_entry(units, plain, energy, reading, library)
+    if ripple is not None:
+        causes.append(ripple)
+    causes = sorted(
+        (cause for cause in causes if cause.share >= SMALLEST_SHARE), key=lambda one: -one.share
+    )
+    harmless = sum(cause.share for cause in causes if cause.benign)
+    harmful = sum(cause.share for cause in causes if not cause.benign)
+    return Change(
+        causes=tuple(causes),
+        excess_a=float(np.sqrt(energy.total)),
+        explained_share=min(harmless + harmful, 1.0),
+        benign=harmless >= BENIGN_SHARE and harmful < FAULT_SHARE,
+        units=(len(before), len(after)),
+        sessions=not cycles,
+        angle=units[0].fine.angle_kind,
+    )
+
+
+def _slow_entries(
+    units: list[Unit],
+    population: Population,
+    energy: Energy,
+    slow: list[SlowCause],
+    library: Library,
+) -> list[Cause]:
+    causes = []
+    left = energy.total
+    for found in slow:
+        rest = energy_of(units, population, True, found.shift).total
+        share = float(np.clip((left - rest) / energy.total, 0.0, 1.0)) if energy.total > 0 else 0.0
+        left = min(left, rest)
+        effect = library[found.effect]
+        causes.append(
+            Cause(
+                effect=found.effect,
+                domain=effect.domain,
+                parameters=found.parameters,
+                interpretation=found.note
+                or effect.interpretation(found.parameters, units[-1].fine),
+                share=share,
+                p_value=found.p_value,
+                ties=found.ties,
+                benign=found.effect in BENIGN,
+            )
+        )
+    return causes
+
+
+def _ripple_entry(
+    units: list[Unit],
+    plain: list[Floats],
+    energy: Energy,
+    reading: Reading | None,
+    library: Library,
+) -> Cause | None:
+    if reading is None or reading.effect not in library:
+        return None
+    held = comb_energy(units, plain, reading.fundamental)
+    whole = max(energy.total, held, 1e-300)
+    if not reading.known and held < SMALLEST_LINE_SHARE * max(energy.fast, held, 1e-300):
+        return None
+    return Cause(
+        effect=reading.effect,
+        domain=library[reading.effect].domain,
+        parameters=reading.parameters,
+        interpretation=reading.interpretation,
+        share=held / whole,
+        p_value=min(line.p_value for line in reading.lines),
+        ties=reading.ties,
+        benign=reading.effect in BENIGN,
+        evidence=reading.evidence,
+    )

@@ -1,0 +1,228 @@
+"""Order spectra of units, stroke by stroke, and the lines that grew."""
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+from opamc_cli.joint.change.moderated import moderated_t
+from opamc_cli.joint.change.units import Unit, own_fit
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.spectra import LOWEST_ORDER, highest_order
+from opamc_cli.joint.track import Bools, Floats, Track
+from opamc_cli.joint.whitening import autoregression, settled, whitened
+
+OVERSAMPLING = 4
+MOST_BINS = 2**19
+BINS_PER_WAVE = 16
+SHORTEST_STROKE = 0.4
+"""Cycles of the lowest order that is looked for: a turn of the motor."""
+
+FEWEST_SAMPLES = 50
+LARGEST_P = 5e-3
+SMALLEST_RATIO = 2.0
+"""A line has to hold twice its power in the baseline, and twice its neighbours' growth."""
+SIDE_LOBES = 4.0
+NEIGHBOURHOOD = 12
+"""Resolutions to either side over which the growth of the neighbours is taken."""
+
+
+@dataclass(frozen=True)
+class OrderSpectra:
+    """Whitened power over order, one row per unit, on one grid.
+
+    Attributes
+    ----------
+    orders : array of shape (k,)
+        Cycles per revolution of the machine angle.
+    before, after : arrays of shape (units, k)
+        Mean power per sample, summed coherently within strokes only: phases alone know no zero
+        of the angle, and the velocity loop turns the phase with the speed.
+    resolution : float
+        Smallest difference of orders that the usual stroke can tell apart.
+    """
+
+    orders: Floats
+    before: Floats
+    after: Floats
+    resolution: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line that grew.
+
+    Attributes
+    ----------
+    order, error : float
+        With its standard error over units.
+    reference : float or None
+        Where the baseline's own line lies, if it has one within two resolutions.
+    growth : float
+        Ratio of the powers.
+    p_value : float
+        Corrected for the number of orders.
+    """
+
+    order: float
+    error: float
+    reference: float | None
+    reference_error: float
+    growth: float
+    p_value: float
+
+
+def fast_residuals(units: list[Unit], terms: tuple[Term, ...]) -> tuple[list[Floats], list[Floats]]:
+    """Residuals of every unit's own fit on the full grid, plain and whitened; zero elsewhere.
+
+    The whitening filter is the baseline's.
+    """
+    plain = []
+    for unit in units:
+        full = np.zeros(unit.fine.size)
+        full[unit.fine_rows] = own_fit(unit, terms, fine=True)[1]
+        plain.append(full)
+    old = [k for k, unit in enumerate(units) if not unit.after]
+    taps = autoregression(
+        np.concatenate([plain[k] for k in old]), np.concatenate([units[k].fine_rows for k in old])
+    )
+    white = []
+    for unit, residual in zip(units, plain, strict=True):
+        ready = settled(unit.fine_rows, unit.fine.bounds, taps.size - 1)
+        white.append(np.where(ready, whitened(residual, taps), 0.0))
+    return plain, white
+
+
+def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
+    """Half-open stretches of motion in one direction long enough to count orders."""
+    side = np.where(rows, track.direction, 0.0)
+    edges = np.flatnonzero(np.diff(side) != 0) + 1
+    edges = np.concatenate([[0], edges, [side.size]])
+    shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
+    found = []
+    for start, stop in pairwise(edges):
+        angle = track.machine_angle_rad[start:stop]
+        long_enough = stop - start >= FEWEST_SAMPLES
+        if side[start] != 0 and long_enough and np.ptp(angle) >= shortest_rad:
+            found.append((int(start), int(stop)))
+    return found
+
+
+def order_spectra(units: list[Unit], white: list[Floats]) -> OrderSpectra | None:
+    """Spectra of all units on one grid of orders; None where no stroke is long enough."""
+    pieces = [
+        (unit, residual, strokes(unit.fine, unit.fine_rows & (residual != 0)))
+        for unit, residual in zip(units, white, strict=True)
+    ]
+    pieces = [piece for piece in pieces if piece[2]]
+    travels = [
+        float(np.ptp(unit.fine.machine_angle_rad[a:b])) for unit, _, cut in pieces for a, b in cut
+    ]
+    tops = [highest_order(unit.fine) for unit, _, _ in pieces]
+    if not pieces or min(tops) <= 0:
+        return None
+    top = min(tops)
+    width = 2 * np.pi / top / BINS_PER_WAVE
+    bins = int(np.ceil(max(travels) / width)) + 1
+    if bins > MOST_BINS:
+        return None
+    length = next_fast_len(OVERSAMPLING * bins, real=True)
+    # long strokes carry the energy: their resolution is what the sum has
+    resolution = 2 * np.pi / float(np.average(travels, weights=travels))
+    kept = int(top * length * width / (2 * np.pi))
+    orders = np.arange(kept) * 2 * np.pi / (length * width)
+    first = int(
+        np.searchsorted(orders, max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution))
+    )
+    rows: dict[bool, list[Floats]] = {False: [], True: []}
+    for unit, residual, cut in pieces:
+        power = np.zeros(kept)
+        samples = 0
+        for start, stop in cut:
+            angle = unit.fine.machine_angle_rad[start:stop]
+            index = ((angle - angle.min()) / width).astype(np.int64)
+            binned = np.bincount(index, weights=residual[start:stop], minlength=bins)
+            power += np.abs(rfft(binned[:bins], length)[:kept]) ** 2
+            samples += stop - start
+        rows[unit.after].append(power[first:] / samples)
+    if len(rows[False]) < 2 or not rows[True]:
+        return None
+    return OrderSpectra(orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution)
+
+
+def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
+    """Lines of the target that lie outside what the baseline's units differ by, largest first.
+
+    Parameters
+    ----------
+    spectra : OrderSpectra
+        Of both sides.
+    between : float
+        Variance of the logarithm of a line's power that is added to what the units show, where
+        these are cycles of one session.
+    most : int
+        Number of lines at most.
+    """
+    orders = spectra.orders
+    if orders.size < 2 * NEIGHBOURHOOD:
+        return []
+    floor = 1e-12 * float(spectra.before.mean())
+    before = np.log(uniform_filter1d(spectra.before, OVERSAMPLING, axis=1) + floor)
+    after = np.log(uniform_filter1d(spectra.after, OVERSAMPLING, axis=1) + floor)
+    _, p_values = moderated_t(before, after, between)
+    trials = max((orders[-1] - orders[0]) / spectra.resolution, 1.0)
+    p_values = np.minimum(p_values * trials, 1.0)
+    growth = after.mean(axis=0) - before.mean(axis=0)
+    spacing = float(orders[1] - orders[0])
+    guard = max(int(1.5 * spectra.resolution / spacing), OVERSAMPLING)
+    excess = np.exp(after.mean(axis=0)) - np.exp(before.mean(axis=0))
+    possible = (p_values < LARGEST_P) & (growth > np.log(SMALLEST_RATIO))
+    found: list[Line] = []
+    while len(found) < most and possible.any():
+        peak = int(np.argmax(np.where(possible, excess, -np.inf)))
+        away = np.abs(orders - orders[peak]) / spectra.resolution
+        # a finite stroke smears a line: its side lobes are no lines of their own
+        lobes = excess[peak] * SIDE_LOBES / (np.pi * np.maximum(away, 1.0)) ** 2
+        possible &= (away > 1.5) & (excess > lobes)
+        reach = int(NEIGHBOURHOOD * spectra.resolution / spacing)
+        around = np.r_[
+            max(peak - reach, 0) : max(peak - guard, 0), peak + guard + 1 : peak + reach + 1
+        ]
+        around = around[around < orders.size]
+        if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
+            continue
+        line = _line(spectra, peak, guard, float(np.exp(growth[peak])), float(p_values[peak]))
+        if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
+            found.append(line)
+    return found
+
+
+def _line(spectra: OrderSpectra, peak: int, guard: int, growth: float, p_value: float) -> Line:
+    near = slice(max(peak - guard, 0), peak + guard + 1)
+    after = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.after])
+    before = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.before])
+    # The baseline has a line here if its units agree where it is.
+    scatter = float(np.std(before, ddof=1)) if before.size > 1 else np.inf
+    has_line = scatter < 0.25 * spectra.resolution
+    error = float(np.std(after, ddof=1)) if after.size > 1 else 0.1 * spectra.resolution
+    error = max(error, 0.05 * spectra.resolution) / np.sqrt(after.size)
+    return Line(
+        order=float(after.mean()),
+        error=error,
+        reference=float(np.median(before)) if has_line else None,
+        reference_error=scatter / np.sqrt(before.size),
+        growth=growth,
+        p_value=p_value,
+    )
+
+
+def _peak(orders: Floats, power: Floats) -> float:
+    best = int(np.argmax(power))
+    shift = 0.0
+    if 0 < best < power.size - 1:
+        left, middle, right = power[best - 1 : best + 2]
+        curvature = left - 2 * middle + right
+        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
+    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))

@@ -1,0 +1,77 @@
+"""Means of two small samples compared, with a variance that borrows from elsewhere."""
+
+import numpy as np
+from scipy.stats import f as fisher
+from scipy.stats import t as student
+
+from opamc_cli.joint.track import Floats
+
+PRIOR_WEIGHT = 4.0
+"""Degrees of freedom that the borrowed variance is worth."""
+
+
+def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Floats, Floats]:
+    """One-sided comparison of many features at once; larger after is positive.
+
+    Parameters
+    ----------
+    before : array of shape (n, k), n at least 2
+        Features of the baseline's units.
+    after : array of shape (m, k)
+        Of the target's.
+    between : float
+        Variance between sessions that units of one session cannot show.
+
+    Returns
+    -------
+    t_values, p_values : arrays of shape (k,)
+        The variance of each feature is drawn towards the median of all features.
+
+    References
+    ----------
+    Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004.
+    """
+    n, m = before.shape[0], after.shape[0]
+    variance = np.var(before, axis=0, ddof=1)
+    weight = n - 1 + PRIOR_WEIGHT
+    variance = ((n - 1) * variance + PRIOR_WEIGHT * np.median(variance)) / weight
+    t_values: Floats = (after.mean(axis=0) - before.mean(axis=0)) / np.sqrt(
+        np.maximum(variance, 1e-300) * (1 / n + 1 / m) + 2 * between
+    )
+    p_values: Floats = student.sf(t_values, weight)
+    return t_values, p_values
+
+
+def moderated_covariance(sample: Floats, prior: Floats) -> Floats:
+    """Covariance of a small sample, drawn towards a prior one.
+
+    Parameters
+    ----------
+    sample : array of shape (n, k)
+        Rows are units; n may be 1.
+    prior : array of shape (k, k)
+        What is expected.
+    """
+    n = sample.shape[0]
+    centred = sample - sample.mean(axis=0)
+    found: Floats = (centred.T @ centred + PRIOR_WEIGHT * prior) / (n - 1 + PRIOR_WEIGHT)
+    return found
+
+
+def shift_p(shift: Floats, covariance: Floats, units: int) -> float:
+    """Probability of a shift of means as large as this, in several directions at once.
+
+    Parameters
+    ----------
+    shift : array of shape (k,)
+        Difference of the means.
+    covariance : array of shape (k, k)
+        Of the shift.
+    units : int
+        Baseline units behind the covariance.
+    """
+    size = shift.size
+    square = float(shift @ np.linalg.pinv(covariance, hermitian=True) @ shift)
+    freedom = max(units - 1 + PRIOR_WEIGHT - size + 1, 1.0)
+    scale = freedom / (units - 1 + PRIOR_WEIGHT)
+    return float(fisher.sf(square * scale / size, size, freedom))

@@ -1,0 +1,207 @@
+"""What lines over the motor angle mean that the target has and the baseline has not."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from opamc_cli.joint.change.lines import Line
+from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.track import Track
+
+HARMONICS = 12
+USUAL_POLE_PAIRS = range(2, 13)
+USUAL_RATIO = 100.0
+SMALLEST_RATIO = 30.0
+"""Gear ratio assumed where none is known, and the smallest of strain wave gears."""
+
+CIRCULAR_BELOW = 0.2
+"""Lines nearer than this to whole orders, on the way to the flexspline's, speak for those."""
+
+SIDE_RESOLUTIONS = 4.0
+"""A damaged mesh has play that the load closes: as the load changes along a stroke, the line of
+its passage is spread over its neighbourhood."""
+
+FLEXSPLINE = "flexspline tooth damage (2(N+1)/N): inspect the flexspline"
+EITHER = (
+    "kinematic error, twice per wave generator turn, that has grown, or flexspline tooth damage "
+    "(2(N+1)/N): inspect wave generator and flexspline"
+)
+KINEMATIC_TIE = "kinematic error of the wave generator (order 2)"
+FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What the lines say.
+
+    Attributes
+    ----------
+    effect : str
+        Name in the library.
+    parameters : dict
+        Order per revolution of the track's machine angle.
+    evidence : dict
+        The order as measured, its error, the smallest difference of orders that a stroke can
+        tell apart, and by which factor the power of the line has grown.
+    interpretation : str
+        To a maintainer.
+    ties : tuple of str
+        Effects or readings that the data cannot tell from it.
+    lines : tuple of Line
+        Those that belong to it.
+    fundamental : float
+        Order whose harmonics are the comb.
+    known : bool
+        Whether the order has a meaning in a strain wave gear.
+    """
+
+    effect: str
+    parameters: Parameters
+    evidence: Parameters
+    interpretation: str
+    ties: tuple[str, ...]
+    lines: tuple[Line, ...]
+    fundamental: float
+    known: bool
+
+
+def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:
+    """Read the lines that grew.
+
+    Parameters
+    ----------
+    lines : list of Line
+        Strongest first.
+    track : Track
+        Gives the kind of angle and the joint's constants.
+    resolution : float
+        Smallest difference of orders that a stroke can tell apart.
+    """
+    if not lines:
+        return None
+    electrical = _other(lines[0], track, resolution)
+    if electrical.effect != "ripple" or "electrical," in electrical.interpretation:
+        return electrical
+    for poles in _turns(track, lines[0]):
+        wave = [line for line in lines if _family(line, poles, track, resolution)]
+        if lines[0] in wave:
+            return _wave_generator(wave, track, resolution, poles)
+    return electrical
+
+
+def _turns(track: Track, line: Line) -> list[float]:
+    """Possible revolutions of the motor per revolution of the track's machine angle, inverted."""
+    if track.angle_kind == "motor":
+        return [1.0]
+    if track.angle_kind == "electrical":
+        # The first line is the strongest: once or twice it is two per turn of the motor.
+        return [float(p) for p in USUAL_POLE_PAIRS if 1.9 < line.order * p < 2.1]
+    return []
+
+
+def _corrected(line: Line, poles: float) -> float:
+    """Order per motor turn; where the baseline's own line is known to lie, relative to that.
+
+    The velocity loop's lag grows with the speed, which moves all lines of a stroke a little.
+    """
+    order = line.order * poles
+    if line.reference is None:
+        return order
+    own = line.reference * poles
+    nearest = max(round(own), 1)
+    return order + nearest - own if abs(own - nearest) < 0.01 * nearest else order
+
+
+def _error(line: Line, poles: float, resolution: float) -> float:
+    """Give an order's standard error; a changing load moves it a quarter of the resolution."""
+    reference = line.reference_error if line.reference is not None else 0.0
+    return poles * math.hypot(line.error, reference, 0.25 * resolution)
+
+
+def _near(line: Line, poles: float, track: Track, slack: float) -> int | None:
+    """Whole number of cycles per turn of the wave generator, in either frame, if there is one."""
+    order = _corrected(line, poles)
+    ratio = track.joint.gear_ratio or SMALLEST_RATIO
+    for k in range(1, HARMONICS + 1):
+        if k - slack < order < k * (1 + 1 / ratio) + slack:
+            return k
+    return None
+
+
+def _family(line: Line, poles: float, track: Track, resolution: float) -> bool:
+    """Whether a line may come from the mesh: near twice per turn, or a sharp multiple of it."""
+    wide = min(SIDE_RESOLUTIONS * resolution * poles, 0.25)
+    sharp = min(0.75 * resolution * poles, 0.25)
+    near = _near(line, poles, track, wide) == 2
+    return near or (_near(line, poles, track, sharp) or 0) >= 2
+
+
+def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:
+    ratio = track.joint.gear_ratio
+    ties: tuple[str, ...]
+    place, doubt = _frame(lines, track, resolution, poles)
+    near = [line for line in lines if abs(_corrected(line, poles) - 2.0) < 0.25] or lines
+    first = near[0]
+    cycles = _near(first, poles, track, 0.25) or 2
+    measured = 2 * _corrected(first, poles) / cycles
+    # What grows between two recordings is rather damage: in doubt the flexspline is named first.
+    if place > CIRCULAR_BELOW or doubt > 1.0:
+        interpretation = FLEXSPLINE
+        ties = () if place - 2 * doubt > 0 else (KINEMATIC_TIE,)
+        order = 2 * (ratio + 1) / ratio if ratio else measured
+    else:
+        interpretation, ties, order = EITHER, (FLEXSPLINE_TIE,), 2.0
+    growth = max(line.growth for line in lines)
+    if track.angle_kind == "electrical":
+        interpretation += f" (order {measured:.4g} per motor turn if it has {poles:.0f} pole pairs)"
+    evidence = {
+        "measured_order": measured / poles,
+        "order_error": _error(first, 1.0, resolution),
+        "order_resolution": resolution,
+        "power_ratio": growth,
+    }
+    named_order = order / poles
+    return Reading(
+        "ripple", {"order": named_order}, evidence, interpretation, ties, tuple(lines),
+        named_order, True,
+    )  # fmt: skip
+
+
+def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> tuple[float, float]:
+    """Where the lines lie between the orders of the circular spline (0) and the flexspline (1).
+
+    Weighted mean over the harmonics, which lie the further apart the higher they are, and its
+    standard error.
+    """
+    ratio = track.joint.gear_ratio or USUAL_RATIO
+    places, weights = [], []
+    for line in lines:
+        k = _near(line, poles, track, min(0.75 * resolution * poles, 0.25))
+        if k is not None:
+            apart = k / ratio
+            places.append((_corrected(line, poles) - k) / apart)
+            weights.append((apart / _error(line, poles, resolution)) ** 2)
+    if not places:
+        return 0.5, math.inf
+    return float(np.average(places, weights=weights)), float(1 / np.sqrt(np.sum(weights)))
+
+
+def _other(line: Line, track: Track, resolution: float) -> Reading:
+    evidence = {
+        "measured_order": line.order,
+        "order_error": _error(line, 1.0, resolution),
+        "order_resolution": resolution,
+        "power_ratio": line.growth,
+    }
+    text = read_order(line.order, track)
+    effect = "ripple"
+    ties: tuple[str, ...] = ()
+    if "electrical," in text and "phases" in track.channels:
+        for multiple, name in (("6p", "dead_time"), ("2p", "sensor_gain"), ("1p", "sensor_offset")):
+            if f"electrical, {multiple} " in text:
+                effect, ties = name, ("ripple",)
+                text += " (the drive's current measurement, not the gear)"
+    known = "unknown" not in text
+    return Reading(effect, {"order": line.order}, evidence, text, ties, (line,), line.order, known)

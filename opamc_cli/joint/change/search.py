@@ -1,0 +1,302 @@
+"""Which slow effects of the library acted in the target alone."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opamc_cli.joint.change.slow import (
+    Population,
+    Prepared,
+    Shift,
+    prepared,
+    shifts,
+    slow_candidates,
+)
+from opamc_cli.joint.change.units import Unit, own_fit
+from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.library import Library
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.track import Floats
+
+NO_CAUSE_OF_CHANGE = frozenset(
+    {"inertia", "gravity", "elasticity", "time_delay", "thermal_viscous", "warmup", "stribeck"}
+)
+"""Alone in the target, inertia and gravity are one thing: a changed payload. The temperature has
+a test of its own; a warm-up and a Stribeck curve are friction whose form a change is too small
+to show."""
+
+PLACE_BOUND = frozenset({"position_drag", "spring", "hysteresis"})
+"""Not sought where the phases alone give the place: it has no zero there."""
+
+EXPECTED = ("payload_change", "offset", "viscous", "coulomb")
+"""What most often changes. Each is tried as one of these four; any other effect as one of all,
+with all its guesses. Of effects that explain a change equally well, the first of these is named."""
+
+FRICTION = frozenset({"viscous", "coulomb", "sublinear_friction", "quadratic_friction"})
+
+LARGEST_P = 0.01
+PLANNED_P = 0.05
+"""Where the logged temperature has left the baseline's range, one effect is expected."""
+
+TIE_RATIO = 30.0
+COLLINEAR = 0.6
+SMALLEST_SHIFT = 0.02
+"""A shift below this share of the slow current's root mean square is of no interest."""
+
+MOST_CAUSES = 3
+STEEPEST_PER_C = 0.08
+"""Viscosity halves over 9 degrees at most."""
+
+SMALLEST_WARMTH_C = 2.0
+LARGEST_COLD_FACTOR = 2.0
+
+
+@dataclass(frozen=True)
+class SlowCause:
+    """A slow effect that changed.
+
+    Attributes
+    ----------
+    effect : str
+        From the library.
+    parameters : dict
+        Non-linear parameters and, for the temperature, how much colder it was.
+    note : str
+        What it means, where the effect itself does not say enough.
+    shift : Shift
+        Jointly with the causes before it.
+    p_value : float
+        Corrected for what was tried.
+    ties : tuple of str
+        Effects whose contribution is nearly the same.
+    """
+
+    effect: str
+    parameters: Parameters
+    note: str
+    shift: Shift
+    p_value: float
+    ties: tuple[str, ...]
+
+
+def find_slow_causes(
+    units: list[Unit], population: Population, library: Library
+) -> list[SlowCause]:
+    """Add effects one by one while the target lies outside what the baseline's units show."""
+    logged = "logged" in units[0].fine.channels
+    effects = [
+        effect
+        for name, effect in library.items()
+        if not effect.fast
+        and name not in NO_CAUSE_OF_CHANGE
+        and name != "payload_change"
+        and (logged or name not in PLACE_BOUND)
+    ]
+    candidates = slow_candidates(units, effects)
+    payload = library.get("payload_change")
+    if payload is not None:
+        # Without a scale of the joint angle a payload is inertia.
+        shown = None if "scale" in units[0].fine.channels else (2,)
+        candidates.append(Term(payload, {"since_s": -1.0}, shown))
+    ready = prepared(units, population)
+    found: list[SlowCause] = []
+    gone: set[str] = set()
+    for _ in range(MOST_CAUSES):
+        chosen = tuple(cause.shift.terms[-1] for cause in found)
+        cause = _next(ready, population, chosen, candidates, library)
+        if cause is None:
+            break
+        found = [*_still_needed(ready, population, found, cause), cause]
+        gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
+        candidates = [term for term in candidates if term.effect.name not in gone]
+    return _in_turn(ready, population, found)
+
+
+def _still_needed(
+    ready: list[Prepared], population: Population, found: list[SlowCause], latest: SlowCause
+) -> list[SlowCause]:
+    """Drop causes that the latest one has made superfluous."""
+    kept = list(found)
+    for cause in found:
+        others = [other for other in kept if other is not cause]
+        beside = tuple(other.shift.terms[-1] for other in (*others, latest))
+        again = shifts(ready, population, beside, [cause.shift.terms[-1]])
+        if not again or again[0].p_value * len(EXPECTED) > LARGEST_P:
+            kept = others
+    return kept
+
+
+def _in_turn(
+    ready: list[Prepared], population: Population, found: list[SlowCause]
+) -> list[SlowCause]:
+    """Fit each cause jointly with those before it, as they stand in the end."""
+    settled = []
+    terms: tuple[Term, ...] = ()
+    for cause in found:
+        last = cause.shift.terms[-1]
+        again = shifts(ready, population, terms, [last])
+        terms = (*terms, last)
+        settled.append(replace(cause, shift=again[0]) if again else cause)
+    return settled
+
+
+def _next(
+    ready: list[Prepared],
+    population: Population,
+    chosen: tuple[Term, ...],
+    candidates: list[Term],
+    library: Library,
+) -> SlowCause | None:
+    guesses: dict[str, int] = {}
+    for term in candidates:
+        guesses[term.effect.name] = guesses.get(term.effect.name, 0) + 1
+    best: dict[str, tuple[float, Shift]] = {}
+    for shift in shifts(ready, population, chosen, candidates):
+        name = shift.terms[-1].effect.name
+        tried = len(EXPECTED) if name in EXPECTED else guesses[name] * len(guesses)
+        p_value = min(shift.p_value * tried, 1.0)
+        if name not in best and _size(ready, shift) >= SMALLEST_SHIFT * population.power**0.5:
+            best[name] = (p_value, shift)
+    if not best:
+        return None
+    expected = None if chosen else _expected(ready, population, best)
+    if expected is not None:
+        return expected
+    name = min(best, key=lambda key: best[key][0])
+    p_value, shift = best[name]
+    if p_value > LARGEST_P:
+        return None
+    own = _contribution(ready, shift)
+    alike = [
+        other
+        for other, (value, rival) in best.items()
+        if value <= TIE_RATIO * max(p_value, 1e-12)
+        and _correlation(own, _contribution(ready, rival)) > COLLINEAR
+    ]
+    first = next((other for other in EXPECTED if other in alike), name)
+    ties = tuple(other for other in alike if other != first)
+    p_value, shift = best[first]
+    cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
+    if first == "payload_change":
+        return _payload(cause)
+    if {first, *ties} & FRICTION:
+        return _friction(ready, population, cause, library)
+    return cause
+
+
+def _payload(cause: SlowCause) -> SlowCause:
+    return SlowCause(
+        cause.effect, {}, "the payload has changed: check the tool, not the gear", cause.shift,
+        cause.p_value, cause.ties,
+    )  # fmt: skip
+
+
+def _expected(
+    ready: list[Prepared], population: Population, best: dict[str, tuple[float, Shift]]
+) -> SlowCause | None:
+    """Grease of another temperature, where the logged one has left the baseline's range."""
+    warmer = _warmer(ready)
+    if warmer is None or "viscous" not in best:
+        return None
+    _, shift = best["viscous"]
+    if shift.p_value > PLANNED_P or not _plausible(ready, population, shift, warmer):
+        return None
+    others = [p for name, (p, _) in best.items() if name not in FRICTION]
+    if min(others, default=1.0) < min(shift.p_value, LARGEST_P):
+        return None
+    return _thermal(shift, shift.p_value, ("viscous",), warmer)
+
+
+def _friction(
+    ready: list[Prepared], population: Population, cause: SlowCause, library: Library
+) -> SlowCause:
+    """Where grease of another temperature explains a change of friction, it is no fault."""
+    if "thermal_viscous" not in library:
+        return cause
+    ties = (cause.effect, *cause.ties)
+    warmer = _warmer(ready)
+    if warmer is not None:
+        if _plausible(ready, population, cause.shift, warmer):
+            return _thermal(cause.shift, cause.p_value, ties, warmer)
+        return cause
+    if ready[0].unit.fine.temperature_c is not None:
+        return cause  # as warm as ever
+    dry, wet = _relative(ready, population)
+    if abs(wet) > 2 * abs(dry) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
+        return _thermal(cause.shift, cause.p_value, ties, None)
+    return cause
+
+
+def _thermal(
+    shift: Shift, p_value: float, ties: tuple[str, ...], warmer: float | None
+) -> SlowCause:
+    if warmer is None:
+        note = (
+            "friction that grows with the speed has changed, as it does in colder or warmer "
+            "grease; no temperature was logged: compare at equal temperature, and look at the "
+            "grease if it remains"
+        )
+        return SlowCause("thermal_viscous", {}, note, shift, p_value, ties)
+    word = "warmer" if warmer > 0 else "colder"
+    note = (
+        f"the joint was {abs(warmer):.0f} °C {word}, and grease is stiffer when cold: not a fault"
+    )
+    parameters = {"warmer_c": warmer}
+    return SlowCause("thermal_viscous", parameters, note, shift, p_value, ties)
+
+
+def _warmer(ready: list[Prepared]) -> float | None:
+    """How much warmer the target was, where that lies outside the baseline's own range."""
+    means: dict[bool, list[float]] = {False: [], True: []}
+    for one in ready:
+        degrees = one.unit.fine.temperature_c
+        if degrees is None:
+            return None
+        means[one.unit.after].append(float(np.mean(degrees[one.unit.fine_rows])))
+    difference = float(np.mean(means[True]) - np.mean(means[False]))
+    usual = max(2 * float(np.std(means[False], ddof=1)), SMALLEST_WARMTH_C)
+    return difference if abs(difference) > usual else None
+
+
+def _plausible(ready: list[Prepared], population: Population, shift: Shift, warmer: float) -> bool:
+    """Stiffer when colder, and by no more than grease is."""
+    _, wet = _relative(ready, population)
+    return wet * warmer < 0 and abs(np.log(max(1 + wet, 1e-3))) < STEEPEST_PER_C * abs(warmer)
+
+
+def _relative(ready: list[Prepared], population: Population) -> tuple[float, float]:
+    """Relative changes of dry and of viscous friction."""
+    places = {}
+    first = 0
+    for term in population.terms:
+        places[term.effect.name] = first
+        first += term.columns(ready[0].unit.coarse).shape[1]
+    mean = np.mean(
+        [own_fit(one.unit, population.terms)[0] for one in ready if one.unit.after], axis=0
+    )
+    changes = []
+    for name in ("coulomb", "viscous"):
+        at = places.get(name)
+        before = 0.0 if at is None else float(population.mean[at])
+        changes.append(0.0 if at is None or before == 0 else float(mean[at]) / before - 1)
+    return changes[0], changes[1]
+
+
+def _contribution(ready: list[Prepared], shift: Shift) -> Floats:
+    """Compute the last term's current in the target's units, one after the other."""
+    last = shift.terms[-1]
+    parts = []
+    for one in ready:
+        if one.unit.after:
+            columns = one.unit.columns(last)
+            parts.append(columns @ shift.coefficients[-columns.shape[1] :])
+    return np.concatenate(parts)
+
+
+def _size(ready: list[Prepared], shift: Shift) -> float:
+    return float(np.sqrt(np.mean(_contribution(ready, shift) ** 2)))
+
+
+def _correlation(one: Floats, other: Floats) -> float:
+    product = float(np.sqrt(np.dot(one, one) * np.dot(other, other)))
+    return float(np.dot(one, other)) / product if product > 0 else 0.0

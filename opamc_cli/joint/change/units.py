@@ -1,0 +1,179 @@
+"""What is compared as a whole: a recording session, or a cycle where there are too few of those."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.normal import solve
+from opamc_cli.joint.recordings import grouped_track, is_moving
+from opamc_cli.joint.track import Bools, Floats, Joint, Track, averaged, block_mean, coarsen
+
+COARSE_RATE_HZ = 100.0
+FEWEST_SAMPLES = 10
+
+LOST = 2.5
+"""Phases whose torque axis was followed wrongly leave this many times the usual residual."""
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One recording, or one cycle of it.
+
+    Attributes
+    ----------
+    fine, coarse : Track
+        The recording at its own rate, and averaged to about 100 Hz.
+    factor : int
+        Samples per coarse one.
+    fine_rows, coarse_rows : bool arrays
+        Samples of the unit that count.
+    after : bool
+        True in the target.
+    """
+
+    fine: Track
+    coarse: Track
+    factor: int
+    fine_rows: Bools
+    coarse_rows: Bools
+    after: bool
+
+    def columns(self, term: Term, fine: bool = False) -> Floats:
+        """Regressors of a term on the unit's own samples; fast ones are averaged, not resampled."""
+        if fine:
+            return term.columns(self.fine)[self.fine_rows]
+        if not term.effect.fast:
+            return term.columns(self.coarse)[self.coarse_rows]
+        smooth = averaged(term.columns(self.fine), self.fine.bounds, self.fine.kernel)
+        return block_mean(smooth, self.fine.bounds, self.factor)[self.coarse_rows]
+
+    def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
+        """Regressors of several terms side by side."""
+        return np.concatenate([self.columns(term, fine) for term in terms], axis=1)
+
+    def current_a(self, fine: bool = False) -> Floats:
+        """Torque current on the unit's own samples."""
+        if fine:
+            return self.fine.current_a[self.fine_rows]
+        return self.coarse.current_a[self.coarse_rows]
+
+    def with_model(self, terms: tuple[Term, ...], coefficients: Floats) -> "Unit":
+        """Put the fitted load and the whole fitted current on both tracks."""
+        tracks = []
+        for track in (self.fine, self.coarse):
+            load, model = np.zeros(track.size), np.zeros(track.size)
+            first = 0
+            static = []
+            for term in terms:
+                columns = term.columns(track)
+                part = columns @ coefficients[first : first + columns.shape[1]]
+                first += columns.shape[1]
+                model += part
+                static.append(columns)
+                if term.effect.carries_load:
+                    load += part
+            tracks.append(track.with_model(load, model, np.concatenate(static, axis=1)))
+        return replace(self, fine=tracks[0], coarse=tracks[1])
+
+
+def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bool) -> list[Unit]:
+    """Turn the recordings of one side into units.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        Of one joint.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    after : bool
+        True for the target.
+    cycles : bool
+        Whether cycles (or blocks) are the units, and not recordings.
+
+    Returns
+    -------
+    list of Unit
+        Recordings in which the joint hardly moves are left out.
+    """
+    units = []
+    for recording in recordings:
+        track, grouping = grouped_track([replace(recording, started_s=None)], joint)
+        if grouping is None or not is_moving(track):
+            continue
+        if "logged" not in track.channels:
+            # Phases give no zero of the joint angle; the same program has the same middle.
+            at = track.position_rad[track.moving]
+            middle = 0.5 * float(np.min(at) + np.max(at))
+            track = replace(track, position_rad=track.position_rad - middle)
+        fine = replace(track, group=grouping.group)
+        width = 1.0 / float(np.sum(fine.kernel**2))
+        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), fine.quiet, 1)
+        coarse = coarsen(fine, factor)
+        members = _cycles(fine, grouping.names) if cycles else [fine.group >= 0]
+        for member in members:
+            rows = fine.moving & member
+            slow = block_mean(rows.astype(float), fine.bounds, factor) > 1 - 1e-9
+            if np.count_nonzero(slow & coarse.moving) >= FEWEST_SAMPLES:
+                units.append(Unit(fine, coarse, factor, rows, slow & coarse.moving, after))
+    return units
+
+
+def _cycles(track: Track, names: tuple[str, ...]) -> list[Bools]:
+    """Tell whole cycles apart: halves, if they were halved, do not hold the same motion."""
+    wholes: dict[str, list[int]] = {}
+    for group, name in enumerate(names):
+        run, _, piece = name.rpartition(":")
+        wholes.setdefault(f"{run}:{piece.partition('.')[0]}", []).append(group)
+    return [np.isin(track.group, groups) for groups in wholes.values()]
+
+
+def usable_terms(units: list[Unit], effects: list[Effect]) -> tuple[Term, ...]:
+    """Terms of the effects that every unit can show."""
+    return tuple(
+        Term(effect, {})
+        for effect in effects
+        if all(effect.untestable(unit.fine) is None for unit in units)
+    )
+
+
+def own_fit(
+    unit: Unit, terms: tuple[Term, ...], fine: bool = False, current: Floats | None = None
+) -> tuple[Floats, Floats]:
+    """Least squares of the terms on one unit alone.
+
+    Parameters
+    ----------
+    unit : Unit
+        Whose samples are fitted.
+    terms : tuple of Term
+        The joint's model.
+    fine : bool
+        On the recording's own grid.
+    current : array, optional
+        Another current on the unit's samples.
+
+    Returns
+    -------
+    coefficients, residual : arrays
+    """
+    columns = unit.stacked(terms, fine)
+    values = unit.current_a(fine) if current is None else current
+    blur = unit.fine.blur
+    if fine and blur is not None:
+        # What smoothing took from the acceleration is no effect.
+        columns = np.concatenate([columns, blur[unit.fine_rows]], axis=1)
+    coefficients = solve(columns.T @ columns, columns.T @ values)
+    residual: Floats = values - columns @ coefficients
+    return coefficients, residual
+
+
+def followed(units: list[Unit], terms: tuple[Term, ...]) -> list[Unit]:
+    """Units whose torque axis was followed; where motion was logged, all of them."""
+    if not units or "logged" in units[0].fine.channels:
+        return units
+    left = np.array([np.sqrt(np.mean(own_fit(unit, terms)[1] ** 2)) for unit in units])
+    usual = float(np.quantile(left, 0.25))
+    return [unit for unit, rms in zip(units, left, strict=True) if rms <= LOST * usual]
