@@ -75,7 +75,7 @@ class Unit:
                 static.append(columns)
                 if term.effect.carries_load:
                     load += part
-            tracks.append(track.with_model(load, model, np.concatenate(static, axis=1)))
+            tracks.append(track.with_model(load, model, tuple(static)))
         return replace(self, fine=tracks[0], coarse=tracks[1])
 
 
