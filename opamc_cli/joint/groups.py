@@ -62,13 +62,8 @@ def cycle_length(path: Floats, rate_hz: float) -> int | None:
     variance = float(np.var(coarse))
     if n < 16 or variance <= 0:
         return None
-    centred = coarse - coarse.mean()
-    products = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
-    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     lags = np.arange(1, int(n * 0.7))
-    overlap = n - lags
-    mismatch = (squares[n - lags] + squares[n] - squares[lags] - 2 * products[lags]) / overlap
-    mismatch = mismatch / (2 * variance)
+    mismatch = _mismatch(coarse)[lags] / (2 * variance)
     # Everything looks alike at short lags: first leave that neighbourhood.
     away = np.flatnonzero(mismatch > 0.5)
     if not away.size:
@@ -76,19 +71,29 @@ def cycle_length(path: Floats, rate_hz: float) -> int | None:
     inner = mismatch[1:-1]
     dips = np.flatnonzero((inner <= mismatch[:-2]) & (inner <= mismatch[2:])) + 1
     dips = dips[(dips > away[0]) & (mismatch[dips] < COARSE_REPEAT_ERROR)]
+    if not dips.size:
+        return None
+    mismatch = _mismatch(path)
+    limit = REPEAT_ERROR * 2 * float(np.var(path))
     for dip in dips[:MOST_DIPS]:
-        lag, error = _exact_lag(path, int(lags[dip]) * factor, factor)
-        if error < REPEAT_ERROR * 2 * float(np.var(path)):
+        near = int(lags[dip]) * factor
+        first = max(near - factor, 1)
+        lag = first + int(np.argmin(mismatch[first : near + factor + 1]))
+        if mismatch[lag] < limit:
             return lag
     return None
 
 
-def _exact_lag(path: Floats, near: int, reach: int) -> tuple[int, float]:
-    """Best lag at the full rate, and its mean square difference."""
-    lags = [lag for lag in range(near - reach, near + reach + 1) if 0 < lag < path.size]
-    errors = [float(np.mean((path[lag:] - path[:-lag]) ** 2)) for lag in lags]
-    best = int(np.argmin(errors))
-    return lags[best], errors[best]
+def _mismatch(path: Floats) -> Floats:
+    """Mean square of ``path[t + lag] - path[t]`` for every lag below n, by one correlation."""
+    n = path.size
+    centred = path - path.mean()
+    products = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    lags = np.arange(n)
+    overlap = n - lags
+    mismatch: Floats = (squares[overlap] + squares[n] - squares[lags] - 2 * products) / overlap
+    return mismatch
 
 
 def group_samples(

@@ -29,7 +29,11 @@ class Kept:
         self._columns = {key: kept for key, kept in self._columns.items() if key[0] in self._terms}
 
     def columns(
-        self, term: object, fine: bool, follows: Track | None, compute: Callable[[], Floats]
+        self,
+        term: object,
+        fine: bool,
+        follows: Track | None,
+        compute: Callable[[Floats | None], Floats],
     ) -> Floats:
         """Regressors of a term, computed where they are not at hand.
 
@@ -42,13 +46,13 @@ class Kept:
         follows : Track or None
             The track whose fitted model the regressors follow, None where they follow none.
         compute : callable
-            Makes them.
+            Makes them, from those that followed another model if there are any.
         """
         key = (id(term), fine)
         found = self._columns.get(key) if key[0] in self._terms else None
         if found is not None and found[0] is follows:
             return found[1]
-        columns = compute()
+        columns = compute(None if found is None else found[1])
         if key[0] in self._terms:
             self._columns[key] = (follows, columns)
         return columns

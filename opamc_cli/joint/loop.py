@@ -273,7 +273,7 @@ def _candidates(
         if why is not None:
             untestable.append(Untestable(name, why))
             continue
-        candidate, _tried = search(session, views[effect.fast], effect)
+        candidate, _tried = search(session, views[effect.fast], effect, thorough=False)
         trials += 1
         if candidate is not None:
             found.append(candidate)

@@ -32,6 +32,12 @@ class Term:
         columns = self.effect.columns(track, self.parameters)
         return columns if self.keep is None else columns[:, self.keep]
 
+    def updated(self, columns: Floats, track: Track) -> Floats:
+        """Regressors after the fitted model has changed, from those before."""
+        if self.keep is not None:
+            return self.columns(track)
+        return self.effect.updated(columns, track, self.parameters)
+
 
 @dataclass(frozen=True)
 class Grid:
@@ -90,14 +96,14 @@ class Session:
         """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
         fine = fine or self.coarse is self.fine
         follows = None if term.effect.is_constant(term.parameters) else self.fine.track
-        return self.kept.columns(term, fine, follows, lambda: self._columns(term, fine))
+        return self.kept.columns(term, fine, follows, lambda old: self._columns(term, fine, old))
 
-    def _columns(self, term: Term, fine: bool) -> Floats:
+    def _columns(self, term: Term, fine: bool, old: Floats | None) -> Floats:
         track = self.fine.track
         if fine:
-            return term.columns(track)
+            return term.columns(track) if old is None else term.updated(old, track)
         if term.effect.fast:
-            smooth = averaged(term.columns(track), track.bounds, track.kernel)
+            smooth = averaged(self.columns(term, fine=True), track.bounds, track.kernel)
             return block_mean(smooth, track.bounds, self.factor)
         return term.columns(self.coarse.track)
 

@@ -1,6 +1,6 @@
 """Trace a residual to its cause: candidates refitted with the model, gated, and compared."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,6 +23,13 @@ from opamc_cli.joint.whitening import autoregression, settled, whitened
 
 SCORE_PER_PARAMETER = 6.0
 """What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
+
+HOPELESS = -10.0
+"""Score of a best guess below which no refinement has been seen to reach the gate; the largest
+rise over 600 searches was from -8 to 9, and the gate begins near 10."""
+
+BATCH_VALUES = 1_000_000
+"""Values that are multiplied with the model's span at once: more would leave the cache."""
 
 BLOCKS_PER_GROUP = 8
 DECOY_BLOCKS_PER_GROUP = 2
@@ -249,44 +256,108 @@ def _orthonormal(columns: Floats) -> Floats:
     return span
 
 
-def _evaluate(session: Session, view: View, effect: Effect, parameters: Parameters) -> list[Scored]:
-    """Score of an effect's full form and of its smaller forms, with given parameters."""
-    raw = session.columns(Term(effect, parameters), view.fine)
-    if not np.all(np.isfinite(raw)):
-        return []
-    columns = view.whitened_rows(raw)
+@dataclass(frozen=True)
+class Products:
+    """Whitened regressors of one guess, and what scoring needs of them.
+
+    Attributes
+    ----------
+    columns : array of shape (m, k)
+        On the view's valid samples.
+    inside : array of shape (s, k)
+        Products with the model's span.
+    whole, gram : arrays of shape (k,) and (k, k)
+        Their sums of squares; their products without what the span explains.
+    """
+
+    columns: Floats
+    inside: Floats
+    whole: Floats
+    gram: Floats
+
+
+Shared = dict[frozenset[tuple[str, float]], Products]
+
+
+def _products(
+    session: Session, view: View, effect: Effect, guesses: Sequence[Parameters]
+) -> Iterator[tuple[Parameters, Products]]:
+    """Regressors of guesses; those that are not finite are left out.
+
+    Many guesses are multiplied with the span at once: it is read from memory once for all.
+    """
+    batch: list[tuple[Parameters, Floats]] = []
+    width = 0
+    for guess in guesses:
+        raw = session.columns(Term(effect, guess), view.fine)
+        if np.all(np.isfinite(raw)):
+            batch.append((guess, view.whitened_rows(raw)))
+            width += raw.shape[1]
+        if width * view.rows.size > BATCH_VALUES:
+            yield from _multiplied(view, batch)
+            batch, width = [], 0
+    if batch:
+        yield from _multiplied(view, batch)
+
+
+def _multiplied(
+    view: View, batch: list[tuple[Parameters, Floats]]
+) -> Iterator[tuple[Parameters, Products]]:
     # What the span explains is taken out of the products: the columns themselves stay as they are.
-    inside = view.span.T @ columns
-    whole = columns.T @ columns
-    gram = whole - inside.T @ inside
-    moment = columns.T @ view.values
+    shadow = view.span.T @ np.concatenate([columns for _, columns in batch], axis=1)
+    start = 0
+    for guess, columns in batch:
+        inside = shadow[:, start : start + columns.shape[1]]
+        start += columns.shape[1]
+        whole = columns.T @ columns
+        yield guess, Products(columns, inside, np.diagonal(whole), whole - inside.T @ inside)
+
+
+def _scored(
+    view: View, effect: Effect, parameters: Parameters, known: Products
+) -> Iterator[Scored]:
+    """Score an effect's full form and its smaller forms, with given parameters."""
+    width = known.columns.shape[1]
+    moment = known.columns.T @ view.values
     forms: list[tuple[Parameters, tuple[int, ...]]] = [
-        (parameters, tuple(range(raw.shape[1]))),
+        (parameters, tuple(range(width))),
         *effect.variants(parameters),
     ]
     limits = len(effect.limits(view.grid.track))
-    results = []
     for form, keep in forms:
         # A column that the model already spans leaves only rounding.
-        new = [k for k in keep if gram[k, k] > 1e-6 * whole[k, k]]
+        new = [k for k in keep if known.gram[k, k] > 1e-6 * known.whole[k]]
         if not new:
             continue
-        part = gram[np.ix_(new, new)]
-        solution = solve(part, moment[new])
+        solution = solve(known.gram[np.ix_(new, new)], moment[new])
         fall = float(solution @ moment[new])
         left = max(view.power - fall, 1e-12 * view.power)
         likelihood = view.values.size * np.log(view.power / left)
         coefficients = np.zeros(len(keep))
         coefficients[[keep.index(k) for k in new]] = solution
         plausible = effect.plausible(coefficients, form)
-        full = len(keep) == raw.shape[1]
+        full = len(keep) == width
         term = Term(effect, form, None if full or effect.flags_choose_columns else keep)
         score = likelihood - SCORE_PER_PARAMETER * (len(new) + limits) if plausible else -np.inf
-        results.append(Scored(float(score), term, coefficients, columns, inside, new, solution))
-    return results
+        yield Scored(float(score), term, coefficients, known.columns, known.inside, new, solution)
 
 
-def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | None, int]:
+def _evaluate(
+    session: Session, view: View, effect: Effect, parameters: Parameters
+) -> Iterator[Scored]:
+    """Score an effect with given parameters."""
+    for _, known in _products(session, view, effect, [parameters]):
+        yield from _scored(view, effect, parameters, known)
+
+
+def search(
+    session: Session,
+    view: View,
+    effect: Effect,
+    *,
+    thorough: bool = True,
+    shared: Shared | None = None,
+) -> tuple[Candidate | None, int]:
     """Best form of an effect on a view, over its non-linear parameters.
 
     Parameters
@@ -297,6 +368,11 @@ def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | No
         Whitened residual.
     effect : Effect
         What to try.
+    thorough : bool
+        False where a best guess that begins as good as nothing need not be refined.
+    shared : dict, optional
+        Takes the guesses' regressors, and gives them to the next search of the same effect on
+        the same samples.
 
     Returns
     -------
@@ -307,14 +383,23 @@ def search(session: Session, view: View, effect: Effect) -> tuple[Candidate | No
     """
     guesses = effect.guesses(view.grid.track, view.residual)
     best: Scored | None = None
-    for guess in guesses:
-        for result in _evaluate(session, view, effect, guess):
+    if shared is None:
+        found = _products(session, view, effect, guesses)
+    else:
+        new = [guess for guess in guesses if frozenset(guess.items()) not in shared]
+        for guess, products in _products(session, view, effect, new):
+            shared[frozenset(guess.items())] = products
+        keys = [(guess, frozenset(guess.items())) for guess in guesses]
+        found = ((guess, shared[key]) for guess, key in keys if key in shared)
+    for guess, products in found:
+        for result in _scored(view, effect, guess, products):
             if best is None or result.score > best.score:
                 best = result
     if best is None or not np.isfinite(best.score):
         return None, len(guesses)
     limits = effect.limits(view.grid.track)
-    if limits and not effect.flags_choose_columns:
+    hopeless = effect.dense_guesses and best.score < HOPELESS and not thorough
+    if limits and not effect.flags_choose_columns and not hopeless:
         best = _refined(session, view, effect, best, limits, len(guesses))
     settled_parameters = effect.settled(best.term.parameters, view.grid.track)
     if settled_parameters != best.term.parameters:
@@ -574,6 +659,8 @@ def decoy_likelihood(
     rest = view.values - candidate.contribution
     fast = candidate.term.effect.fast
     blocks = _blocks_of(view, BLOCKS_PER_GROUP if fast else DECOY_BLOCKS_PER_GROUP)
+    # Fast effects guess from the residual, all others the same every time.
+    shared: Shared | None = None if fast else {}
     for _ in range(count):
         values = rest.copy()
         for block in blocks:
@@ -582,7 +669,7 @@ def decoy_likelihood(
         shuffled = np.zeros_like(view.residual)
         shuffled[view.valid] = values
         decoy = replace(view, residual=shuffled)
-        found, _tried = search(fit.session, decoy, candidate.term.effect)
+        found, _tried = search(fit.session, decoy, candidate.term.effect, shared=shared)
         if found is not None:
             worst = max(worst, found.likelihood)
     return worst

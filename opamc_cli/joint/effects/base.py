@@ -40,6 +40,9 @@ class Effect:
     """True where parameters say which columns `columns` returns."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
+    dense_guesses: bool = False
+    """True where no guess explains anything only if nothing near it does: a step in time, say,
+    hides between two guesses. A search does not refine what begins as nothing."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
@@ -74,6 +77,10 @@ class Effect:
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Regressors, shape (n, m), for given non-linear parameters."""
         raise NotImplementedError
+
+    def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
+        """Regressors after the fitted model has changed, from those before; `columns` in short."""
+        return self.columns(track, parameters)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

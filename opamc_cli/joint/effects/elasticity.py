@@ -18,6 +18,7 @@ class Elasticity(Effect):
     domain = "acceleration"
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
     needs = ("position", "logged")
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -18,6 +18,7 @@ class Hysteresis(Effect):
     domain = "joint-angle"
     meaning = "torque lags behind after reversals: check gear preload and backlash"
     needs = ("position",)
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -17,6 +17,7 @@ class MainsHum(Effect):
     name = "mains_hum"
     domain = "frequency"
     meaning = "mains pick-up in the current reading: check shielding and grounding"
+    dense_guesses = True
     from_motion = True
     fast = True
     several = True

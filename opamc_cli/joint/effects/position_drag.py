@@ -13,6 +13,7 @@ class PositionDrag(Effect):
     domain = "joint-angle"
     meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -51,6 +51,13 @@ class Ripple(Effect):
             pairs += [side * cosine, side * sine]
         return stack(*pairs)
 
+    def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
+        """Only the last pair follows the model, and it is the first one times a sign."""
+        if not parameters["load"]:
+            return columns
+        side = np.sign(track.model_a)[:, None]
+        return np.concatenate([columns[:, :-2], side * columns[:, :2]], axis=1)
+
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Without the dependences that the data do not ask for."""
         kept = [form for form in FORMS if parameters[form]]

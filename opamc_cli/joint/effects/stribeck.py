@@ -18,6 +18,7 @@ class Stribeck(Effect):
     domain = "velocity"
     meaning = "mixed lubrication at low speed: check the grease film"
     needs = ("position",)
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -13,6 +13,7 @@ class SublinearFriction(Effect):
     domain = "velocity"
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     needs = ("position",)
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

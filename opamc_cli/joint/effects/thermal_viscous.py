@@ -15,6 +15,7 @@ class ThermalViscous(Effect):
     domain = "temperature"
     meaning = "grease is stiffer when cold: not a fault"
     needs = ("position", "temperature")
+    dense_guesses = True
     from_motion = True
 
     def untestable(self, track: Track) -> str | None:

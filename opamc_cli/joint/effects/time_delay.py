@@ -15,6 +15,7 @@ class TimeDelay(Effect):
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False
+    dense_guesses = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Up to 60 ms either way."""

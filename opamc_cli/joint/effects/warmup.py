@@ -13,6 +13,7 @@ class Warmup(Effect):
     domain = "time"
     meaning = "friction falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
+    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
