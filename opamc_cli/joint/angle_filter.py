@@ -2,42 +2,103 @@
 
 import numpy as np
 from numba import njit
+from scipy.special import beta
 
 from opamc_cli.joint.track import Bools, Floats
 
-BANDWIDTH_HZ = 30.0
+WIDEST_HZ = 30.0
+NARROWEST_HZ = 8.0
+NOISE_SHARE = 0.02
+"""Noise of the acceleration, relative to the acceleration, that sets the bandwidth."""
+
 ANGLE_NOISE_RAD = 0.3
 ROUGH_NOISE_RAD = 1.0
 """Error of the rough speed, as an angle over its own window of 15 samples."""
 
 
-def smoothing_kernel(rate_hz: float) -> Floats:
+def widest_bandwidth(rate_hz: float) -> float:
+    """Bandwidth above which errors of sensors and inverter, at the carrier, would be followed."""
+    return min(WIDEST_HZ, rate_hz / 20)
+
+
+def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: float) -> float:
+    """Tell the standard deviation of the acceleration that white noise of the angle leaves.
+
+    Parameters
+    ----------
+    angle_noise_rad : float
+        Standard deviation per sample.
+    rate_hz, bandwidth_hz : float
+        Sampling rate and the smoother's bandwidth.
+
+    Returns
+    -------
+    float
+        In rad/s^2: the root of the noise's density times the integral of
+        ``(2 pi f)^4 / (1 + (f / b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
+    """
+    return float(
+        angle_noise_rad
+        * (2 * np.pi) ** 2
+        * np.sqrt(2 / rate_hz * bandwidth_hz**5 * beta(5 / 6, 7 / 6) / 6)
+    )
+
+
+def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float) -> float:
+    """Widest bandwidth at which the acceleration's noise is 2 % of the acceleration.
+
+    Parameters
+    ----------
+    angle_noise_rad : float
+        Standard deviation of the measured angle per sample.
+    acceleration : float
+        Standard deviation of the acceleration, rad/s^2.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    float
+        In Hz, at least 8, at most 30 and a twentieth of the rate.
+    """
+    widest = widest_bandwidth(rate_hz)
+    own = acceleration_noise(angle_noise_rad, rate_hz, widest)
+    if own <= NOISE_SHARE * acceleration:
+        return widest
+    clean = widest * (NOISE_SHARE * acceleration / own) ** 0.4
+    return float(max(clean, min(NARROWEST_HZ, widest)))
+
+
+def smoothing_kernel(rate_hz: float, bandwidth_hz: float) -> Floats:
     """Weights by which the smoother averages a steady recording, odd length, sum 1.
 
     With ``b`` the bandwidth, the smoother's gain at frequency f is ``1 / (1 + (f / b)^6)``.
 
     Parameters
     ----------
-    rate_hz : float
-        Sampling rate.
+    rate_hz, bandwidth_hz : float
+        Sampling rate and bandwidth.
     """
-    bandwidth = min(BANDWIDTH_HZ, rate_hz / 20)
-    half = int(1.5 * rate_hz / bandwidth)
+    half = int(1.5 * rate_hz / bandwidth_hz)
     length = 16 * half
     frequency = np.fft.rfftfreq(length, 1 / rate_hz)
-    response = np.fft.irfft(1 / (1 + (frequency / bandwidth) ** 6), length)
+    response = np.fft.irfft(1 / (1 + (frequency / bandwidth_hz) ** 6), length)
     kernel = np.concatenate([response[-half:], response[: half + 1]])
     weights: Floats = kernel / kernel.sum()
     return weights
 
 
 def smoothed_angle(
-    angle_rad: Floats, strong: Bools, rough_rad_s: Floats, sure: Bools, rate_hz: float
-) -> tuple[Floats, Floats, Floats, int]:
+    angle_rad: Floats,
+    strong: Bools,
+    rough_rad_s: Floats,
+    sure: Bools,
+    rate_hz: float,
+    bandwidth_hz: float,
+) -> tuple[Floats, Floats, Floats]:
     """Follow angle, speed and acceleration through a recording and back.
 
-    The acceleration is a random walk whose size sets the smoother's bandwidth to 30 Hz: slower
-    than an electrical period at working speed, faster than a joint's change of acceleration.
+    The acceleration is a random walk whose size sets the smoother's bandwidth.
 
     Parameters
     ----------
@@ -49,23 +110,21 @@ def smoothed_angle(
         Rough speed, for the lock.
     sure : bool array of shape (n,)
         Samples whose rough speed counts.
-    rate_hz : float
-        Sampling rate.
+    rate_hz, bandwidth_hz : float
+        Sampling rate and bandwidth: slower than an electrical period at working speed, so that
+        errors of sensors and inverter are not followed.
 
     Returns
     -------
     angle, speed, acceleration : arrays of shape (n,)
-    window : int
-        Samples over which they are smooth, odd.
 
     References
     ----------
     Rauch, Tung and Striebel, AIAA Journal 3, 1965.
     """
-    bandwidth = min(BANDWIDTH_HZ, rate_hz / 20)
     step = 1.0 / rate_hz
     variance = ANGLE_NOISE_RAD**2
-    walk = variance * step * (2 * np.pi * bandwidth) ** 6
+    walk = variance * step * (2 * np.pi * bandwidth_hz) ** 6
     first = np.flatnonzero(sure)
     start = float(rough_rad_s[first[0]]) if first.size and first[0] < rate_hz / 10 else 0.0
     angle, speed, acceleration = _smooth(
@@ -78,9 +137,9 @@ def smoothed_angle(
         (ROUGH_NOISE_RAD * rate_hz / 15) ** 2,
         walk,
         start,
-        (2 * np.pi * bandwidth) ** 2,
+        (2 * np.pi * bandwidth_hz) ** 2,
     )
-    return angle, speed, acceleration, int(rate_hz / bandwidth / 2) | 1
+    return angle, speed, acceleration
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc,unused-ignore]

@@ -16,9 +16,10 @@ from opamc_cli.joint.normal import held_out_error, normal_equations, solve
 from opamc_cli.joint.spectra import (
     LOWEST_ORDER,
     OVERSAMPLING,
-    frequency_lines,
+    line_power,
     order_resolution,
     order_spectrum,
+    standing_views,
 )
 from opamc_cli.joint.trace import prepare, residual_on
 from opamc_cli.joint.track import Floats, Track
@@ -85,9 +86,19 @@ def hats(values: Floats, knots: Floats) -> Floats:
     return weights
 
 
-def _knots(values: Floats, count: int) -> Floats:
-    found: Floats = np.unique(np.quantile(values, np.linspace(0.005, 0.995, count)))
-    return found
+def _knots(values: Floats, count: int, closest: float = 0.02) -> Floats:
+    """Quantiles, none nearer to the one below than a share of their range.
+
+    At a constant speed, or a constant acceleration, quantiles crowd into the controller's own
+    wobble and the measurement's noise: there the current drives the motion, or noise does, and
+    what follows it is no effect of the motion.
+    """
+    found = np.unique(np.quantile(values, np.linspace(0.005, 0.995, count)))
+    knots = [found[0]]
+    for knot in found[1:]:
+        if knot - knots[-1] >= closest * (found[-1] - found[0]):
+            knots.append(knot)
+    return np.array(knots)
 
 
 def _even(values: Floats, count: int) -> Floats:
@@ -121,7 +132,7 @@ def flexible_bases(track: Track, rows: np.ndarray) -> dict[str, Floats]:
     bases = {
         "velocity": both_ways(hats(speed, _knots(speed, 9))),
         "joint-angle": both_ways(hats(position, _even(position, 25))),
-        "acceleration": hats(track.acceleration[rows], _knots(track.acceleration[rows], 12)),
+        "acceleration": hats(track.acceleration[rows], _knots(track.acceleration[rows], 12, 0.08)),
         "time": np.concatenate(
             [
                 hats(time, _even(time, 5)) * velocity[:, None],
@@ -195,13 +206,17 @@ def _line_structures(fit: Fit) -> list[Structure]:
         if height > gamma.isf(LINE_P / trials, classes):
             share = 2 * height / classes / max(int(view.valid.sum()), 1) * classes
             found.append(Structure("motor-angle", min(share, 1.0), float(np.sqrt(height)), LINE_P))
-    frequencies, lines = frequency_lines(track, view.residual)
-    upper = frequencies > 5.0
-    if upper.any():
-        height = float(lines[upper].max())
-        if height > gamma.isf(LINE_P / upper.sum(), 1):
-            share = 2 * height / max(int(view.valid.sum()), 1)
-            found.append(Structure("frequency", min(share, 1.0), float(np.sqrt(height)), LINE_P))
+    shares = []
+    for _turning, signals in standing_views(track, view.residual):
+        frequencies, lines = line_power(track, signals)
+        upper = frequencies > 5.0
+        height = float(lines[upper].max()) if upper.any() else 0.0
+        if upper.any() and height > gamma.isf(LINE_P / upper.sum(), 1):
+            # Turned back, a line is shared out between two signals and two frequencies.
+            shares.append(2 * len(signals) * height / max(int(view.valid.sum()), 1))
+    if shares:
+        root = float(np.sqrt(max(shares) * view.valid.sum() / 2))
+        found.append(Structure("frequency", min(max(shares), 1.0), root, LINE_P))
     return found
 
 

@@ -41,7 +41,7 @@ def objection_of_flux(
     order = getattr(effect, "electrical_order", None)
     if order is not None:
         size = float(np.linalg.norm(coefficients))
-        if not _in_flux(session, _companions(track, effect, order), size):
+        if not _in_flux(session, _companions(track, order, parameters), size):
             return "the flux current does not hold it, so it is no error of sensor or inverter"
         return None
     if effect.name == "ripple":
@@ -68,8 +68,15 @@ def _turns(angle: Floats, track: Track) -> int | None:
     return near if near in ELECTRICAL_ORDERS and abs(abs(slope) - near) < 0.02 * near else None
 
 
-def _companions(track: Track, effect: Effect, order: int) -> Floats:
+def _companions(track: Track, order: int, parameters: Parameters) -> Floats:
+    """Columns by which the flux current shows an error that the torque current shows."""
     assert track.electrical_rad is not None
+    if parameters.get("six_step"):
+        steps = np.zeros(track.size)
+        for phase in range(3):
+            angle = track.electrical_rad - 2 * np.pi * phase / 3
+            steps -= 2 / 3 * np.sign(np.cos(angle)) * np.sin(angle)
+        return (np.sign(track.model_a) * steps)[:, None]
     angle = order * track.electrical_rad
     weight = {1: np.ones(track.size), 2: track.model_a, 6: np.sign(track.model_a)}[order]
     return np.stack([weight * np.cos(angle), weight * np.sin(angle)], axis=1)

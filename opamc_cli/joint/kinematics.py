@@ -1,10 +1,9 @@
 """From recordings to a track: motion by local polynomials, torque current with its sign."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.angle_filter import smoothing_kernel
 from opamc_cli.joint.phases import PhaseAngle, follow_phases, side_of_torque, torque_current
 from opamc_cli.joint.smoothing import (
     averaging_kernel,
@@ -14,6 +13,7 @@ from opamc_cli.joint.smoothing import (
     noise_gain,
     quiet_block,
     smoothing_window,
+    unstepped,
 )
 from opamc_cli.joint.track import Bools, Floats, Joint, Track
 
@@ -87,6 +87,20 @@ class Motion:
     kernel: Floats
     quiet: int = 1
     blur: Floats | None = None
+
+    def later(self, lag_s: float, rate_hz: float) -> "Motion":
+        """Return the motion delayed by a fraction of a sample."""
+        time_s = np.arange(self.velocity.size) / rate_hz
+
+        def delayed(values: Floats) -> Floats:
+            return np.interp(time_s - lag_s, time_s, values)
+
+        return replace(
+            self,
+            position_rad=delayed(self.position_rad),
+            velocity=delayed(self.velocity),
+            acceleration=delayed(self.acceleration),
+        )
 
 
 def motion_from_position(
@@ -249,6 +263,8 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         return np.concatenate([getattr(piece, name) for piece in pieces])
 
     n = offset
+    alone = len(recordings) == 1
+    common = all(recording.started_s is not None for recording in recordings)
     return Track(
         rate_hz=rate,
         bounds=tuple(bounds),
@@ -273,6 +289,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         kernel=max((piece.kernel for piece in pieces), key=len),
         quiet=max(piece.quiet for piece in pieces),
         blur=join("blur") if all(piece.blur is not None for piece in pieces) else None,
+        own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
 
@@ -307,9 +324,9 @@ def _one(recording: Recording, joint: Joint) -> Track:
         if poles and ratio:
             scale, kind = 1.0 / (poles * ratio), "joint"
             channels |= {"scale"}
-        motion = _scaled(phase_angle, scale, rate)
+        motion = _scaled(phase_angle, scale)
         # Where there is too little current to tell an angle, the motion is a guess.
-        usable &= ~widened(~phase_angle.strong, phase_angle.window)
+        usable &= ~widened(~phase_angle.strong, phase_angle.window) & phase_angle.clear
         channels |= {"position"}
     else:
         msg = "a recording needs a position, a velocity or three phase currents"
@@ -319,7 +336,12 @@ def _one(recording: Recording, joint: Joint) -> Track:
     if phases is not None and phase_angle is not None:
         if recording.position_rad is not None or recording.velocity_rad_s is not None:
             known = poles * ratio if poles and ratio else None
-            electrical = phase_angle.aligned_with(motion.position_rad, motion.velocity, known)
+            electrical, lag_s = phase_angle.aligned_with(
+                motion.position_rad, motion.velocity, known, rate
+            )
+            if abs(lag_s) * rate <= 1:
+                # Sensors' filters and channels read in turn come to this, no clock does.
+                motion = motion.later(lag_s, rate)
         else:
             electrical = phase_angle.angle_rad
         current, current_d = torque_current(phases, electrical, motion.velocity)
@@ -370,7 +392,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
         model_a=np.zeros(n),
         joint=joint,
         channels=frozenset(channels),
-        temperature_c=None if temperature is None else filled(temperature),
+        temperature_c=None if temperature is None else unstepped(filled(temperature)),
         current_d_a=current_d,
         electrical_rad=electrical,
         kernel=motion.kernel,
@@ -379,13 +401,13 @@ def _one(recording: Recording, joint: Joint) -> Track:
     )
 
 
-def _scaled(phase_angle: PhaseAngle, scale: float, rate_hz: float) -> Motion:
+def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
     return Motion(
         phase_angle.angle_rad * scale,
         phase_angle.velocity_rad_s * scale,
         phase_angle.acceleration_rad_s2 * scale,
         phase_angle.window,
         0.0,
-        smoothing_kernel(rate_hz),
+        phase_angle.kernel,
         blur=phase_angle.blur * scale,
     )

@@ -9,7 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.angle_filter import smoothed_angle
+from opamc_cli.joint.angle_filter import (
+    acceleration_noise,
+    clean_bandwidth,
+    smoothed_angle,
+    smoothing_kernel,
+    widest_bandwidth,
+)
 from opamc_cli.joint.normal import solve
 from opamc_cli.joint.smoothing import derivatives
 from opamc_cli.joint.track import Bools, Floats
@@ -21,10 +27,16 @@ LOST_S = 0.015
 """After this long without current the side of the torque axis has to be found again."""
 
 SIDE_ROUNDS = 8
+BANDWIDTH_ROUNDS = 2
 
-LONGEST_DELAY_S = 3e-3
-DELAY_STEP_S = 5e-5
-"""Where the delay between logged position and phases is sought."""
+NOISIEST_SHARE = 0.1
+"""Noise of the acceleration, relative to the acceleration, up to which a sample counts."""
+
+LONGEST_LAG_S = 0.06
+ALIGNMENT_SAMPLES = 2000
+ALIGNED = 0.8
+LEAST_CONTRAST = 0.97
+"""How far, on how many samples and how surely the lag of phases behind a position is sought."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +49,12 @@ class PhaseAngle:
         Electrical.
     strong : bool array of shape (n,)
         Samples with enough current to tell an angle.
+    clear : bool array of shape (n,)
+        Samples with enough current for an acceleration that is not mostly noise.
     window : int
         Samples over which it is smooth.
+    kernel : array of odd length
+        Moving average that the angle and its derivatives have gone through.
     blur : array of shape (n, 2)
         What the acceleration would gain or lose by a shorter and a longer window.
     """
@@ -47,12 +63,14 @@ class PhaseAngle:
     velocity_rad_s: Floats
     acceleration_rad_s2: Floats
     strong: Bools
+    clear: Bools
     window: int
+    kernel: Floats
     blur: Floats
 
     def aligned_with(
-        self, position_rad: Floats, velocity_rad_s: Floats, ratio: float | None
-    ) -> Floats:
+        self, position_rad: Floats, velocity_rad_s: Floats, ratio: float | None, rate_hz: float
+    ) -> tuple[Floats, float]:
         """Electrical angle from the logged position, with ratio, zero and delay from the phases.
 
         Parameters
@@ -61,30 +79,54 @@ class PhaseAngle:
             Joint angle and speed.
         ratio : float or None
             Electrical radians per joint radian, if known.
+        rate_hz : float
+            Sampling rate.
 
         Returns
         -------
-        array of shape (n,)
+        electrical_rad : array of shape (n,)
             The phases' own angle where the position does not follow it within half a radian.
-            Filters of the current sensors delay the phases by a time that is found within 3 ms:
-            at 300 Hz a millisecond is two radians.
+        lag_s : float
+            By how much the phases come later than the position, within 60 ms; 0 where that
+            cannot be told. Filters and loggers make it: at 300 Hz a millisecond is two radians.
         """
         centred = position_rad - position_rad.mean()
         slope = float(np.dot(centred, self.angle_rad) / max(np.dot(centred, centred), 1e-300))
         if ratio is not None:
             slope = float(np.copysign(ratio, slope))
-        rest = np.exp(2j * (self.angle_rad - slope * position_rad))[self.strong]
-        if not rest.size:
-            return self.angle_rad
-        speed = slope * velocity_rad_s[self.strong]
-        delays_s = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 1e-9, DELAY_STEP_S)
-        means = np.array([np.mean(rest * np.exp(-2j * delay * speed)) for delay in delays_s])
-        best = int(np.argmax(np.abs(means)))
-        if abs(means[best]) < 0.8:
-            return self.angle_rad
-        path = slope * (position_rad + delays_s[best] * velocity_rad_s)
-        aligned: Floats = path + 0.5 * float(np.angle(means[best]))
-        return aligned
+        rows = np.flatnonzero(self.strong)
+        if not rows.size:
+            return self.angle_rad, 0.0
+        rows = rows[:: max(rows.size // ALIGNMENT_SAMPLES, 1)]
+        rest = np.exp(2j * (self.angle_rad[rows] - slope * position_rad[rows]))
+        speed = slope * velocity_rad_s[rows]
+        lag_s = _lag(rest, speed, LONGEST_LAG_S)
+        time_s = np.arange(position_rad.size) / rate_hz
+        path = slope * np.interp(time_s - lag_s, time_s, position_rad)
+        offset = complex(np.mean(np.exp(2j * (self.angle_rad[rows] - path[rows]))))
+        if abs(offset) < ALIGNED:
+            return self.angle_rad, 0.0
+        electrical: Floats = path + 0.5 * float(np.angle(offset))
+        return electrical, lag_s
+
+
+def _lag(rest: NDArray[np.complex128], speed: Floats, longest_s: float) -> float:
+    """Lag that turns the phasors `rest` by twice the lag times the speed; the shortest of equals.
+
+    At one speed there and back, lags that differ by half a period look the same.
+    """
+    step = 0.25 / max(float(np.quantile(np.abs(speed), 0.99)), 0.25 / longest_s)
+    count = int(longest_s / step)
+
+    def contrast(lags: Floats) -> Floats:
+        return np.array([abs(np.mean(rest * np.exp(2j * lag * speed))) for lag in lags])
+
+    coarse = np.arange(-count, count + 1) * step
+    heights = contrast(coarse)
+    equals = coarse[heights > LEAST_CONTRAST * heights.max()]
+    nearest = equals[np.argmin(np.abs(equals))]
+    fine = nearest + np.linspace(-3 * step, 3 * step, 61)
+    return float(fine[np.argmax(contrast(fine))])
 
 
 def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
@@ -133,20 +175,39 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
     rough = np.concatenate([[0.0], np.angle(smooth)]) * rate_hz
     sure = np.concatenate([[False], coherence > 0.9]) & strong
-    angle, velocity, acceleration, window = smoothed_angle(
-        np.angle(vector), strong, rough, sure, rate_hz
+    measured = np.angle(vector)
+    bandwidth = widest_bandwidth(rate_hz)
+    angle, velocity, acceleration = smoothed_angle(
+        measured, strong, rough, sure, rate_hz, bandwidth
     )
+    angle_noise = noise / np.maximum(_centred_mean(length.astype(np.complex128), 15).real, 1e-300)
+    typical = float(np.median(angle_noise[strong])) if strong.any() else 0.0
+    for _ in range(BANDWIDTH_ROUNDS):
+        followed = float(np.var(acceleration[strong])) if strong.any() else 0.0
+        followed -= acceleration_noise(typical, rate_hz, bandwidth) ** 2
+        narrower = clean_bandwidth(typical, np.sqrt(max(followed, 0.0)), rate_hz)
+        if narrower > 0.9 * bandwidth:
+            break
+        bandwidth = narrower
+        angle, velocity, acceleration = smoothed_angle(
+            measured, strong, rough, sure, rate_hz, bandwidth
+        )
+    limit = NOISIEST_SHARE * float(np.std(acceleration[strong])) if strong.any() else 0.0
+    per_radian = acceleration_noise(1.0, rate_hz, bandwidth)
+    clear = strong & (per_radian * angle_noise <= limit)
+    window = int(rate_hz / bandwidth) | 1
     # The measured angle, on the branch that was followed.
     error = np.where(strong, np.angle(vector) - angle, 0.0)
     path = angle + error - np.pi * np.round(error / np.pi)
     blur = np.stack(
         [
             derivatives(path, rate_hz, min(size, (path.size - 1) | 1), 2) - acceleration
-            for size in (window | 1, 4 * window | 1)
+            for size in (int(rate_hz / bandwidth / 2) | 1, int(2 * rate_hz / bandwidth) | 1)
         ],
         axis=1,
     )
-    return PhaseAngle(angle, velocity, acceleration, strong, window, blur)
+    kernel = smoothing_kernel(rate_hz, bandwidth)
+    return PhaseAngle(angle, velocity, acceleration, strong, clear, window, kernel, blur)
 
 
 def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:

@@ -192,3 +192,25 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
         path, window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz, mode="interp"
     )
     return smooth
+
+
+def unstepped(values: Floats) -> Floats:
+    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+        Uniformly sampled.
+
+    Returns
+    -------
+    array of shape (n,)
+        Straight lines through the middles of the steps, the first and the last value held; the
+        values themselves where more than a tenth of them are steps.
+    """
+    steps = np.flatnonzero(np.diff(values)) + 1
+    if not steps.size or steps.size > values.size / 10:
+        return values
+    places = np.concatenate([[0], steps - 0.5, [values.size - 1]])
+    levels = np.concatenate([values[:1], (values[steps - 1] + values[steps]) / 2, values[-1:]])
+    return np.interp(np.arange(values.size), places, levels)

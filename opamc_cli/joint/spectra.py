@@ -143,6 +143,36 @@ def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
     return peaks
 
 
+def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floats]]]:
+    """Signals in which a line of constant frequency stands still.
+
+    Parameters
+    ----------
+    track : Track
+        With the phases' electrical angle, where they were logged.
+    residual : array of shape (n,)
+        Whitened residual.
+
+    Returns
+    -------
+    list of (bool, list of array)
+        The residual itself (False); and, from phases, the residual turned back into their frame
+        (True): what a phase picks up turns against the field in the torque current.
+    """
+    views = [(False, [residual])]
+    if "phases" in track.channels and track.electrical_rad is not None:
+        field = track.electrical_rad
+        views.append((True, [residual * np.cos(field), residual * np.sin(field)]))
+    return views
+
+
+def line_power(track: Track, signals: list[Floats]) -> tuple[Floats, Floats]:
+    """Mean power over frequency of signals on one track, see `frequency_lines`."""
+    lines = [frequency_lines(track, signal) for signal in signals]
+    power: Floats = np.mean([line[1] for line in lines], axis=0)
+    return lines[0][0], power
+
+
 def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
     """Power of a residual over frequency, oversampled twice.
 

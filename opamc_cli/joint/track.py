@@ -88,6 +88,8 @@ class Track:
         scale, temperature, phases, electrical.
     period_samples : int or None
         Length of a cycle, if the motion repeats.
+    own_clocks_s : tuple of float
+        `time_s` at which each recording begins, where recordings have no common clock.
     """
 
     rate_hz: float
@@ -116,6 +118,7 @@ class Track:
     kernel: Floats = field(default_factory=lambda: np.ones(1))
     quiet: int = 1
     blur: Floats | None = None
+    own_clocks_s: tuple[float, ...] = ()
 
     @property
     def size(self) -> int:

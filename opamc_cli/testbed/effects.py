@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from opamc_cli.testbed.kernel import AxisConstants
 from opamc_cli.testbed.parameters import Effect
@@ -100,7 +101,7 @@ KINDS: dict[str, EffectKind] = {
     "sensor_offset": EffectKind("A", {"phase": 0.0}, None),
     "sensor_gain": EffectKind("relative", {"phase": 0.0}, None),
     "dead_time": EffectKind("A", {}, _set("fx_dead_time")),
-    "mains_hum": EffectKind("A", {"frequency_hz": 50.0, "phase_rad": 0.0}, None),
+    "mains_hum": EffectKind("A", {"frequency_hz": 50.0, "phase_rad": 0.0, "phase": 0.0}, None),
 }
 """Every effect name with its unit, its parameters and what it changes."""
 
@@ -196,16 +197,16 @@ def apply_to_sensors(
     Returns
     -------
     gain, offset_a, hum_a, vector_a : ndarray
-        As they are with the effects; the hum, shape (n,), is common to the phases.
+        As they are with the effects; the hum has shape (n, 3).
     """
     gain, offset_a = gain.copy(), offset_a.copy()
-    hum = np.zeros(len(vector_a))
+    hum = np.zeros((len(vector_a), 3))
     for effect in effects:
         size, p = effect.magnitude, effect.parameters
         if effect.name == "time_delay":
             vector_a = np.column_stack([delayed(vector_a[:, k], size * rate_hz) for k in range(2)])
         elif effect.name == "mains_hum":
-            hum += _hum(len(vector_a), size, p, rate_hz)
+            hum[:, int(p["phase"])] += _hum(len(vector_a), size, p, rate_hz)
         elif effect.name == "sensor_offset":
             offset_a[int(p["phase"])] += size
         elif effect.name == "sensor_gain":
@@ -214,9 +215,24 @@ def apply_to_sensors(
 
 
 def apply_to_reported(
-    effects: Sequence[Effect], current_a: NDArray[np.float64], rate_hz: float
+    effects: Sequence[Effect],
+    current_a: NDArray[np.float64],
+    electrical_rad: NDArray[np.float64],
+    rate_hz: float,
 ) -> NDArray[np.float64]:
-    """Apply the sensor effects of one axis to its reported current (n,)."""
+    """Apply the sensor effects of one axis to its reported current.
+
+    The drive computes what it reports from its own phase sensors: an error of one of them turns
+    with the field, once per electrical revolution for an offset, twice for a gain.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Of one axis, completed.
+    current_a, electrical_rad : ndarray, shape (n,)
+        Reported torque current and the angle of the rotor's field.
+    rate_hz : float
+    """
     out = current_a
     for effect in effects:
         size = effect.magnitude
@@ -224,17 +240,22 @@ def apply_to_reported(
             out = delayed(out, size * rate_hz)
         elif effect.name == "mains_hum":
             out = out + _hum(len(out), size, effect.parameters, rate_hz)
-        elif effect.name == "sensor_offset":
-            out = out + size
-        elif effect.name == "sensor_gain":
-            out = out * (1.0 + size)
+        elif effect.name in ("sensor_offset", "sensor_gain"):
+            # The share of this phase in the torque current: the field leads by a quarter turn.
+            seen = -np.sin(electrical_rad - 2.0 * np.pi / 3.0 * effect.parameters["phase"])
+            error = size if effect.name == "sensor_offset" else size * current_a * seen
+            out = out + 2.0 / 3.0 * error * seen
     return out
 
 
 def delayed(values: NDArray[np.float64], samples: float) -> NDArray[np.float64]:
-    """Delay a signal by a number of samples, whole or not; the first value is held."""
-    n = len(values)
-    result: NDArray[np.float64] = np.interp(np.arange(n) - samples, np.arange(n), values)
+    """Delay a signal by a number of samples, whole or not; first and last value are held.
+
+    Cubic splines: straight lines between samples would weaken a carrier by several per cent.
+    """
+    times = np.arange(len(values))
+    inside = np.clip(times - samples, 0, len(values) - 1)
+    result: NDArray[np.float64] = CubicSpline(times, values)(inside)
     return result
 
 

@@ -271,11 +271,12 @@ def _measure(
         vector[:, 1],
         gain,
         offset,
-        noise + hum[:, None],
+        noise + hum,
         sensor.full_scale_a,
         sensor.bits,
     )
-    reported = apply_to_reported(effects, signal["reported_a"], rate_hz)
+    electrical = joint.motor.pole_pairs * signal["motor_angle_rad"]
+    reported = apply_to_reported(effects, signal["reported_a"], electrical, rate_hz)
     reported = reported + sensor.reported_noise_a * rng.standard_normal(n)
     counts = joint.control.encoder_counts_per_turn
     step = 2.0 * pi / counts if counts else 0.0

@@ -3,11 +3,16 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.normal import solve
 from opamc_cli.joint.track import Floats, Track
 
 
 class LoadFriction(Effect):
-    """Meshing losses: dry friction in proportion to the load's magnitude."""
+    """Meshing losses: dry friction in proportion to the load's magnitude.
+
+    What accelerates the rotor itself does not pass the gear: `inertia_share` is the part of the
+    inertia's current that does.
+    """
 
     name = "load_friction"
     domain = "load"
@@ -21,10 +26,25 @@ class LoadFriction(Effect):
             return "no declared effect carries a load that changes (inertia, gravity, spring)"
         return super().untestable(track)
 
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """All of the inertia beyond the gear, half of it, or none."""
+        return [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Direction times the magnitude of the fitted load current."""
-        return stack(track.direction * np.abs(track.load_a))
+        """Direction times the magnitude of the fitted load current that passes the gear."""
+        load = track.load_a - (1 - parameters["inertia_share"]) * _inertial(track)
+        return stack(track.direction * np.abs(load))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""
         return bool(coefficients[0] > 0)
+
+
+def _inertial(track: Track) -> Floats:
+    """Part of the fitted load that follows the acceleration."""
+    place = track.position_rad
+    shapes = (track.acceleration, np.sin(place), np.cos(place), place, np.ones(track.size))
+    columns = stack(*shapes)[track.moving]
+    share = solve(columns.T @ columns, columns.T @ track.load_a[track.moving])
+    inertial: Floats = share[0] * track.acceleration
+    return inertial

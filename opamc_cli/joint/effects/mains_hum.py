@@ -1,18 +1,45 @@
 """Pick-up from the mains."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.spectra import frequency_lines
+from opamc_cli.joint.spectra import line_power, standing_views
 from opamc_cli.joint.track import Floats, Track
 
 MAINS_HZ = (50.0, 60.0)
 HIGHEST_HARMONIC = 12
 TOLERANCE = 0.005
+SAME_START_S = 1e-3
+
+
+@dataclass(frozen=True)
+class _Line:
+    """A multiple of the mains, and where the sampling rate folds it to."""
+
+    true_hz: float
+    shown_hz: float
+
+
+def _mains_lines(rate_hz: float) -> list[_Line]:
+    lines = []
+    for mains in MAINS_HZ:
+        for harmonic in range(1, HIGHEST_HARMONIC + 1):
+            line = mains * harmonic
+            folded = abs((line + rate_hz / 2) % rate_hz - rate_hz / 2)
+            if 5 <= folded <= 0.48 * rate_hz:
+                lines.append(_Line(line, folded))
+    return lines
 
 
 class MainsHum(Effect):
-    """A line at a multiple of 50 or 60 Hz, folded where the sampling rate is low."""
+    """A line at a multiple of 50 or 60 Hz, folded where the sampling rate is low.
+
+    In a phase's reading the line stands still, so in the torque current it turns against the
+    field (`turning`); what all three phases pick up alike does not reach the torque current.
+    Recordings without a common clock have phases of their own.
+    """
 
     name = "mains_hum"
     domain = "frequency"
@@ -25,29 +52,41 @@ class MainsHum(Effect):
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest line near each multiple that the rate can show."""
-        frequencies, power = frequency_lines(track, residual)
-        found: list[tuple[float, float]] = []
-        for mains in MAINS_HZ:
-            for harmonic in range(1, HIGHEST_HARMONIC + 1):
-                line = mains * harmonic
-                folded = abs((line + track.rate_hz / 2) % track.rate_hz - track.rate_hz / 2)
-                if folded < 5 or folded > 0.48 * track.rate_hz:
-                    continue
-                near = np.abs(frequencies - folded) <= max(TOLERANCE * line, 0.1)
+        found: list[tuple[float, float, float]] = []
+        for turning, signals in standing_views(track, residual):
+            frequencies, power = line_power(track, signals)
+            for line in _mains_lines(track.rate_hz):
+                near = np.abs(frequencies - line.shown_hz) <= max(TOLERANCE * line.true_hz, 0.1)
                 if np.any(near):
                     best = int(np.argmax(np.where(near, power, 0.0)))
-                    found.append((float(power[best]), float(frequencies[best])))
+                    found.append((float(power[best]), float(frequencies[best]), float(turning)))
         found.sort(reverse=True)
-        return [{"frequency_hz": frequency} for _, frequency in found[:2]]
+        return [
+            {"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found[:2]
+        ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to the highest frequency that the rate can show."""
         return {"frequency_hz": (4.0, 0.49 * track.rate_hz)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Sine and cosine of time."""
+        """Sine and cosine of time, against the field or not, for each clock."""
         angle = 2 * np.pi * parameters["frequency_hz"] * track.time_s
-        return stack(np.cos(angle), np.sin(angle))
+        waves = [np.cos(angle), np.sin(angle)]
+        if parameters.get("turning"):
+            assert track.electrical_rad is not None
+            field = (np.cos(track.electrical_rad), np.sin(track.electrical_rad))
+            waves = [wave * part for wave in waves for part in field]
+        if not track.own_clocks_s:
+            return stack(*waves)
+        started_s = track.time_s - track.run_time_s
+        return stack(
+            *(
+                np.where(np.abs(started_s - start_s) < SAME_START_S, wave, 0.0)
+                for start_s in track.own_clocks_s
+                for wave in waves
+            )
+        )
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Name the line, and say where it may be folded."""

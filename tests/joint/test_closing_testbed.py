@@ -1,0 +1,110 @@
+"""The loop on the virtual testbed: an effect that is switched on is the one that is found.
+
+The joint of configs/closing.yaml holds the declared effects and hardly anything else; each test
+switches on what the model does not declare. The recordings are those of one seed, taken before
+anything was run on it.
+"""
+
+import numpy as np
+import pytest
+from testbed_closing import EFFECTS, SENSING, close_on_testbed, names_of
+
+from opamc_cli.joint.loop import Loop
+
+SEED = 100
+
+FROM_CURRENT = "the motion comes from the phase currents themselves"
+UNTESTABLE = {("elasticity", "phases"), ("time_delay", "phases")}
+"""What recordings without a position cannot show."""
+
+TIED = {"asymmetric_friction"}
+"""The testbed's is a constant while the joint moves: nobody can tell it from an offset."""
+
+UNMENDED = {
+    ("warmup", "phases"): "the drift between cycles is taken for the noise's colour",
+    ("time_delay", "position and current"): "what a delay does at a start is left for elasticity",
+}
+
+
+def cases():
+    for effect in EFFECTS:
+        for sensing in SENSING:
+            if (effect, sensing) in UNTESTABLE:
+                continue
+            why = UNMENDED.get((effect, sensing))
+            marks = [pytest.mark.xfail(strict=True, reason=why)] if why else []
+            yield pytest.param(effect, sensing, marks=marks)
+
+
+@pytest.fixture(scope="session")
+def floors() -> dict[str, float]:
+    """Sealed error of the healthy joint, by what is logged."""
+    return {sensing: close_on_testbed((), sensing, SEED).rmse_before_a for sensing in SENSING}
+
+
+def fall(loop: Loop, floor: float) -> float:
+    """Share of the sealed mean square above the floor that is gone."""
+    excess = loop.rmse_before_a**2 - floor**2
+    return float((loop.rmse_before_a**2 - loop.rmse_after_a**2) / excess)
+
+
+@pytest.mark.parametrize("sensing", SENSING)
+def test_nothing_is_added_to_a_healthy_joint(sensing):
+    loop = close_on_testbed((), sensing, SEED)
+    assert loop.verdict == "nothing-missing"
+    assert loop.steps == ()
+
+
+@pytest.mark.parametrize(("effect", "sensing"), list(cases()))
+def test_the_missing_effect_is_found_alone(effect, sensing, floors):
+    loop = close_on_testbed((effect,), sensing, SEED)
+    assert len(loop.steps) == 1
+    if effect in TIED:
+        assert effect in names_of(loop)[0]
+    else:
+        assert loop.steps[0].term.effect.name == effect
+    assert loop.verdict == "closed"
+    assert loop.rmse_after_a < loop.rmse_before_a
+    assert fall(loop, floors[sensing]) > 0.85
+
+
+@pytest.mark.parametrize(("effect", "sensing"), sorted(UNTESTABLE))
+def test_what_the_phases_cannot_show_is_said_to_be_untestable(effect, sensing):
+    loop = close_on_testbed((effect,), sensing, SEED)
+    reasons = {entry.effect: entry.why for entry in loop.untestable}
+    assert FROM_CURRENT in reasons[effect]
+    assert effect not in set().union(*names_of(loop))
+
+
+PAIRS = [
+    (("stribeck", "ripple"), "position and current"),
+    (("position_drag", "mains_hum"), "position and current"),
+    (("load_friction", "warmup"), "position and current"),
+    (("elasticity", "spring"), "position and current"),
+    (("payload_change", "sensor_offset"), "position and phases"),
+    (("quadratic_friction", "position_drag"), "phases"),
+    (("payload_change", "ripple"), "phases"),
+    (("spring", "thermal_viscous"), "phases"),
+]
+
+
+@pytest.mark.parametrize(("pair", "sensing"), PAIRS)
+def test_two_missing_effects_are_both_found(pair, sensing, floors):
+    loop = close_on_testbed(pair, sensing, SEED)
+    for effect in pair:
+        assert any(effect in names for names in names_of(loop))
+    assert len(loop.steps) == 2
+    assert fall(loop, floors[sensing]) > 0.85
+
+
+@pytest.mark.parametrize(
+    ("effect", "domain"),
+    [("ripple", "motor-angle"), ("mains_hum", "frequency"), ("position_drag", "joint-angle")],
+)
+@pytest.mark.parametrize("sensing", ["position and current", "phases"])
+def test_an_effect_that_the_library_lacks_is_not_given_another_s_name(effect, domain, sensing):
+    loop = close_on_testbed((effect,), sensing, SEED, without=(effect,))
+    assert loop.verdict == "not-in-library"
+    assert loop.remaining_domain == domain
+    assert loop.steps == ()
+    assert np.isclose(loop.rmse_after_a, loop.rmse_before_a)
