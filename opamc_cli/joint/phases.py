@@ -121,11 +121,11 @@ def _lag(rest: NDArray[np.complex128], speed: Floats, longest_s: float) -> float
     def contrast(lags: Floats) -> Floats:
         return np.array([abs(np.mean(rest * np.exp(2j * lag * speed))) for lag in lags])
 
-    coarse = np.arange(-count, count + 1) * step
+    coarse: Floats = step * np.arange(-count, count + 1, dtype=np.float64)
     heights = contrast(coarse)
     equals = coarse[heights > LEAST_CONTRAST * heights.max()]
     nearest = equals[np.argmin(np.abs(equals))]
-    fine = nearest + np.linspace(-3 * step, 3 * step, 61)
+    fine: Floats = nearest + step * np.linspace(-3, 3, 61)
     return float(fine[np.argmax(contrast(fine))])
 
 

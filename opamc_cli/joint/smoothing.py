@@ -213,4 +213,5 @@ def unstepped(values: Floats) -> Floats:
         return values
     places = np.concatenate([[0], steps - 0.5, [values.size - 1]])
     levels = np.concatenate([values[:1], (values[steps - 1] + values[steps]) / 2, values[-1:]])
-    return np.interp(np.arange(values.size), places, levels)
+    bridged: Floats = np.interp(np.arange(values.size), places, levels)
+    return bridged

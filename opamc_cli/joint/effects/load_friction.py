@@ -32,7 +32,8 @@ class LoadFriction(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the magnitude of the fitted load current that passes the gear."""
-        load = track.load_a - (1 - parameters["inertia_share"]) * _inertial(track)
+        share = parameters.get("inertia_share", 1.0)
+        load = track.load_a if share == 1 else track.load_a - (1 - share) * _inertial(track)
         return stack(track.direction * np.abs(load))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
