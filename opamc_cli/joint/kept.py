@@ -15,9 +15,15 @@ class Kept:
     A joint that lacks a dozen effects is fitted fifty times; from one fit to the next a single
     term is new, and only what follows the fitted load changes. Entries are recognised by
     identity: of the term, and of the track where the regressors follow what was fitted.
+
+    Parameters
+    ----------
+    storing : bool
+        False where a session is fitted once: nothing is kept, which takes a fraction of the memory.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, storing: bool = True) -> None:
+        self.storing = storing
         self._terms: dict[int, object] = {}
         self._columns: dict[tuple[int, bool], tuple[Track | None, Floats]] = {}
         self._means: dict[int, tuple[Floats, Floats]] = {}
@@ -25,7 +31,7 @@ class Kept:
 
     def keep(self, terms: Sequence[object]) -> None:
         """Name the terms whose regressors are worth keeping; forget those of all others."""
-        self._terms = {id(term): term for term in terms}
+        self._terms = {id(term): term for term in terms} if self.storing else {}
         self._columns = {key: kept for key, kept in self._columns.items() if key[0] in self._terms}
 
     def columns(

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
 from opamc_cli.joint.kept import Kept
-from opamc_cli.joint.normal import Normal, solve
+from opamc_cli.joint.normal import Normal, normal_equations, solve
 from opamc_cli.joint.thinning import MOST_SAMPLES, cut, thinned, whole_groups
 from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, coarsen
 
@@ -151,7 +151,7 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     pieces = thinned(track, grouping, groups)
     sealed = whole_groups(track, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
-    opened = Session(grid, grid, 1, grouping, groups)
+    opened = Session(grid, grid, 1, grouping, groups, kept=Kept(storing=False))
     return replace(_session(cut(track, pieces), grouping, groups), opened=opened)
 
 
@@ -248,16 +248,15 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
     grid = session.fine
     current = grid.track.current_a
-    columns = [session.columns(term, fine=True) for term in terms]
-    normal = session.kept.products(columns, current, grid.rows)
+    normal, widths = _products(session, terms)
     solution = solve(normal.gram.sum(axis=0), normal.moment.sum(axis=0))
-    widths = [block.shape[1] for block in columns]
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     total = np.zeros(grid.track.size)
     model = np.zeros(grid.track.size)
     load = np.zeros(grid.track.size)
     static = []
-    for term, block, values in zip(terms, columns, coefficients, strict=True):
+    for term, values in zip(terms, coefficients, strict=True):
+        block = session.columns(term, fine=True)
         part = block @ values
         total += part
         if term.effect.static and not term.effect.fast:
@@ -267,3 +266,17 @@ def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
             load += part
     session = session.with_model(load, model, tuple(static))
     return Fit(terms, coefficients, session, current - total, normal)
+
+
+def _products(session: Session, terms: tuple[Term, ...]) -> tuple[Normal, list[int]]:
+    """Sum products of the current and all regressors on the open samples; count each term's."""
+    grid = session.fine
+    current = grid.track.current_a
+    if session.kept.storing:
+        columns = [session.columns(term, fine=True) for term in terms]
+        widths = [block.shape[1] for block in columns]
+        return session.kept.products(columns, current, grid.rows), widths
+    blocks = [session.columns(term, fine=True)[grid.fit] for term in terms]
+    design = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(grid.fit.sum()), 0))
+    widths = [block.shape[1] for block in blocks]
+    return normal_equations(design, current[grid.fit], grid.slices), widths

@@ -10,6 +10,9 @@ from opamc_cli.joint.track import Bools, Track, excerpt
 MOST_SAMPLES = 250_000
 """Above this many moving samples, evenly spread parts of the open groups stand for all."""
 
+TAKEN_SAMPLES = 150_000
+"""So many of all moving samples are taken (times the share of the open ones)."""
+
 FEWEST_GROUPS = 9
 RUN = 3
 """Cycles are taken in runs of so many: neighbours tell what repeats from what does not."""
@@ -40,11 +43,11 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     Returns
     -------
     list of (int, int)
-        Half-open pieces with some 250 000 moving samples times the open groups' share; more
+        Half-open pieces with some 150 000 moving samples times the open groups' share; more
         where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
-    share = MOST_SAMPLES / max(int(np.count_nonzero(member)), 1)
+    share = TAKEN_SAMPLES / max(int(np.count_nonzero(member)), 1)
     sizes = np.bincount(track.group[member], minlength=len(grouping.names))
     count = min(max(int(len(groups) * share), FEWEST_GROUPS), len(groups))
     whole = grouping.kind == "cycles"

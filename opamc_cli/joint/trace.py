@@ -24,12 +24,10 @@ from opamc_cli.joint.whitening import autoregression, settled, whitened
 SCORE_PER_PARAMETER = 6.0
 """What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
 
-HOPELESS = -10.0
-"""Score of a best guess below which no refinement has been seen to reach the gate; the largest
-rise over 600 searches was from -8 to 9, and the gate begins near 10."""
-
 BATCH_VALUES = 1_000_000
 """Values that are multiplied with the model's span at once: more would leave the cache."""
+
+ROWS_AT_A_TIME = 16_384
 
 BLOCKS_PER_GROUP = 8
 DECOY_BLOCKS_PER_GROUP = 2
@@ -246,14 +244,19 @@ def residual_on(fit: Fit, fine: bool) -> Floats:
 
 
 def _orthonormal(columns: Floats) -> Floats:
+    """Orthonormal columns of the same span, in the place of the given ones."""
     if columns.shape[1] == 0:
         return columns
     gram = columns.T @ columns
     scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
     good = values > 1e-9 * values[-1]
-    span: Floats = columns @ (vectors[:, good] / np.sqrt(values[good]) / scale[:, None])
-    return span
+    turn = vectors[:, good] / np.sqrt(values[good]) / scale[:, None]
+    # In place, some rows at a time: on the fine grid a second array is a hundred megabytes.
+    for start in range(0, columns.shape[0], ROWS_AT_A_TIME):
+        rows = slice(start, start + ROWS_AT_A_TIME)
+        columns[rows, : turn.shape[1]] = columns[rows] @ turn
+    return columns[:, : turn.shape[1]]
 
 
 @dataclass(frozen=True)
@@ -355,7 +358,7 @@ def search(
     view: View,
     effect: Effect,
     *,
-    thorough: bool = True,
+    least: float = -np.inf,
     shared: Shared | None = None,
 ) -> tuple[Candidate | None, int]:
     """Best form of an effect on a view, over its non-linear parameters.
@@ -368,8 +371,8 @@ def search(
         Whitened residual.
     effect : Effect
         What to try.
-    thorough : bool
-        False where a best guess that begins as good as nothing need not be refined.
+    least : float
+        A best guess that scores less is not refined, where no effect hides between its guesses.
     shared : dict, optional
         Takes the guesses' regressors, and gives them to the next search of the same effect on
         the same samples.
@@ -398,7 +401,7 @@ def search(
     if best is None or not np.isfinite(best.score):
         return None, len(guesses)
     limits = effect.limits(view.grid.track)
-    hopeless = effect.dense_guesses and best.score < HOPELESS and not thorough
+    hopeless = effect.dense_guesses and best.score < least
     if limits and not effect.flags_choose_columns and not hopeless:
         best = _refined(session, view, effect, best, limits, len(guesses))
     settled_parameters = effect.settled(best.term.parameters, view.grid.track)

@@ -56,9 +56,11 @@ class MainsHum(Effect):
         for turning, signals in standing_views(track, residual):
             frequencies, power = line_power(track, signals)
             for line in _mains_lines(track.rate_hz):
-                near = np.abs(frequencies - line.shown_hz) <= max(TOLERANCE * line.true_hz, 0.1)
-                if np.any(near):
-                    best = int(np.argmax(np.where(near, power, 0.0)))
+                reach = max(TOLERANCE * line.true_hz, 0.1)
+                first = int(np.searchsorted(frequencies, line.shown_hz - reach))
+                last = int(np.searchsorted(frequencies, line.shown_hz + reach, side="right"))
+                if last > first:
+                    best = first + int(np.argmax(power[first:last]))
                     found.append((float(power[best]), float(frequencies[best]), float(turning)))
         found.sort(reverse=True)
         return [
