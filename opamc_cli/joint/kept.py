@@ -29,6 +29,12 @@ class Kept:
         self._means: dict[int, tuple[Floats, Floats]] = {}
         self._products: tuple[tuple[Floats, ...], Normal] | None = None
 
+    def clear(self) -> None:
+        """Forget everything; it is computed again where it is asked for."""
+        self.keep(())
+        self._means = {}
+        self._products = None
+
     def keep(self, terms: Sequence[object]) -> None:
         """Name the terms whose regressors are worth keeping; forget those of all others."""
         self._terms = {id(term): term for term in terms} if self.storing else {}

@@ -211,7 +211,11 @@ class Fit:
         fitted once more, to the same samples, where all sealed groups can be predicted.
         """
         session = self.session.opened
-        return self if session is None else fit_terms(session, self.terms)
+        if session is None:
+            return self
+        # This is the end: what the loop has kept would only take memory from here on.
+        self.session.kept.clear()
+        return fit_terms(session, self.terms)
 
     def rmse(self, sealed: bool) -> float:
         """Root mean square residual on the open or on the sealed samples."""
@@ -277,6 +281,9 @@ def _products(session: Session, terms: tuple[Term, ...]) -> tuple[Normal, list[i
         widths = [block.shape[1] for block in columns]
         return session.kept.products(columns, current, grid.rows), widths
     blocks = [session.columns(term, fine=True)[grid.fit] for term in terms]
-    design = np.concatenate(blocks, axis=1) if blocks else np.zeros((int(grid.fit.sum()), 0))
     widths = [block.shape[1] for block in blocks]
+    design = np.empty((int(grid.fit.sum()), sum(widths)))
+    for stop in np.cumsum(widths)[::-1]:
+        block = blocks.pop()
+        design[:, stop - block.shape[1] : stop] = block
     return normal_equations(design, current[grid.fit], grid.slices), widths

@@ -13,9 +13,8 @@ MOST_SAMPLES = 250_000
 TAKEN_SAMPLES = 150_000
 """So many of all moving samples are taken (times the share of the open ones)."""
 
-FEWEST_GROUPS = 9
-RUN = 3
-"""Cycles are taken in runs of so many: neighbours tell what repeats from what does not."""
+FEWEST_GROUPS = 12
+"""What happens at some time is consistent over groups only if there are some on both sides."""
 
 LEAD_S = 2.0
 """Before each piece, so that what has a memory (wind-up, hysteresis) has settled."""
@@ -34,9 +33,9 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     track : Track
         With its groups.
     grouping : Grouping
-        Cycles are taken whole, in runs of neighbours: a part of a cycle is not like the rest.
-        Of recordings and blocks the first and the last part is taken, so that whatever changes
-        at some time is seen on its own side of a sealed neighbour.
+        Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks
+        the first and the last part is taken, so that whatever changes at some time is seen on
+        its own side of a sealed neighbour.
     groups : sequence of int
         The open ones, in time order.
 
@@ -51,7 +50,7 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     sizes = np.bincount(track.group[member], minlength=len(grouping.names))
     count = min(max(int(len(groups) * share), FEWEST_GROUPS), len(groups))
     whole = grouping.kind == "cycles"
-    picks = _runs(groups, count, RUN if whole else 1)
+    picks = [groups[i] for i in np.linspace(0, len(groups) - 1, count).round().astype(int)]
     budget = share * float(sizes[list(groups)].sum()) / len(picks)
     pieces: Pieces = []
     for group in picks:
@@ -72,13 +71,6 @@ def whole_groups(track: Track, groups: Sequence[int]) -> Pieces:
         rows = np.flatnonzero(track.group == group)
         pieces.append((int(rows[0]), int(rows[-1]) + 1))
     return pieces
-
-
-def _runs(groups: Sequence[int], count: int, run: int) -> list[int]:
-    """Pick about `count` groups in evenly spread runs of neighbours."""
-    starts = np.linspace(0, len(groups) - run, max(count // run, 1)).round().astype(int)
-    places = np.unique((starts[:, None] + np.arange(run)).clip(0, len(groups) - 1))
-    return [groups[place] for place in places]
 
 
 def cut(track: Track, pieces: Pieces) -> Track:
