@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.joint.change.lines import strokes
-from opamc_cli.joint.change.slow import Population, Shift
+from opamc_cli.joint.change.slow import Population, Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.domains import hats
 from opamc_cli.joint.spectra import highest_order
@@ -62,9 +62,7 @@ def energy_of(
     moved = np.zeros(len(units))
     left = np.zeros(len(units))
     for k, unit in enumerate(units):
-        current = unit.current_a(fine=True)
-        if shift is not None and unit.after:
-            current = current - unit.stacked(shift.terms, fine=True) @ shift.coefficients
+        current = without(unit, shift)
         residual = own_fit(unit, population.terms, fine=True, current=current)[1]
         model = unit.stacked(population.terms, fine=True) @ population.mean
         left[k] = np.mean(residual**2)

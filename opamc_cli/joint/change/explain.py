@@ -148,20 +148,20 @@ def explain_change(
         side = "target" if before else "baseline"
         return Change((), 0.0, 0.0, False, why_not=f"too little motion in the {side}")
     terms = usable_terms(before + after, [effect_named(library, name) for name in declared])
-    before, after = followed(before, terms), followed(after, terms)
-    if len(before) < 2:
-        why = "the baseline has fewer than two cycles or recordings that can be followed"
+    before, after = followed(before, after, terms)
+    if len(before) < 2 or not after:
+        why = "too few cycles or recordings whose torque axis can be followed"
         return Change((), 0.0, 0.0, False, why_not=why)
     population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
     units = [unit.with_model(terms, population.mean) for unit in before + after]
 
-    plain, white = fast_residuals(units, terms)
+    slow = find_slow_causes(units, population, library)
+    plain, white = fast_residuals(units, terms, slow[-1].shift if slow else None)
     spectra = order_spectra(units, white)
     reading = None
     if spectra is not None:
         lines = grown_lines(spectra, LINES_DIFFER if cycles else 0.0)
         reading = read_lines(lines, units[0].fine, spectra.resolution)
-    slow = find_slow_causes(units, population, library)
 
     energy = energy_of(units, population, slow_found=bool(slow))
     causes = _slow_entries(units, population, energy, slow, library)

@@ -8,6 +8,7 @@ from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.change.moderated import moderated_t
+from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.model import Term
 from opamc_cli.joint.spectra import LOWEST_ORDER, highest_order
@@ -74,15 +75,25 @@ class Line:
     p_value: float
 
 
-def fast_residuals(units: list[Unit], terms: tuple[Term, ...]) -> tuple[list[Floats], list[Floats]]:
+def fast_residuals(
+    units: list[Unit], terms: tuple[Term, ...], shift: Shift | None
+) -> tuple[list[Floats], list[Floats]]:
     """Residuals of every unit's own fit on the full grid, plain and whitened; zero elsewhere.
 
-    The whitening filter is the baseline's.
+    Parameters
+    ----------
+    units : list of Unit
+        Of both sides; the whitening filter is the baseline's.
+    terms : tuple of Term
+        The joint's model.
+    shift : Shift or None
+        Slow effects that are taken from the target's current first.
     """
     plain = []
     for unit in units:
         full = np.zeros(unit.fine.size)
-        full[unit.fine_rows] = own_fit(unit, terms, fine=True)[1]
+        current = without(unit, shift)
+        full[unit.fine_rows] = own_fit(unit, terms, fine=True, current=current)[1]
         plain.append(full)
     old = [k for k, unit in enumerate(units) if not unit.after]
     taps = autoregression(

@@ -25,7 +25,7 @@ NO_CAUSE_OF_CHANGE = frozenset(
 a test of its own; a warm-up and a Stribeck curve are friction whose form a change is too small
 to show."""
 
-PLACE_BOUND = frozenset({"position_drag", "spring", "hysteresis"})
+PLACE_BOUND = frozenset({"spring", "hysteresis"})
 """Not sought where the phases alone give the place: it has no zero there."""
 
 EXPECTED = ("payload_change", "offset", "viscous", "coulomb")
@@ -38,14 +38,17 @@ LARGEST_P = 0.01
 PLANNED_P = 0.05
 """Where the logged temperature has left the baseline's range, one effect is expected."""
 
-TIE_RATIO = 30.0
+SMALLEST_GAIN = 0.03
+"""What explains less of the slow change is not worth a maintainer's time."""
+
+AS_GOOD, NEARLY_AS_GOOD = 0.95, 0.85
 COLLINEAR = 0.6
 SMALLEST_SHIFT = 0.02
 """A shift below this share of the slow current's root mean square is of no interest."""
 
 MOST_CAUSES = 3
-STEEPEST_PER_C = 0.08
-"""Viscosity halves over 9 degrees at most."""
+STEEPEST_PER_C = 0.06
+"""Viscosity halves over 12 degrees at most."""
 
 SMALLEST_WARMTH_C = 2.0
 LARGEST_COLD_FACTOR = 2.0
@@ -102,14 +105,16 @@ def find_slow_causes(
     found: list[SlowCause] = []
     gone: set[str] = set()
     for _ in range(MOST_CAUSES):
-        chosen = tuple(cause.shift.terms[-1] for cause in found)
-        cause = _next(ready, population, chosen, candidates, library)
+        before = found[-1].shift if found else None
+        cause = _next(ready, population, before, candidates, library)
         if cause is None:
             break
-        found = [*_still_needed(ready, population, found, cause), cause]
+        found = _in_turn(
+            ready, population, [*_still_needed(ready, population, found, cause), cause]
+        )
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         candidates = [term for term in candidates if term.effect.name not in gone]
-    return _in_turn(ready, population, found)
+    return found
 
 
 def _still_needed(
@@ -143,10 +148,11 @@ def _in_turn(
 def _next(
     ready: list[Prepared],
     population: Population,
-    chosen: tuple[Term, ...],
+    before: Shift | None,
     candidates: list[Term],
     library: Library,
 ) -> SlowCause | None:
+    chosen = before.terms if before is not None else ()
     guesses: dict[str, int] = {}
     for term in candidates:
         guesses[term.effect.name] = guesses.get(term.effect.name, 0) + 1
@@ -162,24 +168,30 @@ def _next(
     expected = None if chosen else _expected(ready, population, best)
     if expected is not None:
         return expected
-    name = min(best, key=lambda key: best[key][0])
-    p_value, shift = best[name]
-    if p_value > LARGEST_P:
+    sure = {name: entry for name, entry in best.items() if entry[0] <= LARGEST_P}
+    if not sure:
         return None
-    own = _contribution(ready, shift)
-    alike = [
-        other
-        for other, (value, rival) in best.items()
-        if value <= TIE_RATIO * max(p_value, 1e-12)
-        and _correlation(own, _contribution(ready, rival)) > COLLINEAR
-    ]
-    first = next((other for other in EXPECTED if other in alike), name)
-    ties = tuple(other for other in alike if other != first)
-    p_value, shift = best[first]
+    left = _left(ready, before)
+    gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
+    most = max(gains.values())
+    if most < SMALLEST_GAIN * _changed(ready):
+        return None
+    # Among those that explain the change equally well, the simplest is named.
+    as_good = [name for name, gain in gains.items() if gain >= AS_GOOD * most]
+    first = min(as_good, key=lambda name: (sure[name][1].width, _rank(name), sure[name][0]))
+    own = _contribution(ready, sure[first][1])
+    ties = tuple(
+        name
+        for name in gains
+        if name != first
+        and gains[name] >= NEARLY_AS_GOOD * gains[first]
+        and _correlation(own, _contribution(ready, sure[name][1])) > COLLINEAR
+    )
+    p_value, shift = sure[first]
     cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
     if first == "payload_change":
         return _payload(cause)
-    if {first, *ties} & FRICTION:
+    if "viscous" in (first, *ties):
         return _friction(ready, population, cause, library)
     return cause
 
@@ -300,3 +312,25 @@ def _size(ready: list[Prepared], shift: Shift) -> float:
 def _correlation(one: Floats, other: Floats) -> float:
     product = float(np.sqrt(np.dot(one, one) * np.dot(other, other)))
     return float(np.dot(one, other)) / product if product > 0 else 0.0
+
+
+def _left(ready: list[Prepared], shift: Shift | None) -> float:
+    """Compute the target's mean square beyond the baseline's mean model and a shift."""
+    found = []
+    for one in ready:
+        if one.unit.after:
+            rest = one.residual
+            if shift is not None:
+                rest = rest - one.unit.stacked(shift.terms) @ shift.coefficients
+            found.append(float(np.mean(rest**2)))
+    return float(np.mean(found))
+
+
+def _changed(ready: list[Prepared]) -> float:
+    """Compute how much more of it there is than in the baseline."""
+    usual = float(np.mean([np.mean(one.residual**2) for one in ready if not one.unit.after]))
+    return max(_left(ready, None) - usual, 0.0)
+
+
+def _rank(name: str) -> int:
+    return EXPECTED.index(name) if name in EXPECTED else len(EXPECTED)

@@ -66,12 +66,15 @@ class Shift:
         Of these.
     p_value : float
         Of the last term beside the others.
+    width : int
+        Number of the last term's columns.
     """
 
     terms: tuple[Term, ...]
     coefficients: Floats
     covariance: Floats
     p_value: float
+    width: int
 
 
 @dataclass(frozen=True)
@@ -178,7 +181,7 @@ def shifts(
         own = units[0].unit.columns(candidate).shape[1]
         last = slice(shift.size - own, shift.size)
         p_value = shift_p(shift[last], covariance[last, last], len(before))
-        found.append(Shift(terms, shift, covariance, p_value))
+        found.append(Shift(terms, shift, covariance, p_value, own))
     return sorted(found, key=lambda one: one.p_value)
 
 
@@ -207,3 +210,12 @@ def slow_candidates(units: list[Unit], effects: list[Effect]) -> list[Term]:
             guesses = effect.guesses(track, np.zeros(track.size))
             found += [Term(effect, guess) for guess in guesses]
     return found
+
+
+def without(unit: Unit, shift: Shift | None) -> Floats:
+    """Take a shift from the target's current, on the fine grid; the baseline has none."""
+    current = unit.current_a(fine=True)
+    if shift is None or not unit.after:
+        return current
+    rest: Floats = current - unit.stacked(shift.terms, fine=True) @ shift.coefficients
+    return rest

@@ -14,7 +14,7 @@ from opamc_cli.joint.track import Bools, Floats, Joint, Track, averaged, block_m
 COARSE_RATE_HZ = 100.0
 FEWEST_SAMPLES = 10
 
-LOST = 2.5
+LOST = 2.0
 """Phases whose torque axis was followed wrongly leave this many times the usual residual."""
 
 
@@ -170,10 +170,69 @@ def own_fit(
     return coefficients, residual
 
 
-def followed(units: list[Unit], terms: tuple[Term, ...]) -> list[Unit]:
-    """Units whose torque axis was followed; where motion was logged, all of them."""
-    if not units or "logged" in units[0].fine.channels:
+def followed(
+    before: list[Unit], after: list[Unit], terms: tuple[Term, ...]
+) -> tuple[list[Unit], list[Unit]]:
+    """Set right, or leave out, the units whose torque axis was followed wrongly.
+
+    Phases alone lose the side of the torque axis where there is no current for a while. The
+    baseline's units that fit well tell the side of every stretch of motion in the others; what
+    still fits badly is left out. Where motion was logged, nothing is lost.
+
+    Parameters
+    ----------
+    before, after : list of Unit
+        Baseline and target.
+    terms : tuple of Term
+        The joint's model.
+
+    Returns
+    -------
+    before, after : list of Unit
+    """
+    if not before or "logged" in before[0].fine.channels:
+        return before, after
+    before = _agreeing(before, terms)
+    usual = float(np.quantile([_rms(unit, terms) for unit in before], 0.25))
+    model = np.median(
+        [own_fit(unit, terms)[0] for unit in before if _rms(unit, terms) <= LOST * usual], axis=0
+    )
+    after = _agreeing([_better(unit, terms, model) for unit in after], terms)
+    # A changed joint may leave more everywhere: the target has a usual residual of its own.
+    limit = LOST * max(usual, min((_rms(unit, terms) for unit in after), default=usual))
+    return (
+        [unit for unit in before if _rms(unit, terms) <= LOST * usual],
+        [unit for unit in after if _rms(unit, terms) <= limit],
+    )
+
+
+def _agreeing(units: list[Unit], terms: tuple[Term, ...]) -> list[Unit]:
+    """Set the sides of all units by the model of the one that fits best."""
+    if not units:
         return units
-    left = np.array([np.sqrt(np.mean(own_fit(unit, terms)[1] ** 2)) for unit in units])
-    usual = float(np.quantile(left, 0.25))
-    return [unit for unit, rms in zip(units, left, strict=True) if rms <= LOST * usual]
+    best = min(units, key=lambda unit: _rms(unit, terms))
+    model = own_fit(best, terms)[0]
+    return [_better(unit, terms, model) for unit in units]
+
+
+def _better(unit: Unit, terms: tuple[Term, ...], model: Floats) -> Unit:
+    return min((unit, _sided(unit, terms, model)), key=lambda one: _rms(one, terms))
+
+
+def _rms(unit: Unit, terms: tuple[Term, ...]) -> float:
+    return float(np.sqrt(np.mean(own_fit(unit, terms)[1] ** 2)))
+
+
+def _sided(unit: Unit, terms: tuple[Term, ...], coefficients: Floats) -> Unit:
+    """Turn every stretch of motion to the side on which it agrees with a model."""
+    track = unit.fine
+    model = np.concatenate([term.columns(track) for term in terms], axis=1) @ coefficients
+    edges = np.flatnonzero(np.diff(track.moving.astype(np.int8), prepend=0, append=0))
+    side = np.ones(track.size)
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if float(np.dot(track.current_a[start:stop], model[start:stop])) < 0:
+            side[start:stop] = -1.0
+    if np.all(side > 0):
+        return unit
+    fine = replace(track, current_a=side * track.current_a)
+    return replace(unit, fine=fine, coarse=coarsen(fine, unit.factor))

@@ -1,0 +1,152 @@
+"""How often the cause of a change is named rightly, and a healthy joint is left in peace.
+
+    python benchmarks/cause.py --quick
+    python benchmarks/cause.py --first-seed 14000 --seeds 30 --write   # and docs/validation.md
+
+Every pair holds six baseline and two target sessions of one joint; what changed between them is
+known. Half of the pairs are the virtual robot's (axis and speed follow from the seed), half the
+tests' own simulator's. Tuning used seeds below 100.
+"""
+
+import argparse
+import time
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from change_pairs import JOINT_CHANGES, ROBOT_CHANGES, Pair, joint_pair, robot_pair
+
+from opamc_cli.joint.change.explain import BENIGN, FAULT_SHARE, Change, explain_change
+
+ROOT = Path(__file__).resolve().parents[1]
+BEGIN, END = "<!-- cause: begin -->", "<!-- cause: end -->"
+
+EXPECTED = {
+    "nothing": None,
+    "flexspline 0.5": "ripple",
+    "flexspline 1": "ripple",
+    "tooth": "ripple",
+    "ripple": "ripple",
+    "colder": "thermal_viscous",
+    "payload": "payload_change",
+    "coulomb": "coulomb",
+    "viscous": "viscous",
+    "offset": "offset",
+    "position drag": "position_drag",
+}
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was said of one pair."""
+
+    named: bool
+    right: bool
+    harmless: bool
+    wrong_fault: bool
+    share: float
+
+
+def judged(pair: Pair, change: Change) -> Outcome:
+    """Hold what was said against what was true."""
+    expected = EXPECTED[pair.name]
+    first = change.causes[0] if change.causes else None
+    right = expected is None and first is None
+    if first is not None and expected is not None:
+        right = expected in (first.effect, *first.ties)
+        if pair.name.startswith(("flexspline", "tooth")):
+            said = " ".join((first.interpretation, *first.ties))
+            right = right and "flexspline" in said
+        elif pair.name == "ripple":
+            right = right and "flexspline" not in first.interpretation
+    wrong = any(
+        cause.effect not in BENIGN
+        and cause.share >= FAULT_SHARE
+        and expected not in (cause.effect, *cause.ties)
+        for cause in change.causes
+    )
+    return Outcome(
+        named=first is not None,
+        right=right,
+        harmless=change.benign,
+        wrong_fault=wrong and not change.benign,
+        share=first.share if first is not None and right else float("nan"),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--seeds", type=int, default=12)
+    parser.add_argument("--first-seed", type=int, default=14000)
+    parser.add_argument("--quick", action="store_true", help="three seeds")
+    parser.add_argument("--only", help="changes, separated by commas")
+    parser.add_argument("--source", choices=("robot", "joint"))
+    parser.add_argument("--mode", choices=("position", "phases"))
+    parser.add_argument("--verbose", action="store_true", help="print every pair that went wrong")
+    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
+    arguments = parser.parse_args()
+    began = time.time()
+    count = 3 if arguments.quick else arguments.seeds
+    seeds = range(arguments.first_seed, arguments.first_seed + count)
+    lines = [
+        "| source | logged | change | named | right, or a tie that holds it | said to be harmless "
+        "| wrong fault | share of the change |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    print("\n".join(lines))
+    spent: list[float] = []
+    for source, changes, make in (
+        ("robot", ROBOT_CHANGES, robot_pair),
+        ("joint", JOINT_CHANGES, joint_pair),
+    ):
+        for mode in ("position", "phases"):
+            if arguments.source not in (None, source) or arguments.mode not in (None, mode):
+                continue
+            for name in changes:
+                if arguments.only and name not in arguments.only.split(","):
+                    continue
+                outcomes = []
+                for seed in seeds:
+                    pair = make(name, seed, mode == "position")
+                    start = time.perf_counter()
+                    change = explain_change(pair.baseline, pair.target, pair.joint)
+                    spent.append(time.perf_counter() - start)
+                    outcomes.append(judged(pair, change))
+                    if arguments.verbose and (not outcomes[-1].right or outcomes[-1].wrong_fault):
+                        said = [
+                            (c.effect, round(c.share, 2), f"{c.p_value:.0e}", c.ties)
+                            for c in change.causes
+                        ]
+                        print(f"  {name} {seed}: {said} {change.why_not or ''}", flush=True)
+                lines.append(_row(source, mode, name, outcomes))
+                print(lines[-1], flush=True)
+    print(f"{np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most")
+    print(f"{time.time() - began:.0f} s in all")
+    if arguments.write:
+        path = ROOT / "docs" / "validation.md"
+        before, rest = path.read_text().split(BEGIN)
+        note = (
+            f"Seeds {seeds.start} to {seeds.stop - 1}: six baseline and two target sessions a "
+            f"pair; {np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most. "
+            "`python benchmarks/cause.py --write` makes this section."
+        )
+        section = "\n".join([BEGIN, "", note, "", *lines, "", END])
+        path.write_text(before + section + rest.split(END)[1])
+
+
+def _row(source: str, mode: str, name: str, outcomes: list[Outcome]) -> str:
+    counts: dict[str, int] = defaultdict(int)
+    for outcome in outcomes:
+        for key in ("named", "right", "harmless", "wrong_fault"):
+            counts[key] += getattr(outcome, key)
+    shares = [outcome.share for outcome in outcomes if np.isfinite(outcome.share)]
+    share = f"{np.median(shares):.0%}" if shares else "–"
+    n = len(outcomes)
+    columns = [f"{counts[key]}/{n}" for key in ("named", "right", "harmless", "wrong_fault")]
+    logged = {"position": "position", "phases": "phases alone"}[mode]
+    return f"| {source} | {logged} | {name} | {' | '.join(columns)} | {share} |"
+
+
+if __name__ == "__main__":
+    main()
