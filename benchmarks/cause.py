@@ -11,7 +11,7 @@ tests' own simulator's. Tuning used seeds below 100.
 import argparse
 import time
 from collections import defaultdict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +82,6 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="three seeds")
     parser.add_argument("--only", help="changes, separated by commas")
     parser.add_argument("--source", choices=("robot", "joint"))
-    parser.add_argument("--mode", choices=("position", "phases"))
     parser.add_argument("--verbose", action="store_true", help="print every pair that went wrong")
     parser.add_argument("--write", action="store_true", help="update docs/validation.md")
     arguments = parser.parse_args()
@@ -96,30 +95,28 @@ def main() -> None:
     ]
     print("\n".join(lines))
     spent: list[float] = []
-    for source, changes, make in (
-        ("robot", ROBOT_CHANGES, robot_pair),
-        ("joint", JOINT_CHANGES, joint_pair),
-    ):
-        for mode in ("position", "phases"):
-            if arguments.source not in (None, source) or arguments.mode not in (None, mode):
+    for source, changes in (("robot", ROBOT_CHANGES), ("joint", JOINT_CHANGES)):
+        for name in changes:
+            if arguments.source not in (None, source):
                 continue
-            for name in changes:
-                if arguments.only and name not in arguments.only.split(","):
-                    continue
-                outcomes = []
-                for seed in seeds:
-                    pair = make(name, seed, mode == "position")
+            if arguments.only and name not in arguments.only.split(","):
+                continue
+            outcomes: dict[str, list[Outcome]] = {"position": [], "phases": []}
+            for seed in seeds:
+                for mode, pair in _pairs(source, name, seed):
                     start = time.perf_counter()
                     change = explain_change(pair.baseline, pair.target, pair.joint)
                     spent.append(time.perf_counter() - start)
-                    outcomes.append(judged(pair, change))
-                    if arguments.verbose and (not outcomes[-1].right or outcomes[-1].wrong_fault):
+                    outcome = judged(pair, change)
+                    outcomes[mode].append(outcome)
+                    if arguments.verbose and (not outcome.right or outcome.wrong_fault):
                         said = [
                             (c.effect, round(c.share, 2), f"{c.p_value:.0e}", c.ties)
                             for c in change.causes
                         ]
-                        print(f"  {name} {seed}: {said} {change.why_not or ''}", flush=True)
-                lines.append(_row(source, mode, name, outcomes))
+                        print(f"  {name} {seed} {mode}: {said} {change.why_not or ''}", flush=True)
+            for mode, found in outcomes.items():
+                lines.append(_row(source, mode, name, found))
                 print(lines[-1], flush=True)
     print(f"{np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most")
     print(f"{time.time() - began:.0f} s in all")
@@ -133,6 +130,21 @@ def main() -> None:
         )
         section = "\n".join([BEGIN, "", note, "", *lines, "", END])
         path.write_text(before + section + rest.split(END)[1])
+
+
+def _pairs(source: str, name: str, seed: int) -> list[tuple[str, Pair]]:
+    """Return a pair with position and temperature logged, and one with phases alone."""
+    if source == "joint":
+        return [
+            ("position", joint_pair(name, seed, True)),
+            ("phases", joint_pair(name, seed, False)),
+        ]
+    pair = robot_pair(name, seed)
+    alone = [
+        [replace(one, position_rad=None, temperature_c=None) for one in side]
+        for side in (pair.baseline, pair.target)
+    ]
+    return [("position", pair), ("phases", replace(pair, baseline=alone[0], target=alone[1]))]
 
 
 def _row(source: str, mode: str, name: str, outcomes: list[Outcome]) -> str:

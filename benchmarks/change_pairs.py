@@ -55,7 +55,7 @@ ROBOT_CHANGES = (
 """What happens to the virtual robot's joint between baseline and target."""
 
 
-def robot_pair(change: str, seed: int, position: bool) -> Pair:
+def robot_pair(change: str, seed: int) -> Pair:
     """Record one joint of the virtual robot in several sessions before and after a change.
 
     Parameters
@@ -64,8 +64,11 @@ def robot_pair(change: str, seed: int, position: bool) -> Pair:
         One of `ROBOT_CHANGES`.
     seed : int
         Of the robot; axis and speed follow from it.
-    position : bool
-        Whether joint position and temperature are logged beside the phases.
+
+    Returns
+    -------
+    Pair
+        With phases, position and temperature.
     """
     config = load_testbed(ROOT / "configs" / "testbed.yaml")
     robot = config.robot
@@ -112,8 +115,8 @@ def robot_pair(change: str, seed: int, position: bool) -> Pair:
             name=f"session-{session:03d}",
             rate_hz=RATE_HZ,
             phases_a=made.phases_a.astype(np.float64),
-            position_rad=made.position_rad if position else None,
-            temperature_c=made.temperature_c.astype(np.float64) if position else None,
+            position_rad=made.position_rad,
+            temperature_c=made.temperature_c.astype(np.float64),
         )
 
     sessions = range(BASELINE_SESSIONS + TARGET_SESSIONS)

@@ -151,8 +151,9 @@ def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[Render
     from opamc_cli.stages.report import wording
 
     sentences = [str(r) for r in entry.get("reasons", ()) if str(r) not in said_below]
-    if entry.get("cause"):
-        sentences.append(f"cause: {wording.cause_phrase(entry['cause'])}")
+    cause = entry.get("cause")
+    if cause and not any(str(cause.get("interpretation")) in said for said in sentences):
+        sentences.append(f"cause: {wording.cause_phrase(cause)}")
     advice = wording.advice(entry)
     if advice:
         sentences.append(advice)

@@ -17,19 +17,19 @@ INSPECT = (
     "current sensor."
 )
 FOUND = (
-    "What changed is read as {}. After that look at the rest of the strain wave gear, brake, "
-    "motor connector and current sensor."
+    "It looks like {}. After that look at the rest of the strain wave gear, brake, motor connector "
+    "and current sensor."
 )
 REPEAT = (
-    "Repeat the recording under the baseline's conditions before taking the joint apart: what is "
-    "found is the effect in the current, not the part that is worn."
+    "Repeat the recording under the baseline's conditions before taking the joint apart: the "
+    "current shows an effect, not the part that is worn."
 )
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
 CHECK_FIRST = (
-    "The change looks like {}: check that before the gear, and record a new baseline if it is "
-    "meant to stay."
+    "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
+    "stay."
 )
 CANNOT_TELL = (
     "The patterns say that the torque's course has changed, not what changed it: another payload, "
@@ -79,6 +79,8 @@ def reasons(
         meaning = cause.get("interpretation") or cause.get("effect")
         known = [CHECK_FIRST] if cause.get("harmless") else [FOUND, REPEAT]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
+        if cause.get("harmless") and judgement.state == "fault":
+            sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]
     return [*sentences, *_short(cells)]

@@ -13,7 +13,7 @@ from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.joint.track import Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 
@@ -32,6 +32,7 @@ LINES_DIFFER = 0.3**2
 SMALLEST_LINE_SHARE = 0.15
 """A line of unknown meaning that carries less of the fast change is a part of something else."""
 
+SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
 
@@ -164,10 +165,14 @@ def explain_change(
         reading = read_lines(lines, units[0].fine, spectra.resolution)
 
     energy = energy_of(units, population, slow_found=bool(slow))
-    causes = _slow_entries(units, population, energy, slow, library)
-    ripple = _ripple_entry(units, plain, energy, reading, library)
-    if ripple is not None:
-        causes.append(ripple)
+    held = comb_energy(units, plain, reading.fundamental) if reading is not None else 0.0
+    # A line stands out of the spectrum before it stands out of the whole mean square.
+    whole = max(energy.slow + max(energy.fast, held), SMALLEST_POWER)
+    causes = _slow_entries(units, population, energy, whole, slow, library)
+    if reading is not None and reading.effect in library:
+        carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
+        if reading.known or carries:
+            causes.append(_ripple_entry(reading, held / whole, library))
     causes = sorted(
         (cause for cause in causes if cause.share >= SMALLEST_SHARE), key=lambda one: -one.share
     )
@@ -175,7 +180,7 @@ def explain_change(
     harmful = sum(cause.share for cause in causes if not cause.benign)
     return Change(
         causes=tuple(causes),
-        excess_a=float(np.sqrt(energy.total)),
+        excess_a=float(np.sqrt(whole)) if causes else float(np.sqrt(energy.total)),
         explained_share=min(harmless + harmful, 1.0),
         benign=harmless >= BENIGN_SHARE and harmful < FAULT_SHARE,
         units=(len(before), len(after)),
@@ -188,6 +193,7 @@ def _slow_entries(
     units: list[Unit],
     population: Population,
     energy: Energy,
+    whole: float,
     slow: list[SlowCause],
     library: Library,
 ) -> list[Cause]:
@@ -195,7 +201,7 @@ def _slow_entries(
     left = energy.total
     for found in slow:
         rest = energy_of(units, population, True, found.shift).total
-        share = float(np.clip((left - rest) / energy.total, 0.0, 1.0)) if energy.total > 0 else 0.0
+        share = float(np.clip((left - rest) / whole, 0.0, 1.0))
         left = min(left, rest)
         effect = library[found.effect]
         causes.append(
@@ -214,25 +220,13 @@ def _slow_entries(
     return causes
 
 
-def _ripple_entry(
-    units: list[Unit],
-    plain: list[Floats],
-    energy: Energy,
-    reading: Reading | None,
-    library: Library,
-) -> Cause | None:
-    if reading is None or reading.effect not in library:
-        return None
-    held = comb_energy(units, plain, reading.fundamental)
-    whole = max(energy.total, held, 1e-300)
-    if not reading.known and held < SMALLEST_LINE_SHARE * max(energy.fast, held, 1e-300):
-        return None
+def _ripple_entry(reading: Reading, share: float, library: Library) -> Cause:
     return Cause(
         effect=reading.effect,
         domain=library[reading.effect].domain,
         parameters=reading.parameters,
         interpretation=reading.interpretation,
-        share=held / whole,
+        share=share,
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
         benign=reading.effect in BENIGN,

@@ -11,13 +11,14 @@ from opamc_cli.joint.effects.ripple import read_order
 from opamc_cli.joint.track import Track
 
 HARMONICS = 12
+SHORTEST_COMB = 3
 USUAL_POLE_PAIRS = range(2, 13)
 USUAL_RATIO = 100.0
 SMALLEST_RATIO = 30.0
 """Gear ratio assumed where none is known, and the smallest of strain wave gears."""
 
-CIRCULAR_BELOW = 0.2
-"""Lines nearer than this to whole orders, on the way to the flexspline's, speak for those."""
+CIRCULAR_BELOW = 0.5
+"""Lines surely nearer to whole orders (0) than to the flexspline's (1) are read as whole ones."""
 
 SIDE_RESOLUTIONS = 4.0
 """A damaged mesh has play that the load closes: as the load changes along a stroke, the line of
@@ -86,7 +87,8 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
         return electrical
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
-        if lines[0] in wave:
+        # One line is enough if it is the strongest; a comb speaks for itself.
+        if lines[0] in wave or len(wave) >= SHORTEST_COMB:
             return _wave_generator(wave, track, resolution, poles)
     return electrical
 
@@ -147,7 +149,7 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
     cycles = _near(first, poles, track, 0.25) or 2
     measured = 2 * _corrected(first, poles) / cycles
     # What grows between two recordings is rather damage: in doubt the flexspline is named first.
-    if place > CIRCULAR_BELOW or doubt > 1.0:
+    if place + doubt > CIRCULAR_BELOW:
         interpretation = FLEXSPLINE
         ties = () if place - 2 * doubt > 0 else (KINEMATIC_TIE,)
         order = 2 * (ratio + 1) / ratio if ratio else measured
@@ -182,7 +184,9 @@ def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> 
         if k is not None:
             apart = k / ratio
             places.append((_corrected(line, poles) - k) / apart)
-            weights.append((apart / _error(line, poles, resolution)) ** 2)
+            # the lag that moves a line grows with its frequency
+            error = _error(line, poles, resolution) * max(k / 2, 1.0)
+            weights.append((apart / error) ** 2)
     if not places:
         return 0.5, math.inf
     return float(np.average(places, weights=weights)), float(1 / np.sqrt(np.sum(weights)))

@@ -198,7 +198,7 @@ def _next(
 
 def _payload(cause: SlowCause) -> SlowCause:
     return SlowCause(
-        cause.effect, {}, "the payload has changed: check the tool, not the gear", cause.shift,
+        cause.effect, {}, "another payload (check the tool, not the gear)", cause.shift,
         cause.p_value, cause.ties,
     )  # fmt: skip
 
@@ -244,15 +244,13 @@ def _thermal(
 ) -> SlowCause:
     if warmer is None:
         note = (
-            "friction that grows with the speed has changed, as it does in colder or warmer "
-            "grease; no temperature was logged: compare at equal temperature, and look at the "
-            "grease if it remains"
+            "colder or warmer grease: friction that grows with the speed has changed (no "
+            "temperature was logged: compare at equal temperature, and look at the grease if it "
+            "remains)"
         )
         return SlowCause("thermal_viscous", {}, note, shift, p_value, ties)
     word = "warmer" if warmer > 0 else "colder"
-    note = (
-        f"the joint was {abs(warmer):.0f} °C {word}, and grease is stiffer when cold: not a fault"
-    )
+    note = f"{word} grease (by {abs(warmer):.0f} °C; it is stiffer when cold), not a fault"
     parameters = {"warmer_c": warmer}
     return SlowCause("thermal_viscous", parameters, note, shift, p_value, ties)
 

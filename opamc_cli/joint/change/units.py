@@ -108,7 +108,8 @@ def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bo
             at = track.position_rad[track.moving]
             middle = 0.5 * float(np.min(at) + np.max(at))
             track = replace(track, position_rad=track.position_rad - middle)
-        fine = replace(track, group=grouping.group)
+        group = grouping.group if cycles else np.where(grouping.group >= 0, 0, -1)
+        fine = replace(track, group=group)
         width = 1.0 / float(np.sum(fine.kernel**2))
         factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), fine.quiet, 1)
         coarse = coarsen(fine, factor)
