@@ -1,6 +1,7 @@
 """What is compared as a whole: a recording session, or a cycle where there are too few of those."""
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -228,9 +229,11 @@ def _sided(unit: Unit, terms: tuple[Term, ...], coefficients: Floats) -> Unit:
     """Turn every stretch of motion to the side on which it agrees with a model."""
     track = unit.fine
     model = np.concatenate([term.columns(track) for term in terms], axis=1) @ coefficients
-    edges = np.flatnonzero(np.diff(track.moving.astype(np.int8), prepend=0, append=0))
+    # The side is lost at rest, or where the torque passes zero.
+    stretch = np.where(track.moving, np.sign(model), 0.0)
+    edges = np.flatnonzero(np.diff(stretch, prepend=0.0, append=0.0))
     side = np.ones(track.size)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in pairwise(edges):
         if float(np.dot(track.current_a[start:stop], model[start:stop])) < 0:
             side[start:stop] = -1.0
     if np.all(side > 0):
