@@ -18,6 +18,9 @@ MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
 much better from more."""
 
+WELL_EXPLAINED = 0.8
+"""Below this share the reasons say how much of the change is unexplained."""
+
 
 def explain(
     axis: int,
@@ -114,7 +117,7 @@ def _why(cause: Cause, change: Change) -> list[str]:
         turn = "turn of the motor" if change.angle == "motor" else f"{change.angle} revolution"
         sentences.append(
             f"Torque ripple at {seen['measured_order']:.4g} ± {seen['order_error']:.1g} per {turn} "
-            f"has grown {seen['power_ratio']:.3g}-fold in power over the baseline's {kind}; "
+            f"has {seen['power_ratio']:.3g} times the power that it has in the baseline's {kind}; "
             f"two orders must differ by {seen['order_resolution']:.2g} to be told apart within a "
             "stroke."
         )
@@ -126,6 +129,13 @@ def _why(cause: Cause, change: Change) -> list[str]:
     )
     if cause.ties:
         sentences.append(f"The recordings cannot tell it from: {'; '.join(cause.ties)}.")
+    others = [f"{_effect_name(other)} ({other.share:.0%})" for other in change.causes[1:]]
+    if others:
+        sentences.append(f"Besides: {', '.join(others)}.")
+    if change.explained_share < WELL_EXPLAINED:
+        sentences.append(
+            f"{1 - change.explained_share:.0%} of the change has no cause in the library."
+        )
     if not change.sessions:
         sentences.append(
             "With fewer than three baseline recordings it is assumed, not known, how much healthy "

@@ -29,7 +29,7 @@ EITHER = (
     "kinematic error, twice per wave generator turn, that has grown, or flexspline tooth damage "
     "(2(N+1)/N): inspect wave generator and flexspline"
 )
-KINEMATIC_TIE = "kinematic error of the wave generator (order 2)"
+KINEMATIC_TIE = "kinematic error of the wave generator (order 2), which does not grow by itself"
 FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
 
 
