@@ -21,7 +21,7 @@ install: $(STAMP)  ## Make the environment in .venv and install opamc into it
 
 demo: $(STAMP)  ## Diagnose data/samples; the report's path is printed
 	@$(BIN)/opamc diagnose --baseline data/samples/normal --target data/samples/fault \
-	  --out opamc-out --exit-zero
+	  --set joint.gear_ratio=100 --set joint.pole_pairs=5 --out opamc-out --exit-zero
 	@echo "open $(CURDIR)/opamc-out/report.html"
 
 test: $(STAMP)  ## Run the test suite on all cores
@@ -54,6 +54,7 @@ studies: $(STAMP)  ## The studies behind the documentation's figures; takes hour
 	$(BIN)/python benchmarks/boundaries.py --write
 	$(BIN)/python benchmarks/decision.py
 	$(BIN)/python benchmarks/loop.py
+	$(BIN)/python benchmarks/cause.py --seeds 30 --write
 
 clean:  ## Remove the environment and every output
 	rm -rf $(VENV) opamc-out build *.egg-info .pytest_cache .mypy_cache .ruff_cache

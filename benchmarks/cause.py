@@ -1,11 +1,12 @@
 """How often the cause of a change is named rightly, and a healthy joint is left in peace.
 
     python benchmarks/cause.py --quick
-    python benchmarks/cause.py --first-seed 14000 --seeds 30 --write   # and docs/validation.md
+    python benchmarks/cause.py --seeds 30 --write   # and docs/validation.md
 
 Every pair holds six baseline and two target sessions of one joint; what changed between them is
 known. Half of the pairs are the virtual robot's (axis and speed follow from the seed), half the
-tests' own simulator's. Tuning used seeds below 100.
+tests' own simulator's. Tuning used seeds below 100; 14000 to 14029 were begun and
+showed a mistake in the shares, so the default begins after them.
 """
 
 import argparse
@@ -78,7 +79,7 @@ def judged(pair: Pair, change: Change) -> Outcome:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=12)
-    parser.add_argument("--first-seed", type=int, default=14000)
+    parser.add_argument("--first-seed", type=int, default=14030)
     parser.add_argument("--quick", action="store_true", help="three seeds")
     parser.add_argument("--only", help="changes, separated by commas")
     parser.add_argument("--source", choices=("robot", "joint"))
