@@ -29,6 +29,7 @@ BATCH_VALUES = 1_000_000
 
 ROWS_AT_A_TIME = 16_384
 
+LEAST_DRIFT = 0.1
 BLOCKS_PER_GROUP = 8
 DECOY_BLOCKS_PER_GROUP = 2
 
@@ -183,7 +184,29 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
         )
     if valid.sum() < 0.2 * grid.fit.sum():
         return residual, grid.fit
+    if not fine:
+        _remove_drift(fit, noise, valid)
     return noise, valid
+
+
+def _remove_drift(fit: Fit, noise: Floats, valid: Bools) -> None:
+    """Take out of the noise, in place, the model's own regressors times a parabola of time.
+
+    Friction or load that drifts from cycle to cycle is what a slow effect looks like; counted as
+    the noise's colour it would hide itself. A drift below a tenth of the noise stays: slow noise
+    makes as much.
+    """
+    track = fit.session.coarse.track
+    columns = [fit.session.columns(term, fine=False)[valid] for term in fit.terms]
+    if not columns:
+        return
+    model = np.concatenate(columns, axis=1)
+    time = track.time_s[valid]
+    time = (time - time.mean()) / max(float(np.ptp(time)), 1e-9)
+    drift = np.concatenate([model * (time**power)[:, None] for power in range(3)], axis=1)
+    drifted = drift @ solve(drift.T @ drift, drift.T @ noise[valid])
+    if drifted @ drifted > LEAST_DRIFT * (noise[valid] @ noise[valid]):
+        noise[valid] -= drifted
 
 
 def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
