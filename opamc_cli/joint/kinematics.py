@@ -4,7 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.phases import PhaseAngle, follow_phases, side_of_torque, torque_current
+from opamc_cli.joint.groups import cycle_length
+from opamc_cli.joint.phases import (
+    PhaseAngle,
+    follow_phases,
+    side_of_torque,
+    torque_current,
+    without_slips,
+)
 from opamc_cli.joint.smoothing import (
     averaging_kernel,
     blurred,
@@ -319,6 +326,9 @@ def _one(recording: Recording, joint: Joint) -> Track:
         channels |= {"position", "scale", "logged"}
         kind = "joint"
     elif phase_angle is not None:
+        period = cycle_length(phase_angle.velocity_rad_s, rate)
+        if period is not None:
+            phase_angle = without_slips(phase_angle, period, rate)
         scale = 1.0
         kind = "electrical"
         if poles and ratio:

@@ -4,7 +4,7 @@ When the torque changes sign, the current vector's angle jumps by pi; the angle 
 does not. Half of that angle is the electrical angle, and the current along it has a sign.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,10 @@ LOST_S = 0.015
 
 SIDE_ROUNDS = 8
 BANDWIDTH_ROUNDS = 2
+CARRIER_OVER_BANDWIDTH = 2.0
+FEWEST_FAST_SAMPLES = 200
+FEWEST_CYCLES = 3
+LARGEST_DRIFT = 0.05
 
 NOISIEST_SHARE = 0.1
 """Noise of the acceleration, relative to the acceleration, up to which a sample counts."""
@@ -175,8 +179,12 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
     rough = np.concatenate([[0.0], np.angle(smooth)]) * rate_hz
     sure = np.concatenate([[False], coherence > 0.9]) & strong
-    measured = np.angle(vector)
     bandwidth = widest_bandwidth(rate_hz)
+    angle, velocity, acceleration = smoothed_angle(
+        np.angle(vector), strong, rough, sure, rate_hz, bandwidth
+    )
+    fast = strong & (np.abs(velocity) > CARRIER_OVER_BANDWIDTH * 2 * np.pi * bandwidth)
+    measured = np.angle(without_sensor_errors(vector, angle, fast))
     angle, velocity, acceleration = smoothed_angle(
         measured, strong, rough, sure, rate_hz, bandwidth
     )
@@ -197,7 +205,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     clear = strong & (per_radian * angle_noise <= limit)
     window = int(rate_hz / bandwidth) | 1
     # The measured angle, on the branch that was followed.
-    error = np.where(strong, np.angle(vector) - angle, 0.0)
+    error = np.where(strong, measured - angle, 0.0)
     path = angle + error - np.pi * np.round(error / np.pi)
     blur = np.stack(
         [
@@ -210,10 +218,105 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     return PhaseAngle(angle, velocity, acceleration, strong, clear, window, kernel, blur)
 
 
+def without_sensor_errors(
+    vector: NDArray[np.complex128], angle_rad: Floats, fast: Bools
+) -> NDArray[np.complex128]:
+    """Take zero errors and unequal gains of the sensors out of a current vector.
+
+    Both show in the flux current, once and twice per electrical revolution; at a low speed the
+    followed angle would sway with them.
+
+    Parameters
+    ----------
+    vector : complex array of shape (n,)
+        Clarke vector.
+    angle_rad : array of shape (n,)
+        Followed angle of the torque axis, modulo pi.
+    fast : bool array of shape (n,)
+        Samples at which the carrier is faster than the follower.
+
+    Returns
+    -------
+    complex array of shape (n,)
+        The vector itself where too few samples are fast.
+    """
+    if np.count_nonzero(fast) < FEWEST_FAST_SAMPLES:
+        return vector
+    rotated = vector[fast] * np.exp(-1j * angle_rad[fast])
+    torque, flux, angle = rotated.real, rotated.imag, angle_rad[fast]
+    columns = np.stack(
+        [
+            -np.sin(angle),
+            np.cos(angle),
+            -torque * np.sin(2 * angle),
+            torque * np.cos(2 * angle),
+            np.ones(angle.size),
+        ],
+        axis=1,
+    )
+    found = solve(columns.T @ columns, columns.T @ flux)
+    offset, imbalance = complex(found[0], found[1]), complex(found[2], found[3])
+    clean: NDArray[np.complex128] = vector - offset - imbalance * np.conj(vector)
+    return clean
+
+
 def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:
     sums = np.cumsum(np.concatenate([np.zeros(width // 2 + 1), values, np.zeros(width // 2)]))
     means: NDArray[np.complex128] = (sums[width:] - sums[:-width]) / width
     return means
+
+
+def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
+    """Let the angle of a motion that repeats repeat.
+
+    While the current is too small to be followed, the angle may slip by a multiple of pi. A
+    stretch of current has the angle that it had one cycle earlier; in the first cycle, the one
+    that follows from the median of all cycles' steps.
+
+    Parameters
+    ----------
+    angle : PhaseAngle
+        As followed.
+    period : int
+        Samples per cycle.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    PhaseAngle
+        As it was where there are fewer than three cycles, or where a cycle ends elsewhere than
+        it began by more than a twentieth of its travel: that is no slip.
+    """
+    path = angle.angle_rad
+    cycles = path.size // period
+    stretches = _stretches(angle.strong, max(int(LOST_S * rate_hz), 2))
+    if cycles < FEWEST_CYCLES or not stretches:
+        return angle
+    whole = slice(0, cycles * period)
+    steps = np.diff(path, append=path[-1])[whole].reshape(cycles, period)
+    course = np.cumsum(np.median(steps, axis=0))
+    if abs(course[-1]) > LARGEST_DRIFT * float(np.ptp(course)):
+        return angle
+    weak = np.mean(~angle.strong[whole].reshape(cycles, period), axis=0) + 1e-9
+    course = course - course[-1] * np.cumsum(weak) / weak.sum()
+    repeated = path.copy()
+    edges, slips = [0.0], [0.0]
+    anchor: float | None = None
+    for start, stop in stretches:
+        if stop <= period:
+            rest = float(np.median(path[start:stop] - course[start:stop]))
+            anchor = rest if anchor is None else anchor
+            slip = np.pi * np.round((rest - anchor) / np.pi)
+        else:
+            begin = max(start, period)
+            rest = float(np.median(path[begin:stop] - repeated[begin - period : stop - period]))
+            slip = np.pi * np.round(rest / np.pi) if begin < stop else 0.0
+        repeated[start:] = path[start:] - slip
+        edges += [float(start), float(stop)]
+        slips += [slip, slip]
+    correction = np.interp(np.arange(path.size), edges, slips)
+    return replace(angle, angle_rad=path - correction)
 
 
 def torque_current(
