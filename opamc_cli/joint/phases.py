@@ -31,7 +31,7 @@ BANDWIDTH_ROUNDS = 2
 CARRIER_OVER_BANDWIDTH = 2.0
 FEWEST_FAST_SAMPLES = 200
 FEWEST_CYCLES = 3
-LARGEST_DRIFT = 0.05
+LARGEST_DRIFT = 0.1
 
 NOISIEST_SHARE = 0.1
 """Noise of the acceleration, relative to the acceleration, up to which a sample counts."""
@@ -286,7 +286,7 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     -------
     PhaseAngle
         As it was where there are fewer than three cycles, or where a cycle ends elsewhere than
-        it began by more than a twentieth of its travel: that is no slip.
+        it began by more than a tenth of its travel: that is no slip.
     """
     path = angle.angle_rad
     cycles = path.size // period

@@ -5,17 +5,43 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.track import Floats, Track
 
+TRAVELS_RAD = (0.3, 0.8, 1.4, 2.0, 2.8, 3.8, 5.0, 6.3)
+SHORTEST_TRAVEL_RAD = 0.1
+LONGEST_TRAVEL_RAD = 7.0
+
 
 class Gravity(Effect):
-    """Sine and cosine of the joint angle: the angle at which the link hangs is not known."""
+    """Sine and cosine of the joint angle: the angle at which the link hangs is not known.
+
+    Where the angle's scale is unknown too (phase currents alone, without gear ratio and pole
+    pairs), `joint_rad_per_rad` is searched: how far the joint turns per radian of the known angle.
+    """
 
     name = "gravity"
     domain = "joint-angle"
     meaning = "weight of the links; not a fault in itself"
-    needs = ("scale",)
-    from_motion = True
+    needs = ("position",)
     carries_load = True
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Travels of the joint from a few degrees to a whole turn, where nobody knows it."""
+        if "scale" in track.channels:
+            return [{}]
+        travel = _travel(track)
+        return [{"joint_rad_per_rad": joint / travel} for joint in TRAVELS_RAD]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Up to somewhat more than a turn of the joint."""
+        if "scale" in track.channels:
+            return {}
+        travel = _travel(track)
+        return {"joint_rad_per_rad": (SHORTEST_TRAVEL_RAD / travel, LONGEST_TRAVEL_RAD / travel)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Sine and cosine of the joint angle."""
-        return stack(np.sin(track.position_rad), np.cos(track.position_rad))
+        angle = parameters.get("joint_rad_per_rad", 1.0) * track.position_rad
+        return stack(np.sin(angle), np.cos(angle))
+
+
+def _travel(track: Track) -> float:
+    return max(float(np.ptp(track.position_rad[track.moving])), 1e-9)
