@@ -121,6 +121,11 @@ def _why(cause: Cause, change: Change) -> list[str]:
             f"two orders must differ by {seen['order_resolution']:.2g} to be told apart within a "
             "stroke."
         )
+    if "measured_frequency_hz" in seen:
+        sentences.append(
+            f"A line at {seen['measured_frequency_hz']:.4g} Hz, whatever the speed, has "
+            f"{seen['power_ratio']:.3g} times the power that it has in the baseline's {kind}."
+        )
     chance = "below 0.0001" if cause.p_value < 1e-4 else f"{cause.p_value:.2g}"
     sentences.append(
         f"{_effect_name(cause)} explains {cause.share:.0%} of what the current changed beyond the "

@@ -27,6 +27,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
         "tooth": 1.5 * noise * np.cos(tooth * q),
         "payload": 0.3 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
         "friction": 0.5 * v / top,
+        "hum": 1.5 * noise * np.cos(2 * np.pi * 50.0 * made.time),
     }[kind]
     edges = np.linspace(0, v.size, count + 1).astype(int)
     if not sessions:
@@ -72,6 +73,13 @@ def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     if cause.evidence["order_resolution"] > 0.05:
         assert "kinematic error" in cause.ties[0]
     assert not change.benign
+
+
+def test_a_line_that_keeps_its_frequency_is_no_ripple():
+    change = change_of("hum")
+    assert change.causes[0].effect == "mains_hum"
+    assert change.causes[0].parameters == {"frequency_hz": 50.0}
+    assert change.benign
 
 
 def test_unknown_gear_ratio_leaves_the_order_per_joint_revolution():

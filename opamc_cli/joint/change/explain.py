@@ -5,20 +5,28 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of
-from opamc_cli.joint.change.lines import fast_residuals, grown_lines, order_spectra
-from opamc_cli.joint.change.reading import Reading, read_lines
+from opamc_cli.joint.change.lines import clocked, fast_residuals, grown_lines, order_spectra
+from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
 from opamc_cli.joint.change.slow import Population, learn
 from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Floats, Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 
 BENIGN = frozenset(
-    {"thermal_viscous", "warmup", "payload_change", "sensor_offset", "sensor_gain", "dead_time"}
+    {
+        "thermal_viscous",
+        "warmup",
+        "payload_change",
+        "sensor_offset",
+        "sensor_gain",
+        "dead_time",
+        "mains_hum",
+    }
 )
 """Causes that are no fault of the gear."""
 
@@ -158,14 +166,10 @@ def explain_change(
 
     slow = find_slow_causes(units, population, library)
     plain, white = fast_residuals(units, terms, slow[-1].shift if slow else None)
-    spectra = order_spectra(units, white)
-    reading = None
-    if spectra is not None:
-        lines = grown_lines(spectra, LINES_DIFFER if cycles else 0.0)
-        reading = read_lines(lines, units[0].fine, spectra.resolution)
+    reading, turning = _line_reading(units, white, LINES_DIFFER if cycles else 0.0)
 
     energy = energy_of(units, population, slow_found=bool(slow))
-    held = comb_energy(units, plain, reading.fundamental) if reading is not None else 0.0
+    held = comb_energy(turning, plain, reading.fundamental) if reading is not None else 0.0
     # A line stands out of the spectrum before it stands out of the whole mean square.
     whole = max(energy.slow + max(energy.fast, held), SMALLEST_POWER)
     causes = _slow_entries(units, population, energy, whole, slow, library)
@@ -187,6 +191,26 @@ def explain_change(
         sessions=not cycles,
         angle=units[0].fine.angle_kind,
     )
+
+
+def _line_reading(
+    units: list[Unit], white: list[Floats], between: float
+) -> tuple[Reading | None, list[Unit]]:
+    """Read the lines that grew, over the motor angle or over time; also the units by that angle."""
+    spectra = order_spectra(units, white)
+    if spectra is None:
+        return None, units
+    lines = grown_lines(spectra, between)
+    reading = read_lines(lines, units[0].fine, spectra.resolution)
+    if reading is None or reading.known:
+        return reading, units
+    # An order that means nothing may be a frequency: hum, or a structure that rings.
+    timed = [clocked(unit) for unit in units]
+    clock = order_spectra(timed, white)
+    beats = grown_lines(clock, between) if clock is not None else []
+    if clock is not None and beats and beats[0].excess > lines[0].excess:
+        return read_frequency(beats[0], clock.resolution), timed
+    return reading, units
 
 
 def _slow_entries(

@@ -1,6 +1,6 @@
 """Order spectra of units, stroke by stroke, and the lines that grew."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -63,6 +63,8 @@ class Line:
         Where the baseline's own line lies, if it has one within two resolutions.
     growth : float
         Ratio of the powers.
+    excess : float
+        Difference of the powers.
     p_value : float
         Corrected for the number of orders.
     """
@@ -72,6 +74,7 @@ class Line:
     reference: float | None
     reference_error: float
     growth: float
+    excess: float
     p_value: float
 
 
@@ -104,6 +107,14 @@ def fast_residuals(
         ready = settled(unit.fine_rows, unit.fine.bounds, taps.size - 1)
         white.append(np.where(ready, whitened(residual, taps), 0.0))
     return plain, white
+
+
+def clocked(unit: Unit) -> Unit:
+    """Let time turn the machine, once a second: its orders are then frequencies in Hz."""
+    fine = replace(
+        unit.fine, machine_angle_rad=2 * np.pi * unit.fine.run_time_s, angle_kind="joint"
+    )
+    return replace(unit, fine=fine)
 
 
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
@@ -204,13 +215,22 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         around = around[around < orders.size]
         if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
             continue
-        line = _line(spectra, peak, guard, float(np.exp(growth[peak])), float(p_values[peak]))
+        line = _line(
+            spectra,
+            peak,
+            guard,
+            growth=float(np.exp(growth[peak])),
+            excess=float(excess[peak]),
+            p_value=float(p_values[peak]),
+        )
         if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
             found.append(line)
     return found
 
 
-def _line(spectra: OrderSpectra, peak: int, guard: int, growth: float, p_value: float) -> Line:
+def _line(
+    spectra: OrderSpectra, peak: int, guard: int, growth: float, excess: float, p_value: float
+) -> Line:
     near = slice(max(peak - guard, 0), peak + guard + 1)
     after = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.after])
     before = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.before])
@@ -225,6 +245,7 @@ def _line(spectra: OrderSpectra, peak: int, guard: int, growth: float, p_value: 
         reference=float(np.median(before)) if has_line else None,
         reference_error=scatter / np.sqrt(before.size),
         growth=growth,
+        excess=excess,
         p_value=p_value,
     )
 

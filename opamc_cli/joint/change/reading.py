@@ -7,6 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.change.lines import Line
 from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.mains_hum import MAINS_HZ, MainsHum
 from opamc_cli.joint.effects.ripple import read_order
 from opamc_cli.joint.track import Track
 
@@ -17,6 +18,7 @@ USUAL_RATIO = 100.0
 SMALLEST_RATIO = 30.0
 """Gear ratio assumed where none is known, and the smallest of strain wave gears."""
 
+MAINS_HARMONICS = 6
 CIRCULAR_BELOW = 0.5
 """Lines surely nearer to whole orders (0) than to the flexspline's (1) are read as whole ones."""
 
@@ -93,8 +95,33 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
     return electrical
 
 
+def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
+    """Read a line that keeps its frequency whatever the speed; None where nobody knows its source.
+
+    Parameters
+    ----------
+    line : Line
+        Its order is a frequency in Hz.
+    resolution_hz : float
+        Smallest difference of frequencies that a stroke can tell apart.
+    """
+    multiples = [mains * k for mains in MAINS_HZ for k in range(1, MAINS_HARMONICS + 1)]
+    mains = min(multiples, key=lambda frequency: abs(frequency - line.order))
+    if abs(line.order - mains) > resolution_hz:
+        return None
+    evidence = {
+        "measured_frequency_hz": line.order,
+        "frequency_resolution_hz": resolution_hz,
+        "power_ratio": line.growth,
+    }
+    parameters = {"frequency_hz": mains}
+    return Reading(
+        "mains_hum", parameters, evidence, MainsHum.meaning, (), (line,), line.order, True
+    )
+
+
 def _turns(track: Track, line: Line) -> list[float]:
-    """Possible revolutions of the motor per revolution of the track's machine angle, inverted."""
+    """Revolutions of the track's machine angle per turn of the motor, as far as they are known."""
     if track.angle_kind == "motor":
         return [1.0]
     if track.angle_kind == "electrical":
