@@ -12,6 +12,7 @@ from opamc_cli.signal.rotation import Rotation
 
 MIN_CLEAR_FRAMES = 3
 SMOOTHED_FRAMES = 3
+FRAMES_AT_A_TIME = 65_536
 # Largest ratio between the ridge's and the vector's frequency where the two agree: well inside
 # the sidebands of a torque ripple twice per motor turn with five pole pairs, 1 ± 2/5.
 AGREEMENT = 1.2
@@ -150,20 +151,22 @@ def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     list of Motion
         In order, not overlapping.
     """
-    ridge_hz = evidence.frames.ridge_hz.astype(np.float64)
     clear = clear_motion(evidence, rule)
+
+    def ridge_hz(first: int, last: int) -> NDArray[np.float64]:
+        return evidence.frames.ridge_hz[first:last].astype(np.float64)
 
     def speed_hz(first: int, last: int) -> float:
         """Largest frequency where S(t) is nearly as high as it gets."""
         high = evidence.frames.strength[first:last] * clear[first:last]
-        return largest_frequency(ridge_hz[first:last][high >= HIGH_SHARE * high.max()])
+        return largest_frequency(ridge_hz(first, last)[high >= HIGH_SHARE * high.max()])
 
     joined: list[tuple[int, int]] = []
     for high in hysteresis(evidence.frames.strength, rule.on, rule.off):
         for part in _split_by_direction(high, evidence, rule):
             # Noise may pass the threshold for a moment; a carrier is clear for a few frames, and
             # no frame of it is faster than the largest frequency that lasts.
-            slow_enough = ridge_hz[slice(*part)] < AGREEMENT * speed_hz(*part)
+            slow_enough = ridge_hz(*part) < AGREEMENT * speed_hz(*part)
             turning = np.flatnonzero(clear[slice(*part)] & slow_enough)
             if turning.size < MIN_CLEAR_FRAMES:
                 continue
@@ -177,9 +180,9 @@ def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
     for first, last in joined:
         if (last - first) * evidence.frame_s < rule.min_motion_s:
             continue
-        f_last_hz = float(ridge_hz[last - 1])
+        f_last_hz = float(evidence.frames.ridge_hz[last - 1])
         # A few percent less, or noise would put it anywhere in a cruise at constant speed.
-        as_fast = clear[first:last] & (ridge_hz[first:last] >= 0.95 * f_last_hz)
+        as_fast = clear[first:last] & (ridge_hz(first, last) >= 0.95 * f_last_hz)
         motions.append(
             Motion(
                 first,
@@ -199,11 +202,17 @@ def clear_motion(evidence: Evidence, rule: MotionRule) -> NDArray[np.bool_]:
     Noise has a ridge as well, but does not turn along with it; and where the torque is near
     zero, the ripple's sidebands outgrow the carrier, whose frequency the vector still shows.
     """
-    ridge_hz = np.maximum(evidence.frames.ridge_hz, 1e-9)
-    turned_hz = evidence.rotation.smoothed(SMOOTHED_FRAMES).frequency_hz(evidence.fs_hz)
-    ratio = np.abs(turned_hz) / ridge_hz
-    agrees = (ratio > 1 / AGREEMENT) & (ratio < AGREEMENT)
-    return agrees & (evidence.frames.strength >= rule.on)
+    clear = evidence.frames.strength >= rule.on
+    n = clear.size
+    # A shift has millions of frames: only some at a time need their frequencies in memory.
+    for start in range(0, n, FRAMES_AT_A_TIME):
+        stop = min(start + FRAMES_AT_A_TIME, n)
+        first, last = max(start - SMOOTHED_FRAMES, 0), min(stop + SMOOTHED_FRAMES, n)
+        smooth = evidence.rotation[first:last].smoothed(SMOOTHED_FRAMES)
+        turned_hz = smooth[start - first : stop - first].frequency_hz(evidence.fs_hz)
+        ratio = np.abs(turned_hz) / np.maximum(evidence.frames.ridge_hz[start:stop], 1e-9)
+        clear[start:stop] &= (ratio > 1 / AGREEMENT) & (ratio < AGREEMENT)
+    return clear
 
 
 def largest_frequency(ridge_hz: NDArray[np.floating], n_lasting: int = 5) -> float:

@@ -215,8 +215,10 @@ def _gather(
         for name, n in n_missing.items()
         if n
     )
+    joined = join_frames(frames)
+    frames.clear()
     evidence = Evidence(
-        join_frames(frames),
+        joined,
         join_rotation(turns),
         has_direction=len(names) == 3,
         fs_hz=fs_hz,

@@ -5,6 +5,7 @@ import pytest
 from axis import errors_s, gather, segments_of
 from carriers import Move, Torque, record
 
+from opamc_cli.signal import segmentation
 from opamc_cli.signal.analytic import clarke
 from opamc_cli.signal.boundaries import refine_boundaries
 from opamc_cli.signal.motion import MotionFrames
@@ -12,6 +13,7 @@ from opamc_cli.signal.rotation import Rotation
 from opamc_cli.signal.segmentation import (
     Evidence,
     MotionRule,
+    clear_motion,
     find_motions,
     hysteresis,
     largest_frequency,
@@ -62,6 +64,20 @@ def test_boundaries_do_not_depend_on_the_shape_of_the_ramp(ramp_s, smooth):
     recording = record(wanted, noise=0.02, smooth=smooth)
     spans, _ = segments_of(recording.phases)
     assert np.abs(errors_s(spans, recording.intervals)).max() < 0.025
+
+
+@pytest.mark.parametrize("at_a_time", [1, 7, 64])
+def test_clear_frames_do_not_depend_on_how_many_are_looked_at_together(monkeypatch, at_a_time):
+    rng = np.random.default_rng(0)
+    turn, along, strength = rng.normal(size=(3, 200)).astype(np.float32)
+    ridge_hz = rng.uniform(1, 60, 200).astype(np.float32)
+    frames = MotionFrames(16, strength, ridge_hz)
+    evidence = Evidence(frames, Rotation(turn, along), True, 100.0, 0.1, 1.0)
+    rule = MotionRule(on=-1.0, off=-2.0, min_motion_s=0, min_still_s=0, max_dip_s=0)
+    whole = clear_motion(evidence, rule)
+    assert 0 < whole.sum() < whole.size
+    monkeypatch.setattr(segmentation, "FRAMES_AT_A_TIME", at_a_time)
+    np.testing.assert_array_equal(clear_motion(evidence, rule), whole)
 
 
 def test_a_dip_while_braking_is_one_motion():
