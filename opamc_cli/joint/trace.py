@@ -532,11 +532,17 @@ def prepare_held(fit: Fit, fine: bool) -> Held:
 def _model_rows(fit: Fit, fine: bool) -> Floats:
     session = fit.session
     rows = session.grid(fine).fit
-    blocks = [session.columns(term, fine)[rows] for term in fit.terms]
+    blocks = [session.columns(term, fine) for term in fit.terms]
     blur = session.grid(fine).track.blur
     if fine and blur is not None:
-        blocks.append(blur[rows])
-    return np.concatenate(blocks, axis=1) if blocks else np.zeros((int(rows.sum()), 0))
+        blocks.append(blur)
+    # Filled block by block: to put copies side by side would take twice the memory.
+    base = np.empty((int(np.count_nonzero(rows)), sum(block.shape[1] for block in blocks)))
+    stop = 0
+    for block in blocks:
+        start, stop = stop, stop + block.shape[1]
+        base[:, start:stop] = block[rows]
+    return base
 
 
 def removal_gains(fit: Fit, places: Sequence[int]) -> list[float]:
