@@ -148,6 +148,14 @@ class PatternsConfig(Section):
         description="Take the current sensors' offset, found from whole turns of the current "
         "vector, off before the envelope; it drifts between sessions. The thesis does not.",
     )
+    frames: Annotated[int, Field(ge=0, le=256)] = Field(
+        16,
+        description="Parts of a motion, overlapping by half, of which the envelope's spectrum is "
+        "kept for the decision beside the patterns; 0: patterns alone, as the thesis.",
+    )
+    bins: Annotated[int, Field(ge=2, le=256)] = Field(
+        16, description="Lowest frequencies of each part that are kept, in periods per part."
+    )
 
 
 class ScoreConfig(Section):

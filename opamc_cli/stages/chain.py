@@ -15,8 +15,8 @@ class ChainOutcome:
 
     Attributes
     ----------
-    segments, motions, patterns
-        Paths of the three tables.
+    segments, motions, patterns, spectra
+        Paths of the four tables.
     runs_done
         Names of the runs that went through.
     errors
@@ -29,6 +29,7 @@ class ChainOutcome:
     segments: Path
     motions: Path
     patterns: Path
+    spectra: Path
     runs_done: tuple[str, ...]
     errors: tuple[OpamcError, ...]
     notes: tuple[str, ...]
@@ -51,7 +52,7 @@ def run_chain(
     config
         All options.
     out
-        Folder of the three tables.
+        Folder of the four tables.
     reference
         Motion table whose reference cycles are taken; None: found in these runs.
     jobs
@@ -70,6 +71,7 @@ def run_chain(
         segments=segmented.path,
         motions=identified.path,
         patterns=counted.path,
+        spectra=counted.spectra_path,
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
         notes=segmented.notes

@@ -86,7 +86,8 @@ def run(
     progress("score")
     scored = score.run(normal.patterns, other.patterns, config, out, models=models)
     tables = (normal.patterns, other.patterns, scored.scores_path, scored.features_path)
-    decided = verdict.run(*tables, config, out)
+    spectra = (normal.spectra, other.spectra)
+    decided = verdict.run(*tables, config, out, spectra=spectra)
     unhealthy = [
         entry["axis"] for entry in decided.verdict["axes"] if entry["state"] in ("changed", "fault")
     ]
@@ -106,7 +107,7 @@ def run(
                 continue
             if found is not None:
                 causes[axis] = found
-        decided = verdict.run(*tables, config, out, causes=causes)
+        decided = verdict.run(*tables, config, out, spectra=spectra, causes=causes)
     progress("report")
     page = report.run(out, title=config.report.title)
     return DiagnoseOutcome(

@@ -1,4 +1,7 @@
-"""Stage `patterns`: motions and runs in, ordinal pattern counts out (thesis 4.2)."""
+"""Stage `patterns`: motions and runs in, ordinal pattern counts out (thesis 4.2).
+
+Beside them it keeps the short-time spectrum of the same envelopes, which the thesis does not.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,12 +16,21 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
+from opamc_cli.signal.short_time import short_time_log_power
 from opamc_cli.stages.envelope import current_offset, read_envelope
 from opamc_cli.stages.parallel import map_items
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
-from opamc_cli.storage.tables import MOTIONS, PATTERNS, read_table, table_input, write_table
+from opamc_cli.storage.tables import (
+    MOTIONS,
+    PATTERNS,
+    SPECTRA,
+    read_table,
+    table_input,
+    write_table,
+)
 
 FILE_NAME = "patterns.parquet"
+SPECTRA_NAME = "spectra.parquet"
 
 
 @dataclass(frozen=True)
@@ -27,15 +39,16 @@ class PatternsOutcome:
 
     Attributes
     ----------
-    path
-        The table that was written.
+    path, spectra_path
+        The tables that were written.
     table
-        Its rows.
+        The patterns' rows.
     errors
         One for each axis of a run that could not be read.
     """
 
     path: Path
+    spectra_path: Path
     table: pa.Table
     errors: tuple[OpamcError, ...]
 
@@ -68,7 +81,7 @@ def run(
     moved_to: Sequence[Path] = (),
     jobs: int = 1,
 ) -> PatternsOutcome:
-    """Count the ordinal patterns of every identified segment's envelope.
+    """Count the ordinal patterns of every identified segment's envelope; keep its spectrum.
 
     Parameters
     ----------
@@ -77,7 +90,7 @@ def run(
     config
         Section `patterns` is used.
     out
-        Folder of the pattern table.
+        Folder of the two tables.
     moved_to
         Folders of the runs, if they were moved.
     jobs
@@ -96,23 +109,32 @@ def run(
         _Job(part.source, part.axis, part.rows, config.patterns)
         for part in identified_parts(table, sources)
     ]
-    outcome = map_items(count_patterns, work, jobs)
+    outcome = map_items(_analyse, work, jobs)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
-    patterns = pa.concat_tables([PATTERNS.empty_table(), *outcome.results]).combine_chunks()
+    patterns, spectra = (
+        pa.concat_tables([schema.empty_table(), *tables]).combine_chunks()
+        for schema, tables in (
+            (PATTERNS, [counted for counted, _ in outcome.results]),
+            (SPECTRA, [kept for _, kept in outcome.results]),
+        )
+    )
     too_long = _windows_too_long(motions, patterns)
     if too_long and not any(patterns.column("n_patterns").to_pylist()):
         raise too_long[0]
-    path = out / FILE_NAME
-    write_table(
-        path,
-        patterns,
-        stage="patterns",
-        config=config.canonical("patterns"),
-        inputs=[table_input(motions)],
-        extra=sources_record(sources, out),
+    inputs, used = [table_input(motions)], config.canonical("patterns")
+    for name, rows in ((FILE_NAME, patterns), (SPECTRA_NAME, spectra)):
+        write_table(
+            out / name,
+            rows,
+            stage="patterns",
+            config=used,
+            inputs=inputs,
+            extra=sources_record(sources, out),
+        )
+    return PatternsOutcome(
+        out / FILE_NAME, out / SPECTRA_NAME, patterns, (*outcome.errors, *too_long)
     )
-    return PatternsOutcome(path, patterns, (*outcome.errors, *too_long))
 
 
 def _windows_too_long(motions: Path, patterns: pa.Table) -> list[OpamcError]:
@@ -193,10 +215,10 @@ def delay(config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int) -> 
     return config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
 
 
-def count_patterns(job: _Job) -> pa.Table:
-    """Count the patterns of each segment of one axis, for every order."""
+def _analyse(job: _Job) -> tuple[pa.Table, pa.Table]:
+    """Return the patterns and the spectra of the segments of one axis."""
     config = job.config
-    rows = []
+    patterns, spectra = [], []
     with job.source.open() as run:
         offset = 0j
         if config.remove_offset:
@@ -204,35 +226,69 @@ def count_patterns(job: _Job) -> pa.Table:
             offset = current_offset(run, job.axis, spans, config.envelope)
         for row in job.rows:
             start, stop = aligned_span(row)
+            whole = stop <= run.n_samples
             stop = min(stop, run.n_samples)
             envelope = _finite(read_envelope(run, job.axis, start, stop, config.envelope, offset))
-            delays = {
-                order: delay(config, run.sampling_rate_hz, row["reference_f_max_hz"], order)
-                for order in sorted(set(config.orders))
-            }
-            for tau in sorted(set(delays.values())):
-                orders = [order for order, other in delays.items() if other == tau]
-                for order, counts in ordinal_counts(envelope, orders, tau).items():
-                    counted = int(counts.sum())
-                    rows.append(
-                        {
-                            **{name: row[name] for name in _COPIED},
-                            "start": start,
-                            "stop": stop,
-                            "order": order,
-                            "tau": tau,
-                            "gamma": None if config.tau else config.gamma,
-                            "f_max_hz": row["reference_f_max_hz"],
-                            "n_patterns": counted,
-                            "n_masked": n_windows(envelope.size, order, tau) - counted,
-                            "counts": counts,
-                        }
-                    )
-    rows.sort(key=lambda row: (row["segment"], row["order"]))
-    return pa.Table.from_pylist(rows, schema=PATTERNS)
+            place = {**row, "start": start, "stop": stop}
+            patterns += _pattern_rows(place, envelope, run.sampling_rate_hz, config)
+            # cut short, a segment's frames would not be those of the others
+            if config.frames and whole:
+                spectra += _spectrum_rows(place, envelope, run.sampling_rate_hz, config)
+    patterns.sort(key=lambda row: (row["segment"], row["order"]))
+    return (
+        pa.Table.from_pylist(patterns, schema=PATTERNS),
+        pa.Table.from_pylist(spectra, schema=SPECTRA),
+    )
 
 
-_COPIED = ("run", "axis", "cycle", "motion", "segment", "signal", "temperature_c")
+def _pattern_rows(
+    row: dict[str, Any],
+    envelope: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> list[dict[str, Any]]:
+    """Count the patterns of one segment, for every order."""
+    delays = {
+        order: delay(config, fs_hz, row["reference_f_max_hz"], order)
+        for order in sorted(set(config.orders))
+    }
+    rows = []
+    for tau in sorted(set(delays.values())):
+        orders = [order for order, other in delays.items() if other == tau]
+        for order, counts in ordinal_counts(envelope, orders, tau).items():
+            counted = int(counts.sum())
+            rows.append(
+                {
+                    **{name: row[name] for name in (*_PLACE, "signal", "temperature_c")},
+                    "order": order,
+                    "tau": tau,
+                    "gamma": None if config.tau else config.gamma,
+                    "f_max_hz": row["reference_f_max_hz"],
+                    "n_patterns": counted,
+                    "n_masked": n_windows(envelope.size, order, tau) - counted,
+                    "counts": counts,
+                }
+            )
+    return rows
+
+
+def _spectrum_rows(
+    row: dict[str, Any],
+    envelope: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> list[dict[str, Any]]:
+    """Return the short-time spectrum of one segment; none if it is too short for any."""
+    power = short_time_log_power(envelope, config.frames, config.bins)
+    if not power.size:
+        return []
+    frames, bins = power.shape
+    bin_hz = fs_hz / (2 * envelope.size // (frames + 1))
+    shape = {"frames": frames, "bins": bins, "bin_hz": bin_hz}
+    return [{**{name: row[name] for name in _PLACE}, **shape, "log_power": power.ravel()}]
+
+
+_PLACE = ("run", "axis", "cycle", "motion", "segment", "start", "stop")
 
 
 def _finite(envelope: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:

@@ -13,7 +13,7 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.cells import cells_by_axis
+from opamc_cli.stages.cells import cells_by_axis, session_names, spectrum_cells
 from opamc_cli.stages.reasons import reasons
 from opamc_cli.stages.score import (
     ALL_MOTIONS,
@@ -26,7 +26,7 @@ from opamc_cli.stages.score import (
 from opamc_cli.stats.decision import Judgement, Policy, State, judge
 from opamc_cli.storage.atomic import write_text
 from opamc_cli.storage.sources import RunSource, read_sources
-from opamc_cli.storage.tables import read_table
+from opamc_cli.storage.tables import SPECTRA, read_table
 
 FILE_NAME = "verdict.json"
 
@@ -61,6 +61,7 @@ def run(
     config: Config,
     out: Path,
     *,
+    spectra: tuple[Path, Path] | None = None,
     causes: Mapping[int, Mapping[str, Any]] | None = None,
 ) -> VerdictOutcome:
     """Decide about every joint and write the verdict.
@@ -75,6 +76,8 @@ def run(
         Section `score` is used; the verdict carries the hash of the whole.
     out
         Folder of verdict.json.
+    spectra
+        Spectrum tables of stage `patterns`, of the same runs; None: patterns alone decide.
     causes
         Cause of the change by axis, from closing the loop of the joint's model.
 
@@ -90,6 +93,11 @@ def run(
         read_table(features, "score", FEATURES),
         config,
         causes or {},
+        spectra
+        and (
+            read_table(spectra[0], "patterns", SPECTRA),
+            read_table(spectra[1], "patterns", SPECTRA),
+        ),
     )
     path = out / FILE_NAME
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
@@ -111,6 +119,7 @@ def decide(
     features: pa.Table,
     config: Config,
     causes: Mapping[int, Mapping[str, Any]],
+    spectra: tuple[pa.Table, pa.Table] | None = None,
 ) -> dict[str, Any]:
     """Return the content of verdict.json.
 
@@ -124,9 +133,16 @@ def decide(
         Section `score` is used.
     causes
         Cause by axis.
+    spectra
+        Spectrum tables of baseline and target, if there are any.
     """
     cells = cells_by_axis(*patterns)
-    judgements = judge(cells, policy_of(config.score))
+    by_spectrum = {
+        axis: spectrum_cells(*spectra, axis, session_names(axis, *patterns))
+        for axis in cells
+        if spectra is not None
+    }
+    judgements = judge(cells, policy_of(config.score), by_spectrum)
     jsd = _divergences(scores)
     pooled = _pooled_features(features)
     axes = []

@@ -9,15 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.stats.divergence import chance_divergence, effect_size, jensen_shannon
+from opamc_cli.stats.evidence import (
+    Evidence,
+    PatternEvidence,
+    SessionDistances,
+    SpectrumEvidence,
+    pooled_together,
+    session_distances,
+    weigh_together,
+)
 from opamc_cli.stats.multiplicity import holm
 from opamc_cli.stats.permutation import relabelled_p_value, relabellings
-from opamc_cli.stats.sessions import Cell, paired_log_divergences, pooled_divergence
+from opamc_cli.stats.sessions import Cell, pooled_divergence
+from opamc_cli.stats.spectra import SpectrumCell, size_effect
 from opamc_cli.stats.spread import (
     BETWEEN_SESSIONS,
+    MAD_TO_SIGMA,
     Spread,
     moderated_spread,
-    shared_prior,
     spliced_p_value,
+    spread_among_siblings,
     upper_tail,
 )
 
@@ -38,10 +49,6 @@ HEALTHY_SHIFT_SPREAD = Spread(0.36, 5.0)
 1e-3, Tables 5-4 and 5-7), each order about its own mean. Both orders are of the same six joints,
 so that they are worth five degrees of freedom and not ten."""
 
-
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal variable over its median absolute deviation."""
-
 MAD_EFFICIENCY = 0.37
 """Share of the values that a median absolute deviation is worth (Huber, 1981)."""
 
@@ -58,7 +65,8 @@ class Policy:
     false_alarm_rate : float
         Largest accepted probability of any false alarm over all joints of one diagnosis.
     minimum_effect : float
-        Least relative change of the pattern probabilities (Cohen's w) that matters.
+        Least relative change of the pattern probabilities (Cohen's w), or of the size of the
+        envelope's fluctuations, that matters.
     fault_effect : float
         Relative change from which a change is called a fault.
     permutations : int
@@ -113,9 +121,12 @@ class Judgement:
         What was taken off, not negative.
     distance_ratio : float
         Target's distance from the baseline over that of a healthy session.
-    effect : float
+    pattern_effect : float
         Relative change of the pattern probabilities beyond the baseline's own (Cohen's w), in
         the motion and order where it is largest.
+    size_effect : float
+        Relative change of the envelope's fluctuations beyond the baseline's own, over all motions;
+        NaN without spectra of two baseline sessions.
     method : str
         sessions, relabelled-sessions, one-session or none.
     n_baseline_sessions, n_target_sessions, n_baseline_cycles, n_target_cycles : int
@@ -129,17 +140,24 @@ class Judgement:
     p_alone: float
     common_log_ratio: float
     distance_ratio: float
-    effect: float
+    pattern_effect: float
+    size_effect: float
     method: Method
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
     n_target_cycles: int
 
+    @property
+    def effect(self) -> float:
+        """The larger of the two relative changes; NaN if neither is known."""
+        return float(np.fmax(self.pattern_effect, self.size_effect))
+
 
 def judge(
     cells_by_axis: Mapping[int, Sequence[Cell]],
     policy: Policy = Policy(),
+    spectra_by_axis: Mapping[int, Sequence[SpectrumCell]] | None = None,
 ) -> dict[int, Judgement]:
     """Decide about every joint of a diagnosis.
 
@@ -149,6 +167,8 @@ def judge(
         Motions and orders of each axis; an axis without any has insufficient data.
     policy : Policy
         Levels and limits.
+    spectra_by_axis : mapping of int to sequence of SpectrumCell, optional
+        Short-time spectra of the same sessions; axes without any are judged by patterns alone.
 
     Returns
     -------
@@ -163,19 +183,29 @@ def judge(
     """
     axes = sorted(cells_by_axis)
     methods = {axis: _method(cells_by_axis[axis]) for axis in axes}
-    pairs = {
-        axis: paired_log_divergences(cells_by_axis[axis])
+    evidence = {
+        axis: _evidence(cells_by_axis[axis], (spectra_by_axis or {}).get(axis, ()))
         for axis in axes
         if methods[axis] in ("sessions", "relabelled-sessions")
     }
-    shifts = _session_shifts(pairs)
+    distances = weigh_together(
+        {
+            axis: [
+                session_distances(kind, len(cells[0].baseline), len(cells[0].target))
+                for kind in kinds
+            ]
+            for axis, kinds in evidence.items()
+            for cells in [cells_by_axis[axis]]
+        }
+    )
+    shifts = _session_shifts(distances)
     lone = {
         axis: one_session_log_ratio(cells_by_axis[axis])
         for axis in axes
         if methods[axis] == "one-session"
     }
     shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
-    common = {axis: common_log_ratio(shifts, axis) if axis in pairs else 0.0 for axis in axes}
+    common = {axis: common_log_ratio(shifts, axis) if axis in distances else 0.0 for axis in axes}
 
     def p_value(axis: int, taken_off: float) -> float:
         if methods[axis] == "none":
@@ -183,10 +213,13 @@ def judge(
         shift = shifts[axis]
         tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
         if methods[axis] == "sessions":
-            own, target = pairs[axis]
-            distance = target[:, 0] - own
-            place = shift.log_ratio - distance
-            return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread)
+            one = distances[axis]
+            # Of three sessions the odd one is half of what each other one is compared with: then
+            # pairs place them better, who leave it out.
+            gaps = one.each[-1] - one.each[:-1] if len(one.own) > 2 else one.target[:, 0] - one.own
+            place = shift.log_ratio - gaps
+            above = int((one.each[:-1] >= one.each[-1] - taken_off).sum())
+            return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread, above)
         cells = cells_by_axis[axis]
         if methods[axis] == "one-session":
             # What exchanging cycles cannot tell from chance is no change, however large it looks.
@@ -195,7 +228,7 @@ def judge(
             return tail if by_cycles <= CYCLES_DIFFER else max(tail, by_cycles)
         n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
         labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
-        values = pooled_divergence(cells, labels)
+        values = pooled_together(evidence[axis], labels)
         values[0] *= math.exp(-taken_off)
         values = values[np.isfinite(values)]
         relabelled = relabelled_p_value(values, n_baseline + n_target)
@@ -216,15 +249,19 @@ def judge(
         known = methods[axis] != "none"
         shift = shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
         effect = float(np.nanmax(effect_by_cell(cells))) if known else math.nan
+        size = size_effect(
+            (spectra_by_axis or {}).get(axis, ()), len(cells[0].baseline) if known else 0
+        )
         judgements[axis] = Judgement(
-            state=_state(adjusted[axis], alone[axis], effect, policy),
+            state=_state(adjusted[axis], alone[axis], float(np.fmax(effect, size)), policy),
             health_index=_health_index(shift),
             p_value=p_values[axis],
             p_adjusted=adjusted[axis],
             p_alone=alone[axis],
             common_log_ratio=common[axis],
             distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
-            effect=effect,
+            pattern_effect=effect,
+            size_effect=size,
             method=methods[axis],
             n_baseline_sessions=_present(cells, "baseline"),
             n_target_sessions=_present(cells, "target"),
@@ -348,28 +385,36 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
-def _session_shifts(pairs: Mapping[int, tuple[FloatArray, FloatArray]]) -> dict[int, Shift]:
+def _evidence(cells: Sequence[Cell], spectra: Sequence[SpectrumCell]) -> list[Evidence]:
+    kinds: list[Evidence] = [PatternEvidence(cells)]
+    if spectra:
+        kinds.append(SpectrumEvidence(spectra))
+    return kinds
+
+
+def _session_shifts(distances: Mapping[int, SessionDistances]) -> dict[int, Shift]:
     variances = {
-        axis: float(own.var(ddof=1)) if len(own) > 2 else math.nan
-        for axis, (own, _) in pairs.items()
+        axis: float(one.own.var(ddof=1)) if len(one.own) > 2 else math.nan
+        for axis, one in distances.items()
     }
-    ratios = {axis: float(np.mean(target) - np.mean(own)) for axis, (own, target) in pairs.items()}
-    shares = {axis: 1 / len(own) + 1 / target.shape[1] for axis, (own, target) in pairs.items()}
+    ratios = {
+        axis: float(np.mean(one.target) - np.mean(one.own)) for axis, one in distances.items()
+    }
+    shares = {axis: 1 / len(one.own) + 1 / one.target.shape[1] for axis, one in distances.items()}
     shifts = {}
-    for axis, (own, _) in pairs.items():
-        siblings = [key for key in pairs if key != axis]
-        if len(own) > 2:
-            dof = len(own) - 1
-            prior = shared_prior([variances[key] for key in siblings], dof)
-            unit = moderated_spread(variances[axis], dof, prior)
+    for axis, one in distances.items():
+        siblings = [key for key in distances if key != axis]
+        if len(one.own) > 2:
+            others = [variances[key] for key in siblings]
+            unit = spread_among_siblings(variances[axis], others, len(one.own) - 1)
         else:
             # Two sessions have the same divergence from each other: no spread can be had from
             # them. What the target's session did to the siblings stands in for it.
-            others = np.array([ratios[key] / math.sqrt(shares[key]) for key in siblings])
+            moved = np.array([ratios[key] / math.sqrt(shares[key]) for key in siblings])
             unit = BETWEEN_SESSIONS
-            if len(others) > 1:
-                deviation = MAD_TO_SIGMA * float(np.median(np.abs(others)))
-                unit = moderated_spread(deviation**2, MAD_EFFICIENCY * len(others), unit)
+            if len(moved) > 1:
+                deviation = MAD_TO_SIGMA * float(np.median(np.abs(moved)))
+                unit = moderated_spread(deviation**2, MAD_EFFICIENCY * len(moved), unit)
         scale = unit.scale * math.sqrt(shares[axis])
         shifts[axis] = Shift(ratios[axis], unit.scale, Spread(scale, unit.dof))
     return shifts

@@ -5,13 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import xlogy
 
 from opamc_cli.stats.divergence import (
     chance_divergence,
     chance_inflation,
     jensen_shannon,
-    normalise,
 )
 
 FloatArray = NDArray[np.float64]
@@ -124,98 +122,6 @@ def divergence_from_rest(
     return divergence, max(chance, 1e-12)
 
 
-ENTROPY_PRIOR_DOF = 4.0
-"""Degrees of freedom that the cells' mean variance of entropy counts for in each cell's own."""
-
-
-ENTROPY_WEIGHT = 0.1
-"""Weight of an entropy's ratio beside a divergence's: one squared number scatters far more than a
-sum over all patterns. Larger weights find a little more of what changes the entropy (AUC for a
-quarter of the damage on the testbed 0.864, 0.887, 0.896 at 0, 0.1, 0.25) and less of what does
-not."""
-
-
-def pattern_entropy(counts: FloatArray) -> FloatArray:
-    """Entropy of pattern counts along the last axis, in nats; NaN without counts."""
-    pmf = normalise(counts)
-    return np.asarray(-xlogy(pmf, pmf).sum(axis=-1))
-
-
-def paired_log_divergences(cells: Sequence[Cell]) -> tuple[FloatArray, FloatArray]:
-    """Log distance of each baseline session and of the target, from the same rest.
-
-    Each baseline session i in turn is set aside; it and every target session are compared with
-    the others, so that the two numbers of a pair differ in nothing but the session: same pool,
-    same level, the same finite-sample bias.
-
-    Parameters
-    ----------
-    cells : sequence of Cell
-        All motions and orders of one axis.
-
-    Returns
-    -------
-    baseline : ndarray, shape (B,)
-        Log of session i's distance, in units of the rest's own level.
-    target : ndarray, shape (B, T)
-        The same of each target session, against the rest without i.
-
-    Notes
-    -----
-    The pairs of the jackknife+ of R. F. Barber et al., Ann. Statist. 49 (2021). The distance is
-    a weighted mean of two ratios over all cells: divergence over the rest's own, and squared
-    change of permutation entropy over its variance between the rest's sessions, where these are
-    three or more. The second looks in one direction only, that of more or less order, in which
-    sessions differ little and damage goes: it finds small damage that the divergence, which sums
-    over all directions, loses in their scatter, and the divergence finds what leaves the entropy
-    as it was. The mean is taken before the logarithm, so that one motion that changes strongly
-    is not outvoted by three that do not.
-    """
-    n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
-    ratios = np.full((n_baseline, 1 + n_target, 2, len(cells)), np.nan)
-    entropies = np.array(
-        [pattern_entropy(np.concatenate([cell.baseline, cell.target])) for cell in cells]
-    )
-    for i in range(n_baseline):
-        for j, cell in enumerate(cells):
-            rest = np.delete(cell.baseline, i, axis=0)
-            units = np.concatenate([cell.baseline[i : i + 1], cell.target])
-            divergence, level = divergence_from_rest(units, rest, cell.inflation)
-            ratios[i, :, 0, j] = divergence / level
-        rest_entropies = np.delete(entropies[:, :n_baseline], i, axis=1)
-        unit_entropies = entropies[:, [i, *range(n_baseline, n_baseline + n_target)]]
-        ratios[i, :, 1] = _entropy_ratios(unit_entropies, rest_entropies).T
-    weights = np.repeat([1.0, ENTROPY_WEIGHT], len(cells))
-    logs = _log_mean(ratios.reshape(n_baseline, 1 + n_target, -1), weights)
-    return logs[:, 0], logs[:, 1:]
-
-
-def _entropy_ratios(units: FloatArray, rest: FloatArray) -> FloatArray:
-    """Squared change of entropy over its variance between sessions; rows are cells."""
-    known = np.isfinite(rest)
-    n = known.sum(axis=1)
-    enough = n >= 3
-    if not enough.any():
-        return np.full(units.shape, np.nan)
-    values = np.where(known, rest, 0.0)
-    mean = values.sum(axis=1) / np.maximum(n, 1)
-    squares = np.where(known, (rest - mean[:, np.newaxis]) ** 2, 0.0).sum(axis=1)
-    typical = squares[enough].sum() / (n[enough] - 1).sum()
-    variance = (ENTROPY_PRIOR_DOF * typical + squares) / (ENTROPY_PRIOR_DOF + np.maximum(n - 1, 0))
-    # Identical sessions have no variance; a millionth of a nat is no change.
-    ratio = (units - mean[:, np.newaxis]) ** 2 / np.maximum(variance, 1e-12)[:, np.newaxis]
-    return np.where(enough[:, np.newaxis], ratio, np.nan)
-
-
-def _log_mean(ratios: FloatArray, weights: FloatArray | float = 1.0) -> FloatArray:
-    known = np.isfinite(ratios)
-    total = np.where(known, weights * ratios, 0.0).sum(axis=-1)
-    weight = (weights * known).sum(axis=-1)
-    mean = np.divide(total, weight, out=np.full(total.shape, np.nan), where=weight > 0)
-    # Identical recordings have divergence zero; a millionth of the baseline's level stands for it.
-    return np.asarray(np.log(np.maximum(mean, 1e-6)))
-
-
 def pooled_divergence(cells: Sequence[Cell], is_target: NDArray[np.bool_]) -> FloatArray:
     """Divergence between two pools of sessions, averaged over cells in units of chance.
 
@@ -245,4 +151,7 @@ def pooled_divergence(cells: Sequence[Cell], is_target: NDArray[np.bool_]) -> Fl
         )
         divergence = jensen_shannon(target[both], (total - target)[both])
         ratios[both, j] = divergence / np.maximum(chance, 1e-12)
-    return np.exp(_log_mean(ratios))
+    known = np.isfinite(ratios)
+    n = known.sum(axis=1)
+    total = np.where(known, ratios, 0.0).sum(axis=1)
+    return np.asarray(np.divide(total, n, out=np.full(len(n), np.nan), where=n > 0))

@@ -4,9 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import digamma
 from scipy.stats import t as student_t
 
 FloatArray = NDArray[np.float64]
+
+MAD_TO_SIGMA = 1.4826
+"""Standard deviation of a normal variable over its median absolute deviation."""
 
 
 @dataclass(frozen=True)
@@ -25,16 +29,22 @@ class Spread:
     dof: float
 
 
-BETWEEN_SESSIONS = Spread(0.3, 3.0)
-"""Spread of the log divergence of healthy sessions where nothing else is known.
+LEAST_VARIANCE = 1e-6
+"""Of a log distance: those that agree to a thousandth agree."""
 
-A session's divergence is a mean, over motions and orders, of sums of squares of independent
+BETWEEN_SESSIONS = Spread(0.3, 3.0)
+"""Spread of the log distance of healthy sessions where nothing else is known.
+
+A session's distance is a mean, over motions and orders, of sums of squares of independent
 influences: in simulation 0.06 (counting noise alone) to 0.6 (one influence that moves everything).
 Three degrees of freedom keep false alarms at 1 % up to twice this spread.
 """
 
+EXPECTED = Spread(BETWEEN_SESSIONS.scale, 1.0)
+"""The same where sessions or siblings speak for themselves: then it counts for one value only."""
 
-def moderated_spread(variance: float, dof: float, prior: Spread = BETWEEN_SESSIONS) -> Spread:
+
+def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> Spread:
     """Blend a variance from few values with what is known of such variances.
 
     Parameters
@@ -52,38 +62,53 @@ def moderated_spread(variance: float, dof: float, prior: Spread = BETWEEN_SESSIO
 
     Notes
     -----
-    The moderated variance of G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3.
+    Moderation as in G. K. Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004), article 3, but of the
+    logarithms, without bias: spreads differ by factors, and a mean of the variances would let a
+    large prior outweigh any number of small ones.
     """
+    if dof <= 0:
+        return prior
     total = prior.dof + dof
-    own = variance * dof if dof > 0 else 0.0
-    return Spread(float(np.sqrt((prior.dof * prior.scale**2 + own) / total)), total)
+    own = np.log(max(variance, LEAST_VARIANCE)) - (digamma(dof / 2) - np.log(dof / 2))
+    log_variance = (prior.dof * 2 * np.log(prior.scale) + dof * own) / total
+    return Spread(float(np.exp(log_variance / 2)), total)
 
 
-def shared_prior(variances: ArrayLike, dof: float, prior: Spread = BETWEEN_SESSIONS) -> Spread:
-    """Spread to be expected of one joint, from its siblings.
+SIBLING_SHARE = 0.1
+"""Share of the siblings' degrees of freedom that counts for a joint's own scale."""
+
+
+def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
+    """Spread of one joint's healthy sessions, from its own and its siblings'.
 
     Parameters
     ----------
-    variances : array_like, shape (J,)
-        Sample variances of the siblings; NaN where unknown.
+    variance : float
+        Sample variance of the joint's own sessions.
+    siblings : array_like, shape (J,)
+        Those of the other joints; NaN where unknown.
     dof : float
-        Degrees of freedom of each.
-    prior : Spread
-        Spread expected before the siblings are seen.
+        Degrees of freedom of each, positive.
 
     Returns
     -------
     Spread
-        Blend of `prior` with the siblings' median variance, which one odd sibling cannot move.
-        Half of the siblings' degrees of freedom are counted, because joints differ in spread.
+        Scale from the joint, from the siblings' median, which one odd sibling cannot move, and
+        from `EXPECTED`. The degrees of freedom are the joint's own and that of `EXPECTED`: joints
+        differ in spread, so that siblings sharpen the scale and not what is known of its error.
     """
-    values = np.asarray(variances, dtype=np.float64)
+    values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
-    if not values.size or dof <= 0:
-        return prior
-    # the median of a chi-square over its degrees of freedom is about (1 - 2/9ν)³
-    median = float(np.median(values)) / (1 - 2 / (9 * dof)) ** 3
-    return moderated_spread(median, 0.5 * dof * values.size, prior)
+    prior = EXPECTED
+    if values.size:
+        prior = moderated_spread(
+            float(np.median(values)),
+            dof,
+            Spread(prior.scale, prior.dof / (SIBLING_SHARE * len(values))),
+        )
+        prior = Spread(prior.scale, EXPECTED.dof + SIBLING_SHARE * dof * len(values))
+    own = moderated_spread(variance, dof, prior)
+    return Spread(own.scale, dof + EXPECTED.dof)
 
 
 def upper_tail(distance: float, spread: Spread) -> float:
@@ -104,7 +129,9 @@ def upper_tail(distance: float, spread: Spread) -> float:
     return float(student_t.sf(distance / spread.scale, spread.dof))
 
 
-def spliced_p_value(distances: ArrayLike, observed: float, spread: Spread) -> float:
+def spliced_p_value(
+    distances: ArrayLike, observed: float, spread: Spread, n_above: int | None = None
+) -> float:
     """P-value that is a rank where ranks reach and a parametric tail beyond.
 
     Parameters
@@ -115,6 +142,8 @@ def spliced_p_value(distances: ArrayLike, observed: float, spread: Spread) -> fl
         The value in question, on the same scale.
     spread : Spread
         For the parametric tail.
+    n_above : int, optional
+        How many reference values are at least as large; counted from `distances` by default.
 
     Returns
     -------
@@ -128,12 +157,11 @@ def spliced_p_value(distances: ArrayLike, observed: float, spread: Spread) -> fl
     it within its step, so that p is continuous, and below the last step, where ranks alone say
     no more than p ≤ 1/(n+1).
     """
-    values = np.asarray(distances, dtype=np.float64)
-    above = values[values >= observed]
-    below = values[values < observed]
+    values = np.sort(np.asarray(distances, dtype=np.float64))[::-1]
+    above = int((values >= observed).sum()) if n_above is None else n_above
     tail = upper_tail(observed, spread)
-    upper = upper_tail(float(below.max()), spread) if below.size else 1.0
-    lower = upper_tail(float(above.min()), spread) if above.size else 0.0
+    upper = upper_tail(float(values[above]), spread) if above < values.size else 1.0
+    lower = upper_tail(float(values[above - 1]), spread) if above else 0.0
     width = upper - lower
     share = float(np.clip((tail - lower) / width, 0.0, 1.0)) if width > 0 else 0.5
-    return float(np.clip((above.size + share) / (values.size + 1), 1e-300, 1.0))
+    return float(np.clip((above + share) / (values.size + 1), 1e-300, 1.0))

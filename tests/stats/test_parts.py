@@ -14,7 +14,7 @@ from opamc_cli.stats.sessions import pooled_divergence
 from opamc_cli.stats.spread import (
     Spread,
     moderated_spread,
-    shared_prior,
+    spread_among_siblings,
     spliced_p_value,
     upper_tail,
 )
