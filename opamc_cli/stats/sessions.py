@@ -85,7 +85,7 @@ def inflation_within_sessions(cycles: FloatArray, session_of_cycle: NDArray[np.i
 
 def divergence_from_rest(
     units: FloatArray, rest: FloatArray, inflation: float
-) -> tuple[FloatArray, float]:
+) -> tuple[FloatArray, FloatArray]:
     """Divergence of sessions from the pool of others, and the pool's own level of it.
 
     Parameters
@@ -101,25 +101,29 @@ def divergence_from_rest(
     -------
     divergence : ndarray, shape (U,)
         In bits; NaN for a session without counts.
-    level : float
-        Mean leave-one-out divergence within `rest`, at least what chance alone gives.
+    level : ndarray, shape (U,)
+        Mean leave-one-out divergence within `rest`, as it would be for a session of as many
+        patterns, at least what chance alone gives.
     """
     pool = rest.sum(axis=0)
     n_pool = pool.sum()
-    if n_pool == 0:
-        return np.full(len(units), np.nan), float("nan")
     n_unit = units.sum(axis=1)
+    level = np.full(len(units), np.nan)
+    if n_pool == 0:
+        return np.full(len(units), np.nan), level
     divergence = np.asarray(jensen_shannon(units, pool))
-    counted = n_unit[n_unit > 0]
-    if not counted.size:
-        return divergence, float("nan")
-    typical = float(np.mean(counted))
-    chance = float(chance_divergence(pool, typical / inflation, n_pool / inflation))
+    counted = n_unit > 0
+    if not counted.any():
+        return divergence, level
+    chance = chance_divergence(pool, n_unit[counted] / inflation, n_pool / inflation)
+    level[counted] = chance
     present = rest[rest.sum(axis=1) > 0]
     if len(present) >= 3:
-        own = np.asarray(jensen_shannon(present, pool - present))
-        chance = max(chance, float(own.mean()))
-    return divergence, max(chance, 1e-12)
+        n = present.sum(axis=1)
+        own = float(np.mean(jensen_shannon(present, pool - present)))
+        usual = chance_divergence(pool, n / inflation, (n_pool - n) / inflation)
+        level[counted] = np.maximum(chance, own + chance - float(np.mean(usual)))
+    return divergence, np.maximum(level, 1e-12)
 
 
 def pooled_divergence(cells: Sequence[Cell], is_target: NDArray[np.bool_]) -> FloatArray:

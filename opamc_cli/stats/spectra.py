@@ -1,5 +1,6 @@
 """Distance between recording sessions by the short-time spectra of their envelopes."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -88,8 +89,8 @@ def squared_deviation(
     -----
     The variance of a session's mean is that between sessions plus that of a cycle over the number
     of cycles. The rest's own sessions show both together; what a unit of more or fewer cycles has
-    less or more is corrected for. Few sessions say little of one bin, so that its variance is
-    moderated by the motion's mean (Smyth 2004).
+    less or more is corrected for, and the rest's mean has an error of its own. Few sessions say
+    little of one bin, so that its variance is moderated by the motion's mean (Smyth 2004).
     """
     mean, n = _mean(cell.sessions[rest])
     squares = np.nansum((cell.sessions[rest] - mean) ** 2, axis=0)
@@ -107,8 +108,9 @@ def squared_deviation(
         if cell.cycles[unit] == 0:
             continue
         own = 1 / cell.cycles[unit]
-        corrected = np.fmax(variance + np.nan_to_num(within) * (own - share), within * own)
-        ratio = (cell.sessions[unit] - mean) ** 2 / np.maximum(corrected, LEAST_VARIANCE)
+        expected = np.fmax(variance + np.nan_to_num(within) * (own - share), within * own)
+        expected = expected + variance / np.maximum(n, 1)
+        ratio = (cell.sessions[unit] - mean) ** 2 / np.maximum(expected, LEAST_VARIANCE)
         known = np.isfinite(ratio)
         if known.any():
             result[k] = float(ratio[known].mean())
@@ -146,7 +148,7 @@ def size_effect(cells: Sequence[SpectrumCell], n_baseline: int) -> float:
         )
         excess.append(float(squared[(n > 1) & (n_target > 0)].mean()))
     # half, because a log power is twice a log amplitude
-    return 0.5 * float(np.sqrt(max(np.mean(excess), 0.0))) if excess else float("nan")
+    return 0.5 * math.sqrt(max(float(np.mean(excess)), 0.0)) if excess else math.nan
 
 
 def pooled_deviation(cells: Sequence[SpectrumCell], is_target: NDArray[np.bool_]) -> FloatArray:

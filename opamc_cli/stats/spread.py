@@ -75,7 +75,7 @@ def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> S
 
 
 SIBLING_SHARE = 0.1
-"""Share of the siblings' degrees of freedom that counts for a joint's own scale."""
+"""Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread."""
 
 
 def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
@@ -93,22 +93,19 @@ def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> S
     Returns
     -------
     Spread
-        Scale from the joint, from the siblings' median, which one odd sibling cannot move, and
-        from `EXPECTED`. The degrees of freedom are the joint's own and that of `EXPECTED`: joints
-        differ in spread, so that siblings sharpen the scale and not what is known of its error.
+        Of the joint's own, the siblings' median, which one odd sibling cannot move, and
+        `EXPECTED`.
     """
     values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
     prior = EXPECTED
     if values.size:
-        prior = moderated_spread(
-            float(np.median(values)),
-            dof,
-            Spread(prior.scale, prior.dof / (SIBLING_SHARE * len(values))),
-        )
-        prior = Spread(prior.scale, EXPECTED.dof + SIBLING_SHARE * dof * len(values))
-    own = moderated_spread(variance, dof, prior)
-    return Spread(own.scale, dof + EXPECTED.dof)
+        shared = SIBLING_SHARE * dof * values.size
+        median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
+        share = prior.dof / (prior.dof + shared)
+        scale = prior.scale**share * median.scale ** (1 - share)
+        prior = Spread(scale, prior.dof + shared)
+    return moderated_spread(variance, dof, prior)
 
 
 def upper_tail(distance: float, spread: Spread) -> float:

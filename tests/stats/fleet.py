@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.stats.sessions import Cell, inflation_within_sessions
+from opamc_cli.stats.spectra import SpectrumCell, variance_within_sessions
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class Fleet:
     faulty: int = 3
     independent: int = 300
     overlap: int = 8
+    louder: float = 0.0
+    """Relative change of the fluctuations' size on the faulty axis in the target's sessions."""
 
 
 def cells(plan: Fleet, seed: int) -> dict[int, list[Cell]]:
@@ -61,6 +64,38 @@ def cells(plan: Fleet, seed: int) -> dict[int, list[Cell]]:
                     cycles=cycles,
                     target_cycles=counts[is_target].reshape(-1, plan.n_patterns),
                     inflation=inflation_within_sessions(cycles, session),
+                )
+            )
+    return result
+
+
+def spectra(
+    plan: Fleet, seed: int, n_target_cycles: int | None = None
+) -> dict[int, list[SpectrumCell]]:
+    """Draw log powers of the same fleet: periodograms of noise whose level drifts by session."""
+    rng = np.random.default_rng([seed, 1])
+    n_sessions = plan.n_baseline + plan.n_target
+    is_target = np.arange(n_sessions) >= plan.n_baseline
+    n_cycles = np.where(is_target, n_target_cycles or plan.n_cycles, plan.n_cycles)
+    result: dict[int, list[SpectrumCell]] = {}
+    for axis in range(1, plan.n_axes + 1):
+        drift = rng.normal(size=(n_sessions, plan.influences))
+        result[axis] = []
+        for motion in range(plan.n_motions):
+            loads = rng.normal(size=(plan.influences, 64))
+            level = drift @ loads * plan.between_sessions / np.sqrt(plan.influences)
+            level[is_target] += plan.common * rng.normal(size=64)
+            if axis == plan.faulty:
+                level[is_target] += plan.severity * rng.normal(size=64) + 2 * plan.louder
+            labels = np.repeat(np.arange(n_sessions), n_cycles)
+            cycles = level[labels] + np.log(rng.exponential(size=(len(labels), 64)))
+            means = np.array([cycles[labels == s].mean(axis=0) for s in range(n_sessions)])
+            result[axis].append(
+                SpectrumCell(
+                    motion=motion,
+                    sessions=means,
+                    cycles=n_cycles.astype(np.float64),
+                    within=variance_within_sessions(cycles, labels),
                 )
             )
     return result

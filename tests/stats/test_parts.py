@@ -14,8 +14,8 @@ from opamc_cli.stats.sessions import pooled_divergence
 from opamc_cli.stats.spread import (
     Spread,
     moderated_spread,
-    spread_among_siblings,
     spliced_p_value,
+    spread_among_siblings,
     upper_tail,
 )
 from tests.stats.fleet import Fleet, cells
@@ -81,16 +81,22 @@ def test_a_spliced_p_value_lies_in_its_rank_step(reference, observed):
 
 def test_a_moderated_spread_lies_between_sample_and_prior():
     blended = moderated_spread(4.0, 6.0, Spread(1.0, 3.0))
-    assert 1.0 < blended.scale < 2.0
-    assert blended.scale**2 == pytest.approx((3 * 1.0 + 6 * 4.0) / 9)
+    assert 1.0 < blended.scale < 2.5
     assert blended.dof == 9.0
-    assert moderated_spread(float("nan"), 0.0).dof == 3.0
+    assert moderated_spread(float("nan"), 0.0, Spread(1.0, 3.0)) == Spread(1.0, 3.0)
 
 
-def test_one_odd_sibling_does_not_move_the_prior():
-    usual = shared_prior([0.01, 0.011, 0.009, 0.012, 0.01], 5)
-    odd = shared_prior([0.01, 0.011, 0.009, 0.012, 100.0], 5)
+def test_a_moderated_spread_is_right_in_the_middle_over_many_samples():
+    variances = np.random.default_rng(0).normal(0.0, 0.1, size=(4000, 6)).var(axis=1, ddof=1)
+    logs = [np.log(moderated_spread(v, 5.0, Spread(1.0, 1e-9)).scale) for v in variances]
+    assert np.exp(np.mean(logs)) == pytest.approx(0.1, rel=0.02)
+
+
+def test_one_odd_sibling_does_not_move_the_spread():
+    usual = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 0.01], 5)
+    odd = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 100.0], 5)
     assert odd.scale == pytest.approx(usual.scale, rel=0.1)
+    assert spread_among_siblings(0.01, [], 5).dof < usual.dof
 
 
 def test_the_tail_widens_with_fewer_degrees_of_freedom():
