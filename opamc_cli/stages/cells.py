@@ -85,7 +85,7 @@ def spectrum_cells(
         counts: list[int] = []
         rows: list[Floats] = []
         for side, own_names in zip(sides, names, strict=True):
-            runs, power = side[key]
+            runs, power, bin_hz = side[key]
             for name in own_names:
                 own = power[runs == name]
                 known = own[np.isfinite(own).all(axis=1)]
@@ -96,15 +96,23 @@ def spectrum_cells(
         # of all sessions: of the baseline's alone it would tell the target from them
         within = variance_within_sessions(np.concatenate(rows), labels)
         cells.append(
-            SpectrumCell(key[0], np.array(means), np.array(counts, dtype=np.float64), within)
+            SpectrumCell(
+                motion=key[0],
+                sessions=np.array(means),
+                cycles=np.array(counts, dtype=np.float64),
+                within=within,
+                frames=key[1],
+                bins=key[2],
+                bin_hz=bin_hz,
+            )
         )
     return cells
 
 
 def _spectra_of(
     table: pa.Table, axis: int
-) -> dict[tuple[int, int, int], tuple[npt.NDArray[np.str_], Floats]]:
-    """Return run names and log power by motion, frames and bins."""
+) -> dict[tuple[int, int, int], tuple[npt.NDArray[np.str_], Floats, float]]:
+    """Return run names, log power and width of a bin by motion, frames and bins."""
     names = ("axis", "motion", "frames", "bins")
     columns = {name: table[name].to_numpy() for name in names}
     runs = table["run"].to_numpy(zero_copy_only=False).astype(str)
@@ -118,7 +126,8 @@ def _spectra_of(
         rows = np.flatnonzero(of_axis & (keys == key).all(axis=1))
         length = key[1] * key[2]
         power = values[first[rows][:, np.newaxis] + np.arange(length)].astype(np.float64)
-        found[key[0], key[1], key[2]] = (runs[rows], power)
+        bin_hz = float(table["bin_hz"][int(rows[0])].as_py())
+        found[key[0], key[1], key[2]] = (runs[rows], power, bin_hz)
     return found
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from opamc_cli.stats.decision import Judgement, effect_by_cell
 from opamc_cli.stats.sessions import Cell
+from opamc_cli.stats.spectra import SpectrumCell, clearest_change
 from opamc_cli.storage.sources import RunSource
 
 INSPECT = (
@@ -32,7 +33,7 @@ CHECK_FIRST = (
     "stay."
 )
 CANNOT_TELL = (
-    "The patterns say that the torque's course has changed, not what changed it: another payload, "
+    "The current says that the torque's course has changed, not what changed it: another payload, "
     "program, controller gain or temperature changes it too. Repeat the recording under the "
     "baseline's conditions before taking the joint apart."
 )
@@ -44,6 +45,7 @@ def reasons(
     motions: Sequence[Mapping[str, Any]],
     sources: Mapping[str, Sequence[RunSource]],
     cause: Mapping[str, Any] | None = None,
+    spectra: Sequence[SpectrumCell] = (),
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -59,6 +61,8 @@ def reasons(
         Recordings of "baseline" and "target" in which the axis moves.
     cause
         The cause found for the change, if any.
+    spectra
+        Short-time spectra of the same sessions.
 
     Returns
     -------
@@ -70,7 +74,7 @@ def reasons(
         return [*_missing(judgement, cells), *_short(cells)]
     unhealthy = judgement.state != "healthy"
     sentences = [
-        _change(judgement, cells, motions),
+        *_change(judgement, cells, motions, spectra),
         _certainty(judgement),
         _rest(judgement, sources),
         *_siblings(judgement),
@@ -87,6 +91,35 @@ def reasons(
 
 
 def _change(
+    judgement: Judgement,
+    cells: Sequence[Cell],
+    motions: Sequence[Mapping[str, Any]],
+    spectra: Sequence[SpectrumCell],
+) -> list[str]:
+    distance = (
+        f"the target lies {judgement.distance_ratio:.3g} times as far from the baseline as a "
+        "healthy session does"
+    )
+    if judgement.state == "healthy":
+        if max(judgement.p_adjusted, judgement.p_alone) > SUSPICION:
+            return [
+                f"No change beyond what healthy sessions show: {distance}.",
+                _pattern_change(judgement, cells, motions),
+            ]
+        first = (
+            "A change too small, too uncertain or too common to all joints to act on: "
+            f"{distance}; keep an eye on it."
+        )
+    else:
+        first = f"The course of the torque has changed: {distance}."
+    return [
+        first,
+        _pattern_change(judgement, cells, motions),
+        *_size_change(judgement, spectra),
+    ]
+
+
+def _pattern_change(
     judgement: Judgement, cells: Sequence[Cell], motions: Sequence[Mapping[str, Any]]
 ) -> str:
     worst = cells[int(np.nanargmax(effect_by_cell(cells)))]
@@ -99,22 +132,28 @@ def _change(
         f"{np.mean(entry[side]):.3g}" if entry[side] else "unknown"
         for side in ("jsd_baseline", "jsd_target")
     )
-    place = (
-        f"motion {worst.motion}: mean divergence {target} against {baseline} of the baseline "
-        f"(order {worst.order}, delay {worst.tau} samples)"
-    )
-    ratio = f"patterns differ {judgement.distance_ratio:.3g} times as much as healthy sessions' do"
-    if judgement.state == "healthy" and max(judgement.p_adjusted, judgement.p_alone) > SUSPICION:
-        return f"No change beyond what healthy sessions show: {ratio}, most in {place}."
-    if judgement.state == "healthy":
-        return (
-            f"A change too small, too uncertain or too common to all joints to act on: {ratio}, "
-            f"most in {place}; keep an eye on it."
-        )
     return (
-        f"The course of the torque has changed: {ratio}, most in {place}; pattern probabilities "
-        f"changed by {judgement.effect:.0%} (root mean square)."
+        f"Patterns of the current differ most in motion {worst.motion}, where their probabilities "
+        f"changed by {judgement.pattern_effect:.0%} (root mean square): mean divergence {target} "
+        f"against {baseline} of the baseline (order {worst.order}, delay {worst.tau} samples)."
     )
+
+
+def _size_change(judgement: Judgement, spectra: Sequence[SpectrumCell]) -> list[str]:
+    sessions = max((len(cell.sessions) for cell in spectra), default=0)
+    change = clearest_change(spectra, sessions - judgement.n_target_sessions)
+    if change is None or not math.isfinite(judgement.size_effect):
+        return []
+    how = (
+        f"{change.size_ratio:.2g} times as large as before"
+        if change.size_ratio >= 1
+        else f"down to {change.size_ratio:.0%} of what they were"
+    )
+    return [
+        f"Fluctuations of the current changed in size by {judgement.size_effect:.0%} (root mean "
+        f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"{change.stop:.0%} of its way, near {change.frequency_hz:.3g} Hz, where they are {how}."
+    ]
 
 
 def _certainty(judgement: Judgement) -> str:
@@ -122,7 +161,7 @@ def _certainty(judgement: Judgement) -> str:
     if judgement.p_adjusted != judgement.p_value:
         own += f", {_p(judgement.p_adjusted)} after correction for the number of joints"
     how = {
-        "sessions": "held against each baseline session left out in turn",
+        "sessions": "by its rank among all sessions, each held against the others",
         "relabelled-sessions": "by exchanging whole sessions between baseline and target",
         "one-session": "by the allowance for a single baseline session",
         "none": "",

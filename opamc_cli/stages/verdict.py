@@ -173,7 +173,9 @@ def decide(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "reasons": reasons(decided, cells[axis], motions, runs, cause),
+                "reasons": reasons(
+                    decided, cells[axis], motions, runs, cause, by_spectrum.get(axis, ())
+                ),
             }
         )
     return {"axes": axes, "base": config.score.base, "config_hash": config.digest()}

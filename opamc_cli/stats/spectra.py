@@ -30,12 +30,42 @@ class SpectrumCell:
         Cycles that each mean is of.
     within : ndarray, shape (F,)
         Variance of a single cycle about its session's mean, from all sessions; NaN if unknown.
+    frames, bins : int
+        F is their product, frames first.
+    bin_hz : float
+        Frequency of the first bin; bin k lies at k + 1 times it.
     """
 
     motion: int
     sessions: FloatArray
     cycles: FloatArray
     within: FloatArray
+    frames: int
+    bins: int
+    bin_hz: float
+
+
+@dataclass(frozen=True)
+class BandChange:
+    """Where the envelope's fluctuations have changed most clearly.
+
+    Attributes
+    ----------
+    motion : int
+        In which motion.
+    start, stop : float
+        Part of it, 0 at its beginning and 1 at its end.
+    frequency_hz : float
+        Of the fluctuation.
+    size_ratio : float
+        Its amplitude over the baseline's mean.
+    """
+
+    motion: int
+    start: float
+    stop: float
+    frequency_hz: float
+    size_ratio: float
 
 
 def variance_within_sessions(
@@ -136,19 +166,62 @@ def size_effect(cells: Sequence[SpectrumCell], n_baseline: int) -> float:
     """
     excess: list[float] = []
     for cell in cells:
-        baseline = cell.sessions[:n_baseline]
-        target, n_target = _mean(cell.sessions[n_baseline:])
-        mean, n = _mean(baseline)
-        if not ((n > 1) & (n_target > 0)).any():
-            continue
-        dof = np.maximum(n - 1, 1)
-        variance = np.nansum((baseline - mean) ** 2, axis=0) / dof
-        squared = (target - mean) ** 2 - variance * (
-            1 / np.maximum(n, 1) + 1 / np.maximum(n_target, 1)
-        )
-        excess.append(float(squared[(n > 1) & (n_target > 0)].mean()))
+        change, variance = _change(cell, n_baseline)
+        known = np.isfinite(variance)
+        if known.any():
+            excess.append(float((change[known] ** 2 - variance[known]).mean()))
     # half, because a log power is twice a log amplitude
     return 0.5 * math.sqrt(max(float(np.mean(excess)), 0.0)) if excess else math.nan
+
+
+def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChange | None:
+    """Find the part of a motion and the frequency whose change stands out most.
+
+    Parameters
+    ----------
+    cells : sequence of SpectrumCell
+        All motions of one axis.
+    n_baseline : int
+        Number of baseline sessions.
+
+    Returns
+    -------
+    BandChange or None
+        None for fewer than two baseline sessions.
+    """
+    best, found = 0.0, None
+    for cell in cells:
+        change, variance = _change(cell, n_baseline)
+        known = np.isfinite(variance)
+        if not known.any():
+            continue
+        typical = float(variance[known].mean())
+        ratio = np.where(known, change**2 / (variance + typical + LEAST_VARIANCE), 0.0)
+        place = int(ratio.argmax())
+        if ratio[place] > best:
+            best = float(ratio[place])
+            frame, number = divmod(place, cell.bins)
+            length = 2 / (cell.frames + 1)
+            start = frame / max(cell.frames - 1, 1) * (1 - length)
+            found = BandChange(
+                motion=cell.motion,
+                start=start,
+                stop=start + length,
+                frequency_hz=(number + 1) * cell.bin_hz,
+                size_ratio=math.exp(0.5 * float(change[place])),
+            )
+    return found
+
+
+def _change(cell: SpectrumCell, n_baseline: int) -> tuple[FloatArray, FloatArray]:
+    """Change of each bin's log power, and its variance among healthy sessions; NaN if unknown."""
+    baseline = cell.sessions[:n_baseline]
+    target, n_target = _mean(cell.sessions[n_baseline:])
+    mean, n = _mean(baseline)
+    squares = np.nansum((baseline - mean) ** 2, axis=0)
+    enough = (n > 1) & (n_target > 0)
+    per_session = np.divide(squares, n - 1, out=np.full(n.shape, np.nan), where=enough)
+    return target - mean, per_session * (1 / np.maximum(n, 1) + 1 / np.maximum(n_target, 1))
 
 
 def pooled_deviation(cells: Sequence[SpectrumCell], is_target: NDArray[np.bool_]) -> FloatArray:

@@ -96,6 +96,9 @@ def spectra(
                     sessions=means,
                     cycles=n_cycles.astype(np.float64),
                     within=variance_within_sessions(cycles, labels),
+                    frames=8,
+                    bins=8,
+                    bin_hz=5.0,
                 )
             )
     return result
