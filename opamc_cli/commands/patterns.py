@@ -31,7 +31,7 @@ def patterns(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Count ordinal patterns of the identified segments; writes patterns.parquet."""
+    """Count ordinal patterns of identified segments; writes patterns.parquet, spectra.parquet."""
     from opamc_cli.config import load_config
     from opamc_cli.stages import identify
     from opamc_cli.stages import patterns as stage
@@ -48,7 +48,11 @@ def patterns(
         )
     counted = outcome.by_motion()
     output.result(
-        {"written": str(outcome.path), "motions": counted},
+        {
+            "written": str(outcome.path),
+            "spectra": str(outcome.spectra_path),
+            "motions": counted,
+        },
         *(
             f"axis {c['axis']} motion {c['motion']} order {c['order']}: tau {c['tau']}, "
             f"{c['n_patterns']} patterns in {c['segments']} segments"
