@@ -8,6 +8,7 @@ from opamc_cli.joint.groups import cycle_length
 from opamc_cli.joint.phases import (
     PhaseAngle,
     follow_phases,
+    lost,
     side_of_torque,
     torque_current,
     without_slips,
@@ -336,7 +337,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
             channels |= {"scale"}
         motion = _scaled(phase_angle, scale)
         # Where there is too little current to tell an angle, the motion is a guess.
-        usable &= ~widened(~phase_angle.strong, phase_angle.window) & phase_angle.clear
+        usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear
         channels |= {"position"}
     else:
         msg = "a recording needs a position, a velocity or three phase currents"

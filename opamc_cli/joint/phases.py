@@ -290,7 +290,7 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     """
     path = angle.angle_rad
     cycles = path.size // period
-    stretches = _stretches(angle.strong, max(int(LOST_S * rate_hz), 2))
+    stretches = _stretches(angle.strong, rate_hz)
     if cycles < FEWEST_CYCLES or not stretches:
         return angle
     whole = slice(0, cycles * period)
@@ -365,7 +365,7 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     array of shape (n,)
         +1 or -1.
     """
-    stretches = _stretches(angle.strong, max(int(LOST_S * rate_hz), 2))
+    stretches = _stretches(angle.strong, rate_hz)
     if not stretches:
         return np.ones(torque_a.size)
     speed = angle.velocity_rad_s
@@ -414,12 +414,33 @@ def _turned(signs: Floats, gram: Floats, moment: Floats) -> tuple[float, Floats]
     return explained, signs if solve(total, joint)[0] >= 0 else -signs
 
 
-def _stretches(strong: Bools, longest_gap: int) -> list[tuple[int, int]]:
+def lost(strong: Bools, rate_hz: float) -> Bools:
+    """Tell where the current was too small, for too long, to carry the followed angle across.
+
+    Parameters
+    ----------
+    strong : bool array of shape (n,)
+        Samples with enough current to tell an angle.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    bool array of shape (n,)
+        False also in gaps of up to 15 ms, as where the torque passes zero: the filter bridges them.
+    """
+    result: Bools = np.ones(strong.size, dtype=bool)
+    for start, stop in _stretches(strong, rate_hz):
+        result[start:stop] = False
+    return result
+
+
+def _stretches(strong: Bools, rate_hz: float) -> list[tuple[int, int]]:
     """Half-open stretches of strong samples; short gaps are bridged."""
     rows = np.flatnonzero(strong)
     if not rows.size:
         return []
-    breaks = np.flatnonzero(np.diff(rows) > longest_gap)
+    breaks = np.flatnonzero(np.diff(rows) > max(int(LOST_S * rate_hz), 2))
     starts = [int(rows[0]), *(int(rows[b + 1]) for b in breaks)]
     stops = [*(int(rows[b]) + 1 for b in breaks), int(rows[-1]) + 1]
     return list(zip(starts, stops, strict=True))

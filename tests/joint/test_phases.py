@@ -3,7 +3,7 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint.kinematics import Recording, build_track
-from opamc_cli.joint.phases import follow_phases, side_of_torque, torque_current
+from opamc_cli.joint.phases import follow_phases, lost, side_of_torque, torque_current
 from opamc_cli.joint.track import Joint
 
 
@@ -50,3 +50,12 @@ def test_delay_of_the_phase_sensors_does_not_turn_the_torque_axis():
     assert np.max(np.abs(track.current_a[rows] - torque[rows])) < 0.3
     # The angle comes from the position: it does not slip at rest.
     assert np.ptp(track.electrical_rad - field) < 0.3
+
+
+def test_short_gaps_of_current_are_bridged_and_long_ones_are_lost():
+    strong = np.ones(1000, dtype=bool)
+    strong[200:210] = False
+    strong[500:600] = False
+    gone = lost(strong, rate_hz=1000.0)
+    assert np.array_equal(np.flatnonzero(gone), np.arange(500, 600))
+    assert lost(np.zeros(10, dtype=bool), 1000.0).all()
