@@ -1,6 +1,7 @@
 """How often the loop adds what is not there, finds what is, and names it rightly.
 
     python benchmarks/loop.py [--quick] [--seeds N] [--first-seed 1000] [--mode position|phases]
+    python benchmarks/loop.py --testbed [--quick] [--seeds N] [--first-seed 1000]
 
 Every trial is a joint of the tests' own simulator: trajectory, rate, robot, noise colour and effect
 are drawn from the seed. Tuning used seeds below 100 only; the default starts at 1000.
@@ -123,7 +124,17 @@ def main() -> None:
     parser.add_argument("--only", default="", help="effects, separated by commas; or null, removed")
     parser.add_argument("--ratios", default="0.3,0.6")
     parser.add_argument("--verbose", action="store_true")
+    parser.add_argument(
+        "--testbed", action="store_true", help="on the virtual testbed; --seeds per effect"
+    )
     arguments = parser.parse_args()
+    if arguments.testbed:
+        import testbed_closings
+
+        first, count = arguments.first_seed, arguments.seeds or (1 if arguments.quick else 20)
+        removed = range(first, first + max(count // 5, 1))
+        testbed_closings.run(range(first, first + count), removed, verbose=arguments.verbose)
+        return
     per_effect = arguments.seeds or (2 if arguments.quick else 10)
     options: dict[str, object] = {}
     if arguments.mode == "phases":
@@ -198,9 +209,12 @@ def main() -> None:
             if name in DECLARED:
                 continue
             for seed in seeds_of(name)[: max(per_effect // 2, 1)]:
-                trial = run_trial(
-                    seed, (name,), 0.6, mode=arguments.mode, without=(name,), **options
-                )
+                try:
+                    trial = run_trial(
+                        seed, (name,), 0.6, mode=arguments.mode, without=(name,), **options
+                    )
+                except TooLittleError:
+                    continue
                 total += 1
                 wrong += bool(trial.added)
                 silent += trial.loop.verdict == "nothing-missing"
