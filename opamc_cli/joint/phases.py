@@ -295,11 +295,11 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
         return angle
     whole = slice(0, cycles * period)
     steps = np.diff(path, append=path[-1])[whole].reshape(cycles, period)
-    course = np.cumsum(np.median(steps, axis=0))
+    course = np.concatenate([[0.0], np.cumsum(np.median(steps, axis=0))])
     if abs(course[-1]) > LARGEST_DRIFT * float(np.ptp(course)):
         return angle
     weak = np.mean(~angle.strong[whole].reshape(cycles, period), axis=0) + 1e-9
-    course = course - course[-1] * np.cumsum(weak) / weak.sum()
+    course[1:] -= course[-1] * np.cumsum(weak) / weak.sum()
     repeated = path.copy()
     edges, slips = [0.0], [0.0]
     anchor: float | None = None

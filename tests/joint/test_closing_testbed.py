@@ -7,9 +7,10 @@ anything was run on it.
 
 import numpy as np
 import pytest
-from testbed_closing import EFFECTS, SENSING, close_on_testbed, names_of
+from testbed_closing import EFFECTS, SENSING, close_on_testbed, declared_on_testbed, names_of
 
 from opamc_cli.joint.loop import Loop
+from opamc_cli.joint.track import Joint
 
 SEED = 100
 
@@ -119,3 +120,9 @@ def test_an_effect_that_the_library_lacks_is_not_given_another_s_name(effect, do
     assert loop.remaining_domain == domain
     assert loop.steps == ()
     assert np.isclose(loop.rmse_after_a, loop.rmse_before_a)
+
+
+def test_gravity_is_declared_without_gear_ratio_and_pole_pairs():
+    fitted = declared_on_testbed("phases", SEED, Joint())
+    (gravity,) = (term for term in fitted.terms if term.effect.name == "gravity")
+    assert gravity.parameters["joint_rad_per_rad"] == pytest.approx(1 / 500, rel=0.02)

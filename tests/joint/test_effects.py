@@ -181,3 +181,18 @@ def test_without_gear_ratio_orders_are_counted_per_joint_revolution():
     _, track = track_of(Joint())
     assert track.angle_kind == "joint"
     assert "per joint revolution" in read_order(202.0, track)
+
+
+@pytest.mark.parametrize(("starts", "columns"), [((None, None), 4), ((0.0, 86_400.0), 2)])
+def test_hum_has_a_phase_for_every_clock(starts, columns):
+    made = simulate(3, rate=500.0, cycles=4, kind="quintic")
+    recordings = [
+        Recording("run", 500.0, made.current, position_rad=made.position, started_s=start)
+        for start in starts
+    ]
+    track = build_track(recordings, Joint())
+    hum = built_in_library()["mains_hum"].columns(track, {"frequency_hz": 50.0, "turning": 0.0})
+    assert hum.shape == (track.size, columns)
+    first = track.bounds[0][1]
+    assert np.any(hum[:first, 0])
+    assert np.any(hum[first:, 0]) == (columns == 2)

@@ -1,9 +1,20 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulator import simulate
 
+from opamc_cli.joint.angle_filter import acceleration_noise, smoothed_angle
 from opamc_cli.joint.kinematics import Recording, build_track
-from opamc_cli.joint.phases import follow_phases, lost, side_of_torque, torque_current
+from opamc_cli.joint.phases import (
+    PhaseAngle,
+    follow_phases,
+    lost,
+    side_of_torque,
+    torque_current,
+    without_sensor_errors,
+    without_slips,
+)
 from opamc_cli.joint.track import Joint
 
 
@@ -59,3 +70,45 @@ def test_short_gaps_of_current_are_bridged_and_long_ones_are_lost():
     gone = lost(strong, rate_hz=1000.0)
     assert np.array_equal(np.flatnonzero(gone), np.arange(500, 600))
     assert lost(np.zeros(10, dtype=bool), 1000.0).all()
+
+
+def test_noise_of_the_acceleration_is_that_of_a_smoothed_white_angle():
+    rate, size = 1000.0, 200_000
+    angle = 0.01 * np.random.default_rng(2).normal(size=size)
+    every, none = np.ones(size, dtype=bool), np.zeros(size, dtype=bool)
+    for bandwidth in (10.0, 30.0):
+        _, _, acceleration = smoothed_angle(angle, every, np.zeros(size), none, rate, bandwidth)
+        found = float(np.std(acceleration[2000:-2000]))
+        assert found == pytest.approx(acceleration_noise(0.01, rate, bandwidth), rel=0.05)
+
+
+def test_an_angle_that_repeats_is_freed_of_slips():
+    rate, period, cycles = 500.0, 1000, 5
+    true = 200 * np.sin(2 * np.pi * np.arange(period * cycles) / period)
+    strong = np.ones(true.size, dtype=bool)
+    path = true + 3.0
+    rng = np.random.default_rng(3)
+    for cycle in range(cycles):
+        for gap in (230, 740):
+            start = cycle * period + gap
+            strong[start : start + 40] = False
+            # One slip in three, so that the median of the cycles has none.
+            path[start + 20 :] += np.pi * rng.integers(-3, 4) * (cycle % 3 == 1)
+    speed, blur = np.gradient(path) * rate, np.zeros((true.size, 2))
+    angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
+    freed = without_slips(angle, period, rate).angle_rad
+    np.testing.assert_allclose((freed - true)[strong], 3.0, atol=1e-6)
+    drifting = replace(angle, angle_rad=path + 0.1 * np.arange(true.size))
+    assert without_slips(drifting, period, rate) is drifting
+
+
+def test_zero_errors_and_unequal_gains_are_taken_out_of_the_vector():
+    angle = np.linspace(0, 300, 5000)
+    torque = 2 + np.sin(angle / 40)
+    clean = torque * np.exp(1j * angle)
+    vector = clean + (0.1 - 0.2j) + (0.03 + 0.02j) * np.conj(clean)
+    every = np.ones(angle.size, dtype=bool)
+    mended = without_sensor_errors(vector, angle, every)
+    assert np.std(np.angle(vector * np.exp(-1j * angle))) > 0.05
+    assert np.std(np.angle(mended * np.exp(-1j * angle))) < 0.005
+    assert without_sensor_errors(vector, angle, ~every) is vector

@@ -6,6 +6,7 @@ from opamc_cli.joint.smoothing import (
     derivatives,
     measurement_noise,
     smoothing_window,
+    unstepped,
 )
 from opamc_cli.joint.track import averaged
 
@@ -51,3 +52,14 @@ def test_clean_paths_get_the_shortest_window_and_noisy_ones_a_longer():
     noisy = clean + np.random.default_rng(0).normal(size=t.size) * 1e-5
     assert smoothing_window(clean, 1000.0) == 5
     assert smoothing_window(noisy, 1000.0) > 21
+
+
+def test_steps_of_a_coarse_temperature_are_bridged():
+    true = 25 + 8 * (1 - np.exp(-np.arange(20_000) / 6000))
+    logged = np.round(true / 0.5) * 0.5
+    assert np.max(np.abs(logged - true)) > 0.24
+    # Beyond the last step nobody knows.
+    inside = slice(500, np.flatnonzero(np.diff(logged))[-1])
+    assert np.max(np.abs(unstepped(logged) - true)[inside]) < 0.05
+    noisy = np.random.default_rng(0).normal(size=100)
+    assert unstepped(noisy) is noisy

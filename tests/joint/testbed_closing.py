@@ -8,7 +8,7 @@ from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop, declared_fit
-from opamc_cli.joint.model import open_session
+from opamc_cli.joint.model import Fit, open_session
 from opamc_cli.joint.recordings import grouped_track
 from opamc_cli.joint.track import Joint
 from opamc_cli.testbed.parameters import Effect
@@ -17,6 +17,7 @@ from opamc_cli.testbed.robot import AxisRecording, simulate
 CONFIG = load_testbed(Path(__file__).parents[2] / "configs" / "closing.yaml")
 RATE_HZ = CONFIG.recording.sampling_rate_hz
 DECLARED = ("inertia", "gravity", "coulomb", "viscous")
+KNOWN = Joint(CONFIG.robot.joints[0].gear.ratio, CONFIG.robot.joints[0].motor.pole_pairs)
 
 SENSING = ("position and current", "position and phases", "phases")
 """What is logged: of position and current only what is named, and the temperature."""
@@ -60,14 +61,10 @@ def record(names: tuple[str, ...], seed: int) -> AxisRecording:
     return recording.axes[1]
 
 
-def close_on_testbed(
-    names: tuple[str, ...],
-    sensing: str,
-    seed: int,
-    declared: tuple[str, ...] = DECLARED,
-    without: tuple[str, ...] = (),
-) -> Loop:
-    """Close the loop on a session, with what `sensing` logs; what is missing is not declared."""
+def declared_on_testbed(
+    sensing: str, seed: int, joint: Joint = KNOWN, names: tuple[str, ...] = ()
+) -> Fit:
+    """Fit the declared model, without the named effects, to a session that has them."""
     axis = record(names, seed)
     phases = sensing != "position and current"
     recording = Recording(
@@ -78,13 +75,18 @@ def close_on_testbed(
         position_rad=None if sensing == "phases" else axis.position_rad,
         temperature_c=axis.temperature_c.astype(float),
     )
-    motor = CONFIG.robot.joints[0].motor
-    joint = Joint(CONFIG.robot.joints[0].gear.ratio, motor.pole_pairs)
     track, grouping = grouped_track([recording], joint)
     assert grouping is not None
     library = built_in_library()
-    terms = tuple((library[name], None) for name in declared if name not in names)
-    fitted = declared_fit(open_session(track, grouping), terms)
+    terms = tuple((library[name], None) for name in DECLARED if name not in names)
+    return declared_fit(open_session(track, grouping), terms)
+
+
+def close_on_testbed(
+    names: tuple[str, ...], sensing: str, seed: int, without: tuple[str, ...] = ()
+) -> Loop:
+    """Close the loop on a session, with what `sensing` logs; what is missing is not declared."""
+    fitted = declared_on_testbed(sensing, seed, names=names)
     return close_loop(fitted, built_in_library(without), seed)
 
 
