@@ -9,13 +9,16 @@ from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.flux import objection_of_flux
+from opamc_cli.joint.form import imitations, pressed_limit
 from opamc_cli.joint.model import Fit, Session, Term, fit_terms
+from opamc_cli.joint.plain import Plain, is_in_library, plain_terms, plainer
 from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.trace import (
     Candidate,
     Gate,
     Held,
     View,
+    consistency,
     decoy_likelihood,
     held_out,
     prepare,
@@ -26,17 +29,13 @@ from opamc_cli.joint.trace import (
 )
 
 MOST_STEPS = 16
-ATTEMPTS = 2
+ATTEMPTS = 3
 TIE_LIKELIHOOD = 6.0
 TIE_SHARE = 0.03
 TIE_COLLINEARITY = 0.9
 STRUCTURE_GAIN = 0.02
 STRUCTURE_P = 1e-3
 """Least gain and largest p of what counts as structure that is left."""
-FORM_GAIN = 0.01
-FORM_P = 0.02
-FORM_KEPT = 0.2
-"""What an added effect may not leave of its own domain's structure."""
 CLOSED_SHARE = 0.9
 TRIFLE_SHARE = 0.4
 PATCHWORK_KINDS = 3
@@ -181,9 +180,7 @@ def close_loop(
         fitted, steps = _pruned(fitted, before, progress)
         found = {step.term.effect.name for step in steps}
         remains = structures(fitted)
-        fitted, steps, remains = _without_wrong_forms(
-            before, fitted, steps, seen_before, remains, progress
-        )
+        fitted, steps, remains = _without_imitations(before, fitted, steps, remains, progress, seed)
         wrong = found - {step.term.effect.name for step in steps}
         if not wrong:
             break
@@ -288,12 +285,30 @@ def _candidates(
     _simplest_first(found, library, session)
     checked: list[Candidate] = []
     held: dict[bool, Held] = {}
+    unnamed: list[Plain] | None = None
     for candidate in found:
         if candidate.fine not in held:
             held[candidate.fine] = prepare_held(fitted, candidate.fine)
         tested = held_out(fitted, candidate, held[candidate.fine])
+        view = views[candidate.fine]
         tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
-        why = refusal(tested, gate)
+        if tested.p_value <= gate.largest_p:
+            tested = replace(tested, consistency=consistency(session, view, candidate))
+        why = refusal(tested, gate) or pressed_limit(session, view, tested)
+        if why is None and not tested.fine:
+            if unnamed is None:
+                unnamed = [
+                    plain
+                    for plain in plain_terms(view)
+                    if plain.score > tested.score
+                    and not is_in_library(plain, library, session, view)
+                ]
+            plain = plainer(tested, unnamed, session, view)
+            if plain is not None:
+                why = (
+                    f"{plain.what} does as well with fewer parameters, and the library has no "
+                    "effect of that form"
+                )
         if why is None:
             term = tested.term
             why = objection_of_flux(session, term.effect, term.parameters, tested.coefficients)
@@ -323,6 +338,9 @@ def _round(
             continue
         extended = fit_terms(session, (*fitted.terms, candidate.term))
         effect = candidate.term.effect
+        if not effect.plausible(extended.coefficients[-1], candidate.term.parameters):
+            checked[i] = replace(candidate, why_not="fitted jointly, its sign is not physical")
+            continue
         ties = _ties(candidate, checked)
         progress.steps.append(
             Step(
@@ -443,42 +461,30 @@ def _pruned(fitted: Fit, before: Fit, progress: _Progress) -> tuple[Fit, list[St
     return fitted, steps
 
 
-SHAPED_DOMAINS = ("velocity", "joint-angle", "acceleration", "load", "temperature", "time")
-
-
-def _without_wrong_forms(
+def _without_imitations(
     before: Fit,
     fitted: Fit,
     steps: list[Step],
-    seen_before: list[Structure],
     remains: list[Structure],
     progress: _Progress,
+    seed: int,
 ) -> tuple[Fit, list[Step], list[Structure]]:
-    """Take back effects that leave much of their own domain's structure: the form is wrong."""
-    scale = (fitted.rmse(sealed=False) / max(before.rmse(sealed=False), 1e-300)) ** 2
-    first = {structure.domain: structure.gain for structure in seen_before}
-    wrong = {
-        structure.domain
-        for structure in remains
-        if structure.domain in SHAPED_DOMAINS
-        and structure.gain > FORM_GAIN
-        and structure.p_value < FORM_P
-        and structure.gain * scale > FORM_KEPT * max(first.get(structure.domain, 0.0), 0.0)
-    }
-    kept = [step for step in steps if step.term.effect.domain not in wrong]
-    if len(kept) == len(steps):
+    """Take back effects whose form is wrong, as what they leave shows."""
+    wrong = imitations(fitted, tuple(step.term for step in steps), seed)
+    if not wrong:
         return fitted, steps, remains
-    for step in steps:
+    kept = [step for i, step in enumerate(steps) if i not in wrong]
+    for i, domain in wrong.items():
+        step = steps[i]
         effect = step.term.effect
-        if effect.domain in wrong:
-            progress.rejected[effect.name] = Rejected(
-                effect.name,
-                effect.domain,
-                step.term.parameters,
-                step.gain,
-                step.p_value,
-                f"leaves structure in the {effect.domain} domain: the form is another one",
-            )
+        progress.rejected[effect.name] = Rejected(
+            effect.name,
+            effect.domain,
+            step.term.parameters,
+            step.gain,
+            step.p_value,
+            f"leaves structure in the {domain} domain: the form is another one",
+        )
     smaller = fit_terms(fitted.session, (*before.terms, *(step.term for step in kept)))
     return smaller, kept, structures(smaller)
 

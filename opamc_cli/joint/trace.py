@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,9 @@ BATCH_VALUES = 1_000_000
 ROWS_AT_A_TIME = 16_384
 
 LEAST_DRIFT = 0.1
+
+SPANNED = 1e-6
+"""A column of which a span leaves less than this share of the energy is rounding."""
 BLOCKS_PER_GROUP = 8
 DECOY_BLOCKS_PER_GROUP = 2
 
@@ -40,9 +44,9 @@ class Gate:
 
     smallest_gain: float = 0.01
     smallest_t: float = 2.0
-    smallest_consistency: float = 0.75
+    smallest_consistency: float = 0.7
     decoy_ratio: float = 2.0
-    largest_p: float = 3e-3
+    largest_p: float = 1e-2
     decoys: int = 5
 
 
@@ -241,7 +245,7 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
         for column in block.T:
             np.take(whitened(column, taps), rows, out=base[:, place])
             place += 1
-    span = _orthonormal(base)
+    span = orthonormal(base)
     signal = whitened(own if residual is None else residual, taps)
     values = signal[valid]
     values = values - span @ (span.T @ values)
@@ -266,8 +270,11 @@ def residual_on(fit: Fit, fine: bool) -> Floats:
     return residual
 
 
-def _orthonormal(columns: Floats) -> Floats:
-    """Orthonormal columns of the same span, in the place of the given ones."""
+def orthonormal(columns: Floats) -> Floats:
+    """Orthonormal columns of the same span, in the place of the given ones.
+
+    Directions below 1e-9 of the largest are left out.
+    """
     if columns.shape[1] == 0:
         return columns
     gram = columns.T @ columns
@@ -280,6 +287,16 @@ def _orthonormal(columns: Floats) -> Floats:
         rows = slice(start, start + ROWS_AT_A_TIME)
         columns[rows, : turn.shape[1]] = columns[rows] @ turn
     return columns[:, : turn.shape[1]]
+
+
+def orthonormal_beside(columns: Floats, span: Floats) -> Floats:
+    """Orthonormal basis of what an orthonormal span leaves of columns.
+
+    A column of which less than a millionth of the energy is left is rounding, and left out.
+    """
+    left = columns - span @ (span.T @ columns)
+    energy = np.einsum("ij,ij->j", columns, columns)
+    return orthonormal(left[:, np.einsum("ij,ij->j", left, left) > SPANNED * energy])
 
 
 @dataclass(frozen=True)
@@ -352,7 +369,7 @@ def _scored(
     limits = len(effect.limits(view.grid.track))
     for form, keep in forms:
         # A column that the model already spans leaves only rounding.
-        new = [k for k in keep if known.gram[k, k] > 1e-6 * known.whole[k]]
+        new = [k for k in keep if known.gram[k, k] > SPANNED * known.whole[k]]
         if not new:
             continue
         solution = solve(known.gram[np.ix_(new, new)], moment[new])
@@ -433,9 +450,10 @@ def search(
             same_form = result.term.keep == best.term.keep
             if same_form and result.term.parameters == settled_parameters:
                 best = result
-    free = best.coefficients.size + len(limits)
-    likelihood = best.score + SCORE_PER_PARAMETER * free
+    likelihood = best.score + SCORE_PER_PARAMETER * (best.coefficients.size + len(limits))
     tried = max(len(guesses), 1)
+    # Guesses that lie close together pay for the choice by their number; others do not.
+    free = best.coefficients.size + (0 if effect.free_refinement else len(limits))
     log_p = float(chi2.logsf(max(likelihood, 0.0), free)) + np.log(tried)
     p_value = float(np.exp(np.clip(log_p, -700.0, 0.0)))
     contribution = best.contribution(view)
@@ -594,22 +612,44 @@ def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candid
     Returns
     -------
     Candidate
-        With gain, and with consistency: the share of groups that are better, every group counted
-        with the energy of what the candidate adds there.
+        With its gain.
     """
     session = fit.session
     grid = session.grid(candidate.fine)
     held = held or prepare_held(fit, candidate.fine)
-    base = held.base.shape[1]
     own = session.columns(candidate.term, candidate.fine)[grid.fit]
     normal = appended(held.normal, held.base, own, held.residual, grid.slices)
     before = held_out_error(held.normal)
-    after = held_out_error(normal)
-    falls = before - after
-    gain = float(falls.sum() / max(before.sum(), 1e-300))
+    falls = before - held_out_error(normal)
+    return replace(candidate, gain=float(falls.sum() / max(before.sum(), 1e-300)))
+
+
+def consistency(session: Session, view: View, candidate: Candidate) -> float:
+    """Share of groups that a candidate explains better when it is fitted to the others.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings.
+    view : View
+        Whitened residual: a slow drift inside a group would drown what the candidate explains.
+    candidate : Candidate
+        From `search`.
+
+    Returns
+    -------
+    float
+        Every group counted with the energy of what the candidate adds there, 0 to 1.
+    """
+    base = view.span.shape[1]
+    own = view.whitened_rows(session.columns(candidate.term, candidate.fine))
+    edges = np.flatnonzero(np.diff(view.grid.track.group[view.rows])) + 1
+    slices = tuple(pairwise([0, *edges.tolist(), view.rows.size]))
+    model = normal_equations(view.span, view.values, slices)
+    normal = appended(model, view.span, own, view.values, slices)
+    falls = held_out_error(model) - held_out_error(normal)
     energy = _excitation(normal, base)
-    consistency = float(np.sum(energy * (falls > 0)) / max(energy.sum(), 1e-300))
-    return replace(candidate, gain=gain, consistency=consistency)
+    return float(np.sum(energy * (falls > 0)) / max(energy.sum(), 1e-300))
 
 
 def _excitation(normal: Normal, base: int) -> Floats:
@@ -643,12 +683,12 @@ def block_t_value(view: View, contribution: Floats) -> float:
         or step, and live in few groups, can show themselves too.
     """
     products = contribution * view.values
-    sums = np.array([products[block].sum() for block in _blocks_of(view, BLOCKS_PER_GROUP)])
+    sums = np.array([products[block].sum() for block in blocks_of(view, BLOCKS_PER_GROUP)])
     length = float(np.linalg.norm(sums))
     return float(sums.sum() / length) if length > 0 else 0.0
 
 
-def _blocks_of(view: View, per_group: int) -> list[NDArray[np.int64]]:
+def blocks_of(view: View, per_group: int) -> list[NDArray[np.int64]]:
     """Positions among the valid samples, in blocks of each group."""
     groups = view.grid.track.group[view.valid]
     edges = np.flatnonzero(np.diff(groups) != 0) + 1
@@ -690,7 +730,7 @@ def decoy_likelihood(
     worst = 0.0
     rest = view.values - candidate.contribution
     fast = candidate.term.effect.fast
-    blocks = _blocks_of(view, BLOCKS_PER_GROUP if fast else DECOY_BLOCKS_PER_GROUP)
+    blocks = blocks_of(view, BLOCKS_PER_GROUP if fast else DECOY_BLOCKS_PER_GROUP)
     # Fast effects guess from the residual, all others the same every time.
     shared: Shared | None = None if fast else {}
     for _ in range(count):

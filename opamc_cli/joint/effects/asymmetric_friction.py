@@ -20,5 +20,5 @@ class AsymmetricFriction(Effect):
         return stack(np.ones(track.size), np.abs(track.velocity))
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """Allow that the difference lies in the slope or in the dry friction alone."""
-        return [(parameters | {"dry": 0.0}, (1,)), (parameters | {"slope": 0.0}, (0,))]
+        """Allow that the difference lies in the slope alone; a constant alone is an offset."""
+        return [(parameters | {"dry": 0.0}, (1,))]

@@ -36,6 +36,11 @@ class Effect:
     """True where the effect takes part in the load or friction that other effects scale."""
     forms: tuple[str, ...] = ()
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
+    open_limits: tuple[str, ...] = ()
+    """Parameters whose limits only bound the search: beyond them the effect is still itself."""
+    free_refinement: bool = True
+    """True where the number of guesses counts the choice; False where refining the best one
+    chooses among many more, and its parameters count as coefficients do."""
     flags_choose_columns: bool = False
     """True where parameters say which columns `columns` returns."""
     carries_load: bool = False

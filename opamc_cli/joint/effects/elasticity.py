@@ -20,19 +20,20 @@ class Elasticity(Effect):
     needs = ("position", "logged")
     dense_guesses = True
     from_motion = True
+    free_refinement = False
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz to a quarter of the rate, three dampings."""
         high = min(60.0, track.rate_hz / 4)
         return [
             {"resonance_hz": resonance, "damping": damping}
-            for damping in (0.03, 0.1, 0.3)
+            for damping in (0.03, 0.1, 0.2)
             for resonance in geometric(2.0, high, 22)
         ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """From slow swaying to a quarter of the sampling rate."""
-        return {"resonance_hz": (1.0, min(60.0, track.rate_hz / 3)), "damping": (0.005, 0.4)}
+        """From slow swaying to a third of the sampling rate; damped more, nothing rings."""
+        return {"resonance_hz": (1.0, min(60.0, track.rate_hz / 3)), "damping": (0.005, 0.25)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
@@ -52,6 +53,10 @@ class Elasticity(Effect):
                 rest = _at_rest(above, poles) * part[0]
                 filtered[start:stop] = lfilter(above, poles, part, zi=rest)[0]
         return stack(excess, change)
+
+    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
+        """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
+        return bool(coefficients[0] > 0 and abs(coefficients[1]) < coefficients[0])
 
 
 Quadratic = tuple[float, float, float]

@@ -46,6 +46,7 @@ class MainsHum(Effect):
     meaning = "mains pick-up in the current reading: check shielding and grounding"
     dense_guesses = True
     from_motion = True
+    free_refinement = False
     fast = True
     several = True
     static = False

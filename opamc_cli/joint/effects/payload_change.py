@@ -14,6 +14,8 @@ class PayloadChange(Effect):
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
+    free_refinement = False
+    open_limits = ("since_s",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try a step between any two groups."""

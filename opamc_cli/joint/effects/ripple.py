@@ -18,6 +18,7 @@ class Ripple(Effect):
     domain = "motor-angle"
     meaning = "torque ripple"
     needs = ("position",)
+    free_refinement = False
     fast = True
     several = True
     flags_choose_columns = True
