@@ -27,6 +27,8 @@ COST = 2.0
 """What another cosine must earn, as in Akaike's criterion."""
 LEAST_EXCESS = 12.0
 """In likelihood units. Right forms left up to 9 in 40 simulated joints, imitations 14 to 2000."""
+LEAST_SHARE = 0.05
+"""Of the effect's own likelihood: in clean recordings the motion's own smoothing leaves as much."""
 LARGEST_P = 0.005
 SUBSUMED = 0.3
 """An effect is an imitation if the cosines leave it less than this share of its likelihood."""
@@ -231,8 +233,8 @@ def imitations(fit: Fit, added: tuple[Term, ...], seed: int) -> dict[int, str]:
     -------
     dict of int to str
         Place in `added`, and the domain of what the effect imitates: one in which smooth functions
-        explain more than chance, and either leave the effect nothing to explain or explain
-        more than it does.
+        explain more than chance and a twentieth of what the effect does, and either leave the
+        effect nothing to explain or explain more than it does.
     """
     if not added:
         return {}
@@ -256,7 +258,11 @@ def imitations(fit: Fit, added: tuple[Term, ...], seed: int) -> dict[int, str]:
         signal = view.values + columns @ values
         alone = _worth(signal, columns, others) / variance
         beside = _worth(signal, columns, np.concatenate([others, worst.basis], axis=1)) / variance
-        if beside < SUBSUMED * alone or worst.excess > alone:
+        if worst.excess < LEAST_SHARE * alone:
+            continue
+        # What is fast averages out on the coarse grid: there it need not explain the most.
+        trifling = worst.excess > alone and not term.effect.fast
+        if beside < SUBSUMED * alone or trifling:
             result[added.index(term)] = worst.domain
     return result
 

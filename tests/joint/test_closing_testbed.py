@@ -21,20 +21,13 @@ UNTESTABLE = {("elasticity", "phases"), ("time_delay", "phases")}
 TIED = {"asymmetric_friction"}
 """The testbed's is a constant while the joint moves: nobody can tell it from an offset."""
 
-UNMENDED = {
-    ("sensor_offset", "phases"): "the followed angle sways with what is left of it at low speed",
-    ("time_delay", "position and current"): "what a delay does at a start is left for elasticity",
-}
-
 
 def cases():
     for effect in EFFECTS:
         for sensing in SENSING:
             if (effect, sensing) in UNTESTABLE:
                 continue
-            why = UNMENDED.get((effect, sensing))
-            marks = [pytest.mark.xfail(strict=True, reason=why)] if why else []
-            yield pytest.param(effect, sensing, marks=marks)
+            yield effect, sensing
 
 
 @pytest.fixture(scope="session")
