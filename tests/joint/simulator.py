@@ -118,6 +118,8 @@ def simulate(
     declared=DECLARED,
     quantum=None,
     phase_errors=False,
+    current_filter_hz=None,
+    current_quantum=None,
 ):
     rng = np.random.default_rng(seed)
     rate = rate or float(rng.choice([100.0, 250.0, 500.0, 1000.0, 2048.0]))
@@ -209,6 +211,11 @@ def simulate(
         )
         total += shape * wanted / left(shape)
     current = base + total + noise
+    if current_filter_hz is not None:
+        pole = np.exp(-2 * np.pi * current_filter_hz / rate)
+        current = lfilter([1 - pole], [1, -pole], current)
+    if current_quantum is not None:
+        current = np.round(current / current_quantum) * current_quantum
     phases = np.stack([current * np.cos(field - k * 2 * np.pi / 3) for k in range(3)], axis=1)
     phases += 0.5 * noise_rms * rng.normal(size=phases.shape)
     errors = dict.fromkeys(effects) if phase_errors else {}
@@ -312,7 +319,9 @@ def effect_shape(
         size = 1 + rng.uniform(0, 0.5) * sign + rng.uniform(-0.5, 0.5) * speed / top
         return size * np.cos(angle + rng.uniform(0, 6) + 0.5 * sign)
     if name == "mains_hum":
-        truth["frequency_hz"] = float(rng.choice([50.0, 60.0])) * rng.uniform(0.999, 1.001)
+        # At 100 samples a second 50 Hz stands still: no recording can show it.
+        mains = [60.0] if rate == 100.0 else [50.0, 60.0]
+        truth["frequency_hz"] = float(rng.choice(mains)) * rng.uniform(0.999, 1.001)
         return np.cos(2 * np.pi * truth["frequency_hz"] * t + rng.uniform(0, 6))
     if name == "sensor_offset":
         return np.cos(pole_pairs * gear_ratio * q + rng.uniform(0, 6))

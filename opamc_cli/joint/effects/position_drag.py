@@ -15,6 +15,7 @@ class PositionDrag(Effect):
     needs = ("position",)
     dense_guesses = True
     from_motion = True
+    free_refinement = False
     open_limits = ("place_rad", "flatness")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
