@@ -30,7 +30,7 @@ BATCH_VALUES = 1_000_000
 
 ROWS_AT_A_TIME = 16_384
 
-LEAST_DRIFT = 0.1
+LEAST_DRIFT = 0.3
 
 SPANNED = 1e-6
 """A column of which a span leaves less than this share of the energy is rounding."""
@@ -197,7 +197,7 @@ def _remove_drift(fit: Fit, noise: Floats, valid: Bools) -> None:
     """Take out of the noise, in place, the model's own regressors times a parabola of time.
 
     Friction or load that drifts from cycle to cycle is what a slow effect looks like; counted as
-    the noise's colour it would hide itself. A drift below a tenth of the noise stays: slow noise
+    the noise's colour it would hide itself. A drift below three tenths of the noise stays: slow noise
     makes as much.
     """
     track = fit.session.coarse.track
