@@ -9,7 +9,7 @@ from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.flux import objection_of_flux
-from opamc_cli.joint.form import imitations, pressed_limit
+from opamc_cli.joint.form import imitations, is_smoothing, pressed_limit
 from opamc_cli.joint.model import Fit, Session, Term, fit_terms
 from opamc_cli.joint.plain import Plain, is_in_library, plain_terms, plainer
 from opamc_cli.joint.spectra import highest_order, order_resolution
@@ -295,6 +295,8 @@ def _candidates(
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
+        if why is None and is_smoothing(session, views[False], tested, tested.coefficients):
+            why = "only the smoothing of the motion makes it: on the coarse grid it is not there"
         if why is None and not tested.fine:
             if unnamed is None:
                 unnamed = [

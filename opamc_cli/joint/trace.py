@@ -197,8 +197,8 @@ def _remove_drift(fit: Fit, noise: Floats, valid: Bools) -> None:
     """Take out of the noise, in place, the model's own regressors times a parabola of time.
 
     Friction or load that drifts from cycle to cycle is what a slow effect looks like; counted as
-    the noise's colour it would hide itself. A drift below three tenths of the noise stays: slow noise
-    makes as much.
+    the noise's colour it would hide itself. A drift below three tenths of the noise stays: slow
+    noise makes as much.
     """
     track = fit.session.coarse.track
     columns = [fit.session.columns(term, fine=False)[valid] for term in fit.terms]
