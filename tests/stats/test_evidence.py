@@ -72,6 +72,22 @@ def test_ranks_and_p_values_of_healthy_joints_are_uniform():
     assert chisquare(np.histogram(p, bins=7, range=(0, 1))[0]).pvalue > 0.01
 
 
+@pytest.mark.parametrize(
+    "plan",
+    [
+        Fleet(n_axes=1, n_baseline=3),
+        Fleet(n_axes=12, n_motions=1),
+        Fleet(n_axes=2, n_baseline=4, n_target=3),
+        Fleet(n_axes=3, between_sessions=0.4, influences=1),
+    ],
+    ids=["lone joint", "twelve joints", "three targets", "wild sessions"],
+)
+def test_robots_of_any_make_stay_healthy(plan):
+    judged = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(100, 115)]
+    states = [j.state for joints in judged for j in joints.values()]
+    assert len(states) - states.count("healthy") <= 1
+
+
 def test_a_change_of_size_alone_is_found_by_the_spectrum():
     plan = Fleet(louder=0.6)
     found = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(10)]
