@@ -387,7 +387,8 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
 
 def _evidence(cells: Sequence[Cell], spectra: Sequence[SpectrumCell]) -> list[Evidence]:
     kinds: list[Evidence] = [PatternEvidence(cells)]
-    if spectra:
+    # Two sessions show no spread, and the one that stands in for it is that of divergences.
+    if spectra and len(cells[0].baseline) > 2:
         kinds.append(SpectrumEvidence(spectra))
     return kinds
 

@@ -139,6 +139,12 @@ def test_a_session_without_spectrum_leaves_the_patterns_to_decide():
     assert judged[1].p_value == alone[1].p_value
 
 
+def test_two_sessions_are_judged_by_patterns_alone():
+    plan = Fleet(n_baseline=2, n_axes=3, severity=1.0)
+    judged, alone = judge(cells(plan, 0), spectra_by_axis=spectra(plan, 0)), judge(cells(plan, 0))
+    assert [j.p_value for j in judged.values()] == [j.p_value for j in alone.values()]
+
+
 def test_identical_spectra_are_no_evidence():
     plan = Fleet(n_axes=1, n_motions=1)
     cell = spectra(plan, 0)[1][0]
