@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from opamc_cli.joint.model import Fit
-from opamc_cli.joint.normal import SINGULAR_BELOW
+from opamc_cli.joint.normal import SINGULAR_BELOW, eigenvectors
 from opamc_cli.joint.track import Floats
 
 INSEPARABLE = 0.995
@@ -78,7 +78,7 @@ def _inseparable(scaled: Floats, fit: Fit, widths: list[int]) -> tuple[tuple[str
     if not widths:
         return ()
     owner = np.repeat(np.arange(len(widths)), widths)
-    values, vectors = np.linalg.eigh(scaled)
+    values, vectors = eigenvectors(scaled)
     sets: list[tuple[str, ...]] = []
     for value, vector in zip(values, vectors.T, strict=True):
         if value > 1 - INSEPARABLE:

@@ -25,6 +25,7 @@ from opamc_cli.joint.trace import (
     prepare_held,
     refusal,
     removal_gains,
+    sealed_falls,
     search,
 )
 
@@ -187,6 +188,8 @@ def close_loop(
         # What has the wrong form may have kept the right one out.
         usable = {name: effect for name, effect in usable.items() if name not in wrong}
     fitted, steps, remains = _without_trifles(before, fitted, steps, remains, progress)
+    # Only now, and only once, are the sealed groups looked at.
+    fitted, steps, remains = _confirmed(before, fitted, steps, remains, progress)
     return _summary(before, fitted, tuple(steps), progress, seen_before, remains)
 
 
@@ -532,6 +535,24 @@ def _is_patchwork(steps: list[Step]) -> bool:
     return len(falls) >= PATCHWORK_KINDS and most < PATCHWORK_SHARE * sum(falls.values())
 
 
+def _confirmed(
+    before: Fit,
+    fitted: Fit,
+    steps: list[Step],
+    remains: list[Structure],
+    progress: _Progress,
+) -> tuple[Fit, list[Step], list[Structure]]:
+    """Take everything back where the sealed data do not bear it out.
+
+    All steps stand or fall together: a choice among them would make the sealed data a part of
+    the search. Slow noise can hide a true fall of the plain error, and whitening an effect that
+    is slow itself, so that one of the two has to fall.
+    """
+    if not steps or any(error > 0 for error in sealed_falls(before, fitted)):
+        return fitted, steps, remains
+    return before, [], _given_up(before, steps, "does not hold on the sealed data", progress)
+
+
 def _given_up(before: Fit, steps: list[Step], why: str, progress: _Progress) -> list[Structure]:
     """Note why steps were taken back; return the declared model's structures."""
     for step in steps:
@@ -566,7 +587,6 @@ def _summary(
         if structure.gain > STRUCTURE_GAIN and structure.p_value < STRUCTURE_P
     ]
     rest = last.share > STRUCTURE_GAIN and last.p_value < STRUCTURE_P
-    # Only now are the sealed groups looked at.
     rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
     floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))
     reach = rmse_before**2 - floor**2

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import eigh
 
 from opamc_cli.joint.track import Floats
 
@@ -191,9 +192,35 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     return solution
 
 
+def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues, ascending, and eigenvectors of symmetric matrices.
+
+    LAPACK's divide and conquer, which is numpy's and the fastest, gives up on a rare matrix that
+    has nothing wrong with it; plain QR iteration then takes its place.
+
+    Parameters
+    ----------
+    symmetric : array of shape (..., k, k)
+        Finite.
+
+    Returns
+    -------
+    values, vectors : arrays of shape (..., k) and (..., k, k)
+        Vectors are columns.
+    """
+    try:
+        values, vectors = np.linalg.eigh(symmetric)
+    except np.linalg.LinAlgError:
+        size = symmetric.shape[-1]
+        pairs = [eigh(one, driver="ev") for one in symmetric.reshape(-1, size, size)]
+        values = np.stack([pair[0] for pair in pairs]).reshape(symmetric.shape[:-1])
+        vectors = np.stack([pair[1] for pair in pairs]).reshape(symmetric.shape)
+    return values, vectors
+
+
 def _inverse(gram: Floats) -> Floats:
     """Pseudo-inverse of symmetric matrices, shape (..., k, k), by their eigenvectors."""
-    values, vectors = np.linalg.eigh(gram)
+    values, vectors = eigenvectors(gram)
     sizes = np.abs(values)
     large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
     factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)

@@ -9,7 +9,7 @@ POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
 ALLOWED_NOISE_SHARE = 0.01
-QUIET_NOISE_SHARE = 0.004
+QUIET_NOISE_SHARE = 0.0025
 
 
 def measurement_noise(path: Floats) -> float:
@@ -137,7 +137,7 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
     """Count the samples per block over which a derivative's noise averages to almost nothing.
 
     A regressor with noise invites every effect that is a smoother version of it. Blocks are long
-    enough when the noise that is left is below 0.4 % of the derivative.
+    enough when the noise that is left is below 0.25 % of the derivative.
 
     Parameters
     ----------

@@ -15,6 +15,7 @@ from opamc_cli.joint.model import Fit, Grid, Session, Term
 from opamc_cli.joint.normal import (
     Normal,
     appended,
+    eigenvectors,
     held_out_error,
     normal_equations,
     solve,
@@ -255,6 +256,35 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
     return View(grid, fine, taps, valid, span, full, max(variance, 1e-300))
 
 
+def sealed_falls(before: Fit, after: Fit) -> tuple[float, float]:
+    """Fall of the sealed mean square error from one fit to another, plain and whitened.
+
+    Parameters
+    ----------
+    before, after : Fit
+        Of the same recordings.
+
+    Returns
+    -------
+    plain, whitened : float
+        Shares of the error before; the noise's colour is the open groups' under `before`.
+    """
+    session = before.opened.session
+    grid = session.fine
+    noise, known = noise_of(before, True, before.residual_a)
+    taps = autoregression(noise, known)
+    track = grid.track
+    clean = grid.sealed & settled(track.moving & (track.group >= 0), track.bounds, taps.size - 1)
+    falls = []
+    for rows, filters in ((grid.sealed, np.ones(1)), (clean, taps)):
+        first, last = (
+            float(np.sum(whitened(fit.opened.residual_a, filters)[rows] ** 2))
+            for fit in (before, after)
+        )
+        falls.append(1.0 - last / first if first > 0 else 0.0)
+    return falls[0], falls[1]
+
+
 def residual_on(fit: Fit, fine: bool) -> Floats:
     """Residual of a fit on one of the session's grids.
 
@@ -279,7 +309,7 @@ def orthonormal(columns: Floats) -> Floats:
         return columns
     gram = columns.T @ columns
     scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
-    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    values, vectors = eigenvectors(gram / np.outer(scale, scale))
     good = values > 1e-9 * values[-1]
     turn = vectors[:, good] / np.sqrt(values[good]) / scale[:, None]
     # In place, some rows at a time: on the fine grid a second array is a hundred megabytes.

@@ -70,3 +70,12 @@ def test_two_runs_of_the_loop_are_equal():
     _, second = close_on(2, ("stribeck",), rate=250.0)
     assert first.rmse_after_a == second.rmse_after_a
     assert [s.p_value for s in first.steps] == [s.p_value for s in second.steps]
+
+
+def test_what_the_sealed_data_do_not_bear_out_is_taken_back():
+    # Slow noise that looks like warm-up in the open cycles, and like nothing in the sealed ones.
+    _, loop = close_on(18, (), quantum=5e-4)
+    reasons = {rejected.effect: rejected.why for rejected in loop.rejected}
+    assert reasons["warmup"] == "does not hold on the sealed data"
+    assert loop.steps == ()
+    assert loop.rmse_after_a == loop.rmse_before_a

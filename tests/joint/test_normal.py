@@ -5,6 +5,7 @@ from hypothesis import strategies as st
 
 from opamc_cli.joint.normal import (
     appended,
+    eigenvectors,
     extended,
     held_out_error,
     normal_equations,
@@ -73,3 +74,20 @@ def test_sums_are_the_same_whether_terms_come_together_or_one_after_the_other():
         np.testing.assert_allclose(found.moment, wanted.moment, atol=1e-12)
         np.testing.assert_allclose(found.power, wanted.power, atol=1e-12)
         np.testing.assert_allclose(found.count, wanted.count)
+
+
+def test_a_matrix_that_divide_and_conquer_gives_up_on_is_solved_all_the_same(monkeypatch):
+    generator = np.random.default_rng(4)
+    columns = generator.normal(size=(3, 40, 6))
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    moment = generator.normal(size=(3, 6))
+    expected = solve(gram, moment)
+
+    def gives_up(matrix):
+        msg = "Eigenvalues did not converge"
+        raise np.linalg.LinAlgError(msg)
+
+    monkeypatch.setattr(np.linalg, "eigh", gives_up)
+    values, vectors = eigenvectors(gram[0])
+    assert np.allclose(vectors * values @ vectors.T, gram[0])
+    assert np.allclose(solve(gram, moment), expected)
