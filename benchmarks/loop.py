@@ -25,7 +25,7 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop, declared_fit
 from opamc_cli.joint.model import open_session
-from opamc_cli.joint.recordings import grouped_track
+from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint
 
 ROOT = Path(__file__).parents[1]
@@ -112,7 +112,7 @@ def run_trial(
         temperature_c=made.temperature,
     )
     track, grouping = grouped_track([recording], joint)
-    if grouping is None:
+    if grouping is None or not is_moving(track):
         msg = f"seed {seed} moves too little"
         raise TooLittleError(msg)
     library = built_in_library(without)
@@ -138,7 +138,7 @@ class Share:
         share = self.count / n
         middle = (share + z * z / (2 * n)) / (1 + z * z / n)
         half = z / (1 + z * z / n) * np.sqrt(share * (1 - share) / n + z * z / (4 * n * n))
-        return middle - half, middle + half
+        return max(middle - half, 0.0), min(middle + half, 1.0)
 
     def row(self) -> str:
         """One row of the table."""

@@ -102,7 +102,8 @@ def _knots(values: Floats, count: int, closest: float = 0.02) -> Floats:
 
 
 def _even(values: Floats, count: int) -> Floats:
-    return np.linspace(float(values.min()), float(values.max()), count)
+    """Evenly spread knots; a single one where the covariate does not change."""
+    return np.unique(np.linspace(float(values.min()), float(values.max()), count))
 
 
 def flexible_bases(track: Track, rows: np.ndarray) -> dict[str, Floats]:
