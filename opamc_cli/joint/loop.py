@@ -594,6 +594,8 @@ def _summary(
     explained = float(np.clip(explained, 0.0, 1.0))
     if not steps:
         verdict = "not-in-library" if rest or structured else "nothing-missing"
+        # Something is there, and none of it is explained, even where its share is too small to say.
+        explained = 0.0 if rest or structured else 1.0
     elif (rest or structured) and explained < CLOSED_SHARE:
         verdict = "partial"
     else:

@@ -45,6 +45,7 @@ def test_nothing_is_added_where_nothing_is_missing(seed, quantum):
     _, loop = close_on(seed, (), quantum=quantum, rate=500.0)
     assert loop.steps == ()
     assert loop.verdict == "nothing-missing"
+    assert loop.explained_share == 1.0
     assert loop.rmse_after_a == loop.rmse_before_a
 
 
@@ -62,6 +63,7 @@ def test_an_effect_outside_the_library_is_not_given_another_name(effect, domain)
     _, loop = close_on(5, (effect,), without=(effect,), rate=500.0)
     assert loop.steps == ()
     assert loop.verdict == "not-in-library"
+    assert loop.explained_share == 0.0
     assert loop.remaining_domain == domain
 
 
