@@ -59,5 +59,6 @@ def patterns(
             for c in counted
         ),
         str(outcome.path),
+        str(outcome.spectra_path),
     )
     raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))
