@@ -21,9 +21,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
+from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.loop import Loop, close_loop, declared_fit
+from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.model import open_session
 from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint

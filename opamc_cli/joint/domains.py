@@ -21,11 +21,14 @@ from opamc_cli.joint.spectra import (
     order_spectrum,
     standing_views,
 )
-from opamc_cli.joint.trace import prepare, residual_on
 from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.view import prepare, residual_on
 
 LINE_P = 1e-4
 """Probability with which noise alone shows a line."""
+LEAST_GAIN = 0.02
+LARGEST_P = 1e-3
+"""Least share and largest p of what counts as structure."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,11 @@ class Structure:
     gain: float
     t_value: float
     p_value: float
+
+    @property
+    def significant(self) -> bool:
+        """Whether more than chance and a trifle is left in the domain."""
+        return self.gain > LEAST_GAIN and self.p_value < LARGEST_P
 
 
 @dataclass(frozen=True)
@@ -56,6 +64,11 @@ class Ceiling:
     t_value: float
     p_value: float
     how: str
+
+    @property
+    def significant(self) -> bool:
+        """Whether more than chance and a trifle repeats."""
+        return self.share > LEAST_GAIN and self.p_value < LARGEST_P
 
 
 def hats(values: Floats, knots: Floats) -> Floats:

@@ -11,15 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.joint.model import Fit, Session, Term
-from opamc_cli.joint.trace import (
-    Candidate,
-    View,
-    blocks_of,
-    orthonormal,
-    orthonormal_beside,
-    prepare,
-)
+from opamc_cli.joint.search import Candidate
+from opamc_cli.joint.span import orthonormal, orthonormal_beside
 from opamc_cli.joint.track import Bools, Floats, Track
+from opamc_cli.joint.view import View, blocks_of, prepare
 
 BLOCKS_PER_GROUP = 4
 SIGNS = 999

@@ -13,14 +13,10 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.model import Session, Term
-from opamc_cli.joint.trace import (
-    SCORE_PER_PARAMETER,
-    SPANNED,
-    Candidate,
-    View,
-    orthonormal_beside,
-)
+from opamc_cli.joint.search import SCORE_PER_PARAMETER, Candidate
+from opamc_cli.joint.span import SPANNED, orthonormal_beside
 from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.view import View
 
 SAME_FORM = 0.999
 """Share of a plain term's whitened energy that an effect of the same form explains."""

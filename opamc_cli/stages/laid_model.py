@@ -7,6 +7,7 @@ import numpy as np
 
 from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
+from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import (
     Library,
@@ -14,7 +15,6 @@ from opamc_cli.joint.effects.library import (
     effect_named,
     load_user_effects,
 )
-from opamc_cli.joint.loop import declared_fit
 from opamc_cli.joint.model import Fit, Session, open_session
 from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint

@@ -13,7 +13,8 @@ from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.joint.domains import ceiling, structures
 from opamc_cli.joint.intervals import certainty
-from opamc_cli.joint.loop import close_loop, find_candidates
+from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.trace import trace_residual
 from opamc_cli.stages.axis_recording import axes_of
 from opamc_cli.stages.laid_model import AxisModel, fitted, lay
 from opamc_cli.stages.model_tables import (
@@ -89,8 +90,10 @@ def trace(
     def one(laid: AxisModel) -> dict[str, Any]:
         base = fitted(laid)
         seen = structures(base)
-        found, untestable = find_candidates(base, laid.library)
-        rows.extend(candidate_row(laid.axis, 0, candidate, False) for candidate in found)
+        traced = trace_residual(base, laid.library)
+        rows.extend(
+            candidate_row(laid.axis, 0, candidate, False) for candidate in traced.candidates
+        )
         return {
             "axis": laid.axis,
             "declared": [term.effect.name for term in base.terms],
@@ -105,9 +108,9 @@ def trace(
                     "p_value": candidate.p_value,
                     "why_not": candidate.why_not,
                 }
-                for candidate in found
+                for candidate in traced.candidates
             ],
-            "untestable": [{"effect": u.effect, "why": u.why} for u in untestable],
+            "untestable": [{"effect": u.effect, "why": u.why} for u in traced.untestable],
         }
 
     results, errors, inputs = _each_axis(model, paths, axes, one)

@@ -11,8 +11,8 @@ from opamc_cli.joint.domains import Ceiling, Structure
 from opamc_cli.joint.intervals import Certainty
 from opamc_cli.joint.loop import Loop
 from opamc_cli.joint.model import Fit, Session, Term
+from opamc_cli.joint.search import Candidate
 from opamc_cli.joint.spectra import order_spectrum
-from opamc_cli.joint.trace import Candidate
 from opamc_cli.joint.track import Floats
 from opamc_cli.stages.laid_model import AxisModel
 

@@ -2,9 +2,10 @@
 
 from simulator import DECLARED, simulate
 
+from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.loop import close_loop, declared_fit
+from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.model import open_session
 from opamc_cli.joint.recordings import grouped_track
 from opamc_cli.joint.track import Joint

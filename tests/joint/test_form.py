@@ -5,7 +5,7 @@ import pytest
 from closing import close_on
 
 from opamc_cli.joint.form import COST, cosines, misfits
-from opamc_cli.joint.trace import prepare
+from opamc_cli.joint.view import prepare
 
 
 def slow_excess(view, basis):

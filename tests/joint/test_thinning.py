@@ -5,11 +5,12 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint import model, thinning
+from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.groups import group_samples
 from opamc_cli.joint.kept import Kept
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.loop import close_loop, declared_fit
+from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.model import Term, fit_terms, open_session
 from opamc_cli.joint.recordings import grouped_track
 from opamc_cli.joint.track import Joint

@@ -5,9 +5,10 @@ from functools import cache
 from pathlib import Path
 
 from opamc_cli.config.testbed import load_testbed
+from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.loop import Loop, close_loop, declared_fit
+from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.model import Fit, open_session
 from opamc_cli.joint.recordings import grouped_track
 from opamc_cli.joint.track import Joint
