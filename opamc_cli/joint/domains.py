@@ -259,19 +259,25 @@ def ceiling(fit: Fit, seen: list[Structure]) -> Ceiling:
 
 
 def _without_blur(fit: Fit) -> Floats:
-    """Fine residual without what smoothing took from the acceleration."""
-    grid = fit.session.fine
+    """Fine residual without what smoothing took from the acceleration.
+
+    The model is fitted anew to the samples that are clear of corners: elsewhere its coefficients
+    have bent to them.
+    """
+    grid = fit.session.sharp
     blur = grid.track.blur
     if blur is None:
         return fit.residual_a
-    part = blur[grid.fit]
-    coefficients = solve(part.T @ part, part.T @ fit.residual_a[grid.fit])
-    residual: Floats = fit.residual_a - blur @ coefficients
+    blocks = [fit.session.columns(term, fine=True)[grid.fit] for term in fit.terms]
+    design = np.concatenate([*blocks, blur[grid.fit]], axis=1)
+    residual = np.zeros(grid.track.size)
+    rest = fit.residual_a[grid.fit]
+    residual[grid.fit] = rest - design @ solve(design.T @ design, design.T @ rest)
     return residual
 
 
 def _cycle_ceiling(fit: Fit) -> Ceiling | None:
-    grid = fit.session.fine
+    grid = fit.session.sharp
     period = grid.track.period_samples
     if period is None:
         return None

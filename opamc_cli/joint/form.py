@@ -27,10 +27,6 @@ LEAST_SHARE = 0.05
 LARGEST_P = 0.005
 SUBSUMED = 0.3
 """An effect is an imitation if the cosines leave it less than this share of its likelihood."""
-EXPECTED = 20.0
-AGREEING = 0.6
-"""Share of its size on the fine grid that a fast effect must have on the coarse one, where its
-likelihood there should exceed the former."""
 PRESSING = 2.5
 """Standard deviations with which a parameter may press against its limit."""
 
@@ -313,33 +309,3 @@ def pressed_limit(session: Session, view: View, candidate: Candidate) -> str | N
         if length > 0 and float(bend @ rest) > PRESSING * length * np.sqrt(view.variance):
             return f"its {name} presses against the limit {low if inward > 0 else high:.3g}"
     return None
-
-
-def is_smoothing(
-    session: Session, coarse: View, candidate: Candidate, coefficients: Floats
-) -> bool:
-    """Tell whether a fast candidate is what the smoothing of the motion leaves on the fine grid.
-
-    A coarse encoder asks for a long window, which rounds the corners of the acceleration off;
-    their current is left over on the fine grid, and slow sines of the angle fit it well. On the
-    coarse grid the current has gone through the same average: there they find nothing.
-
-    Parameters
-    ----------
-    session : Session
-        Recordings.
-    coarse : View
-        Of the coarse grid.
-    candidate : Candidate
-        Found on the fine grid.
-    coefficients : array
-        Fitted there.
-    """
-    if not candidate.fine or session.coarse is session.fine:
-        return False
-    own = coarse.whitened_rows(session.columns(candidate.term, fine=False)) @ coefficients
-    own = own - coarse.span @ (coarse.span.T @ own)
-    energy = float(own @ own)
-    if energy < EXPECTED * coarse.variance:
-        return False
-    return float(own @ coarse.values) < AGREEING * energy

@@ -81,6 +81,8 @@ class Motion:
         Standard deviation of the speed's noise.
     kernel : array of odd length
         Moving average that the acceleration has gone through.
+    evenly_smooth : bool
+        True where position and speed have gone through the same.
     quiet : int
         Samples over which the acceleration's noise averages to almost nothing.
     blur : array of shape (n, 2) or None
@@ -95,6 +97,7 @@ class Motion:
     kernel: Floats
     quiet: int = 1
     blur: Floats | None = None
+    evenly_smooth: bool = False
 
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
         """Return the motion delayed by a fraction of a sample."""
@@ -295,6 +298,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         current_d_a=join("current_d_a") if with_phases else None,
         electrical_rad=join("electrical_rad") if with_angle else None,
         kernel=max((piece.kernel for piece in pieces), key=len),
+        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
         quiet=max(piece.quiet for piece in pieces),
         blur=join("blur") if all(piece.blur is not None for piece in pieces) else None,
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
@@ -407,6 +411,7 @@ def _one(recording: Recording, joint: Joint) -> Track:
         current_d_a=current_d,
         electrical_rad=electrical,
         kernel=motion.kernel,
+        evenly_smooth=motion.evenly_smooth,
         quiet=motion.quiet,
         blur=motion.blur,
     )
@@ -421,4 +426,5 @@ def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
         0.0,
         phase_angle.kernel,
         blur=phase_angle.blur * scale,
+        evenly_smooth=True,
     )

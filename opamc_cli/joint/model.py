@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.joint.corners import clear_of_corners
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
 from opamc_cli.joint.kept import Kept
@@ -82,6 +83,8 @@ class Session:
         Groups that may be looked at before the end.
     kept : Kept
         What fits share.
+    clear : bool array of shape (n,) or None
+        Fine samples at which fast effects are looked for; None where those are all.
     """
 
     fine: Grid
@@ -91,6 +94,16 @@ class Session:
     fit_groups: tuple[int, ...]
     opened: "Session | None" = None
     kept: Kept = field(default_factory=Kept, repr=False, compare=False)
+    clear: Bools | None = None
+
+    @cached_property
+    def sharp(self) -> Grid:
+        """The fine grid without the samples that the smoothing of the motion has spoilt."""
+        if self.clear is None:
+            return self.fine
+        track = self.fine.track
+        track = replace(track, moving=track.moving & self.clear)
+        return _grid(track, self.fit_groups, self.grouping.sealed)
 
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
@@ -108,8 +121,8 @@ class Session:
         return term.columns(self.coarse.track)
 
     def grid(self, fine: bool) -> Grid:
-        """Return the fine or the coarse grid."""
-        return self.fine if fine else self.coarse
+        """Return the grid on which fast effects are searched, or the coarse one."""
+        return self.sharp if fine else self.coarse
 
     def with_model(self, load: Floats, model: Floats, static: tuple[Floats, ...]) -> "Session":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
@@ -165,7 +178,8 @@ def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Sessi
     coarse_track = coarsen(track, factor)
     fine = _grid(track, groups, grouping.sealed)
     coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
-    return Session(fine, coarse, factor, grouping, groups)
+    clear = None if coarse is fine else clear_of_corners(track)
+    return Session(fine, coarse, factor, grouping, groups, clear=clear)
 
 
 def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:

@@ -92,7 +92,7 @@ def plain_terms(view: View) -> list[Plain]:
         own = own / length
         fall = float(own @ view.values) ** 2
         left = max(view.power - fall, 1e-12 * view.power)
-        score = view.values.size * float(np.log(view.power / left)) - SCORE_PER_PARAMETER
+        score = view.freedom(1) * float(np.log(view.power / left)) - SCORE_PER_PARAMETER
         found.append(Plain(what, domain, score, own))
     return sorted(found, key=lambda plain: -plain.score)
 

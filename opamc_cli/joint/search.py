@@ -295,7 +295,7 @@ def _scored(
         solution = solve(known.gram[np.ix_(new, new)], moment[new])
         fall = float(solution @ moment[new])
         left = max(view.power - fall, 1e-12 * view.power)
-        likelihood = view.values.size * np.log(view.power / left)
+        likelihood = view.freedom(len(new)) * np.log(view.power / left)
         coefficients = np.zeros(len(keep))
         coefficients[[keep.index(k) for k in new]] = solution
         plausible = effect.plausible(coefficients, form)

@@ -6,7 +6,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.flux import objection_of_flux
-from opamc_cli.joint.form import is_smoothing, pressed_limit
+from opamc_cli.joint.form import pressed_limit
 from opamc_cli.joint.gate import Gate, consistency, held_out, prepare_held, refusal
 from opamc_cli.joint.model import Fit, Session
 from opamc_cli.joint.plain import Plain, is_in_library, plain_terms, plainer
@@ -99,8 +99,6 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
-        if why is None and is_smoothing(session, views[False], tested, tested.coefficients):
-            why = "only the smoothing of the motion makes it: on the coarse grid it is not there"
         if why is None and not tested.fine:
             if unnamed is None:
                 unnamed = [

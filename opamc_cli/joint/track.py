@@ -79,6 +79,9 @@ class Track:
     kernel : array of odd length
         Moving average that the acceleration has gone through; the coarse grid puts the current
         through it too.
+    evenly_smooth : bool
+        True where position and speed have gone through it as well; otherwise the coarse grid puts
+        them through it.
     blur : array of shape (n, 2) or None
         What the acceleration would gain or lose by a shorter and a longer window.
     quiet : int
@@ -116,6 +119,7 @@ class Track:
     static_columns: tuple[Floats, ...] | None = None
     open_samples: Bools | None = None
     kernel: Floats = field(default_factory=lambda: np.ones(1))
+    evenly_smooth: bool = False
     quiet: int = 1
     blur: Floats | None = None
     own_clocks_s: tuple[float, ...] = ()
@@ -215,7 +219,9 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
 def coarsen(track: Track, factor: int) -> Track:
     """Average a track over blocks of samples; a block moves if all of its samples move.
 
-    The current is first put through the moving average that the acceleration has gone through.
+    Current, position and speed are first put through the moving average that the acceleration has
+    gone through: next to a step of the acceleration, a speed that is rounded off less than the
+    current is some per cent off, which looks like friction of another form.
 
     Parameters
     ----------
@@ -234,6 +240,11 @@ def coarsen(track: Track, factor: int) -> Track:
 
     def mean(values: Floats) -> Floats:
         return block_mean(values, track.bounds, factor)
+
+    def smooth(values: Floats) -> Floats:
+        return mean(averaged(values, track.bounds, track.kernel))
+
+    motion = mean if track.evenly_smooth else smooth
 
     def optional(values: Floats | None) -> Floats | None:
         return None if values is None else mean(values)
@@ -254,9 +265,9 @@ def coarsen(track: Track, factor: int) -> Track:
         bounds=tuple(bounds),
         time_s=mean(track.time_s),
         run_time_s=mean(track.run_time_s),
-        current_a=mean(averaged(track.current_a, track.bounds, track.kernel)),
-        position_rad=mean(track.position_rad),
-        velocity=mean(track.velocity),
+        current_a=smooth(track.current_a),
+        position_rad=motion(track.position_rad),
+        velocity=motion(track.velocity),
         acceleration=mean(track.acceleration),
         machine_angle_rad=mean(track.machine_angle_rad),
         direction=np.sign(mean(track.direction)),

@@ -6,6 +6,8 @@ from scipy.linalg import solve_toeplitz
 from opamc_cli.joint.track import Bools, Floats
 
 AR_ORDER = 10
+PAIRS_PER_TAP = 20
+"""Samples and their predecessors that a tap takes; where there are fewer, fewer taps must do."""
 
 
 def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats:
@@ -18,12 +20,12 @@ def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats
     valid : bool array of shape (n,)
         Samples that count.
     order : int
-        Number of past samples that predict the present one.
+        Number of past samples that predict the present one, at most.
 
     Returns
     -------
-    array of shape (order + 1,)
-        Taps 1, -a_1, ..., -a_order; [1] where there are too few samples.
+    array of shape (p + 1,)
+        Taps 1, -a_1, ..., -a_p; p is the order, or less where there are too few samples.
 
     References
     ----------
@@ -31,14 +33,15 @@ def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats
     """
     values = np.where(valid, noise, 0.0)
     weight = valid.astype(float)
-    covariance = np.zeros(order + 1)
+    known: list[float] = []
     for lag in range(order + 1):
         pairs = float(np.dot(weight[lag:], weight[: weight.size - lag]))
-        if pairs < 10 * (order + 1):
-            return np.ones(1)
-        covariance[lag] = float(np.dot(values[lag:], values[: values.size - lag])) / pairs
-    if covariance[0] <= 0:
+        if pairs < PAIRS_PER_TAP * (lag + 1):
+            break
+        known.append(float(np.dot(values[lag:], values[: values.size - lag])) / pairs)
+    if len(known) < 2 or known[0] <= 0:
         return np.ones(1)
+    covariance = np.array(known)
     # A floor under the noise: where there is none, misfits of 1/1000 would count as signals.
     covariance[0] *= 1 + 1e-3
     coefficients = solve_toeplitz(covariance[:-1], covariance[1:])
