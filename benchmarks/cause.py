@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 from change_pairs import JOINT_CHANGES, ROBOT_CHANGES, Pair, joint_pair, robot_pair
 
-from opamc_cli.joint.change.explain import BENIGN, FAULT_SHARE, Change, explain_change
+from opamc_cli.joint.change.explain import FAULT_SHARE, Change, explain_change
 
 ROOT = Path(__file__).resolve().parents[1]
 BEGIN, END = "<!-- cause: begin -->", "<!-- cause: end -->"
@@ -62,7 +62,7 @@ def judged(pair: Pair, change: Change) -> Outcome:
         elif pair.name == "ripple":
             right = right and "flexspline" not in first.interpretation
     wrong = any(
-        cause.effect not in BENIGN
+        not cause.benign
         and cause.share >= FAULT_SHARE
         and expected not in (cause.effect, *cause.ties)
         for cause in change.causes

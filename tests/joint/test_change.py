@@ -99,6 +99,39 @@ def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
     assert change.benign
 
 
+@pytest.mark.parametrize(
+    ("kind", "effect", "benign"),
+    [
+        ("hum of a phase", "mains_hum", True),
+        ("gain of a phase", "sensor_gain", True),
+        ("order 7", "ripple", False),
+    ],
+)
+def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, benign):
+    rng = np.random.default_rng(5)
+    made = simulate(5, (), 0.0, cycles=2 * (BASELINE + TARGET), rate=1000.0)
+    joint = Joint(gear_ratio=50.0, pole_pairs=4)  # a carrier well below half the rate
+    edges = np.linspace(0, made.current.size, BASELINE + TARGET + 1).astype(int)
+    recordings = []
+    for k, (start, stop) in enumerate(pairwise(edges)):
+        q, current = made.position[start:stop], made.current[start:stop]
+        new = k >= BASELINE
+        if new and kind == "order 7":
+            current = current + 3 * made.noise_rms * np.cos(7 * 50 * q)
+        field = 4 * 50 * q + rng.uniform(0, 2 * np.pi)
+        phases = current[:, None] * np.cos(field[:, None] - np.arange(3) * 2 * np.pi / 3)
+        phases += 0.3 * made.noise_rms * rng.normal(size=phases.shape)
+        if new and kind == "hum of a phase":
+            phases[:, 0] += 3 * made.noise_rms * np.sin(100 * np.pi * made.time[start:stop])
+        if new and kind == "gain of a phase":
+            phases[:, 1] *= 1.3
+        recordings.append(Recording(f"{k}", 1000.0, phases_a=phases, position_rad=q))
+    change = explain_change(recordings[:BASELINE], recordings[BASELINE:], joint)
+    assert change.causes[0].effect == effect
+    assert change.causes[0].share > 0.6
+    assert change.benign == benign
+
+
 def test_more_friction_at_the_same_temperature_is_not_benign():
     change = change_of("friction")
     assert "viscous" in {change.causes[0].effect, *change.causes[0].ties}

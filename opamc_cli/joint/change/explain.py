@@ -4,31 +4,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of
-from opamc_cli.joint.change.lines import clocked, fast_residuals, grown_lines, order_spectra
-from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
+from opamc_cli.joint.change.energy import Energy, energy_of, shift_power
+from opamc_cli.joint.change.lines import fast_residuals
+from opamc_cli.joint.change.periodic import find_periodic
+from opamc_cli.joint.change.reading import Reading
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
 from opamc_cli.joint.change.slow import Population, learn
 from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.joint.track import Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
-
-BENIGN = frozenset(
-    {
-        "thermal_viscous",
-        "warmup",
-        "payload_change",
-        "sensor_offset",
-        "sensor_gain",
-        "dead_time",
-        "mains_hum",
-    }
-)
-"""Causes that are no fault of the gear."""
 
 FEWEST_SESSIONS = 3
 """Fewer baseline recordings say nothing of how sessions differ: their cycles stand for them."""
@@ -43,6 +31,9 @@ SMALLEST_LINE_SHARE = 0.15
 SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
+
+VISIBLE = 0.5
+"""A shift of which the mean square shows less is hidden by what sessions differ by."""
 
 BENIGN_SHARE = 0.5
 FAULT_SHARE = 0.2
@@ -166,17 +157,18 @@ def explain_change(
 
     slow = find_slow_causes(units, population, library)
     plain, white = fast_residuals(units, terms, slow[-1].shift if slow else None)
-    reading, turning = _line_reading(units, white, LINES_DIFFER if cycles else 0.0)
+    periodic = find_periodic(units, white, plain, LINES_DIFFER if cycles else 0.0)
+    held = 0.0 if periodic is None else periodic.power
 
     energy = energy_of(units, population, slow_found=bool(slow))
-    held = comb_energy(turning, plain, reading.fundamental) if reading is not None else 0.0
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    whole = max(energy.slow + max(energy.fast, held), SMALLEST_POWER)
+    slow_power = max(energy.slow, shift_power(units, slow[-1].shift) if slow else 0.0)
+    whole = max(slow_power + max(energy.fast, held), SMALLEST_POWER)
     causes = _slow_entries(units, population, energy, whole, slow, library)
-    if reading is not None and reading.effect in library:
+    if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
-        if reading.known or carries:
-            causes.append(_ripple_entry(reading, held / whole, library))
+        if periodic.reading.known or carries:
+            causes.append(_periodic_entry(periodic.reading, held / whole, library))
     causes = sorted(
         (cause for cause in causes if cause.share >= SMALLEST_SHARE), key=lambda one: -one.share
     )
@@ -193,26 +185,6 @@ def explain_change(
     )
 
 
-def _line_reading(
-    units: list[Unit], white: list[Floats], between: float
-) -> tuple[Reading | None, list[Unit]]:
-    """Read the lines that grew, over the motor angle or over time; also the units by that angle."""
-    spectra = order_spectra(units, white)
-    if spectra is None:
-        return None, units
-    lines = grown_lines(spectra, between)
-    reading = read_lines(lines, units[0].fine, spectra.resolution)
-    if reading is None or reading.known:
-        return reading, units
-    # An order that means nothing may be a frequency: hum, or a structure that rings.
-    timed = [clocked(unit) for unit in units]
-    clock = order_spectra(timed, white)
-    beats = grown_lines(clock, between) if clock is not None else []
-    if clock is not None and beats and beats[0].excess > lines[0].excess:
-        return read_frequency(beats[0], clock.resolution), timed
-    return reading, units
-
-
 def _slow_entries(
     units: list[Unit],
     population: Population,
@@ -223,9 +195,13 @@ def _slow_entries(
 ) -> list[Cause]:
     causes = []
     left = energy.total
-    for found in slow:
+    powers = [shift_power(units, found.shift) for found in slow]
+    # Where healthy sessions' differences hide a change, its own power is what there is of it.
+    hidden = bool(powers) and energy.slow < VISIBLE * powers[-1]
+    for found, power, before in zip(slow, powers, [0.0, *powers], strict=False):
         rest = energy_of(units, population, True, found.shift).total
-        share = float(np.clip((left - rest) / whole, 0.0, 1.0))
+        gained = power - before if hidden else left - rest
+        share = float(np.clip(gained / whole, 0.0, 1.0))
         left = min(left, rest)
         effect = library[found.effect]
         causes.append(
@@ -238,21 +214,22 @@ def _slow_entries(
                 share=share,
                 p_value=found.p_value,
                 ties=found.ties,
-                benign=found.effect in BENIGN,
+                benign=effect.benign,
             )
         )
     return causes
 
 
-def _ripple_entry(reading: Reading, share: float, library: Library) -> Cause:
+def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
+    effect = library[reading.effect]
     return Cause(
         effect=reading.effect,
-        domain=library[reading.effect].domain,
+        domain=effect.domain,
         parameters=reading.parameters,
         interpretation=reading.interpretation,
         share=share,
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
-        benign=reading.effect in BENIGN,
+        benign=effect.benign,
         evidence=reading.evidence,
     )

@@ -13,6 +13,9 @@ from opamc_cli.joint.track import Track
 
 HARMONICS = 12
 SHORTEST_COMB = 3
+PASSAGES = (2, 4)
+"""Without a line at one of these per turn of the wave generator, no comb is the mesh's."""
+
 USUAL_POLE_PAIRS = range(2, 13)
 USUAL_RATIO = 100.0
 SMALLEST_RATIO = 30.0
@@ -89,8 +92,10 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
         return electrical
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
+        slack = min(SIDE_RESOLUTIONS * resolution * poles, 0.25)
+        passages = [line for line in wave if _near(line, poles, track, slack) in PASSAGES]
         # One line is enough if it is the strongest; a comb speaks for itself.
-        if lines[0] in wave or len(wave) >= SHORTEST_COMB:
+        if lines[0] in passages or (passages and len(wave) >= SHORTEST_COMB):
             return _wave_generator(wave, track, resolution, poles)
     return electrical
 
@@ -219,6 +224,16 @@ def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> 
     return float(np.average(places, weights=weights)), float(1 / np.sqrt(np.sum(weights)))
 
 
+def _meant(order: float, track: Track, resolution: float) -> float:
+    """Nearest order that has a meaning of its own within what a stroke can tell apart."""
+    if track.angle_kind != "motor":
+        return order
+    poles = track.joint.pole_pairs
+    named = [1.0, 2.0, 4.0] + ([] if poles is None else [poles, 2.0 * poles, 6.0 * poles])
+    nearest = min(named, key=lambda meant: abs(meant - order))
+    return nearest if abs(nearest - order) < 0.75 * resolution else order
+
+
 def _other(line: Line, track: Track, resolution: float) -> Reading:
     evidence = {
         "measured_order": line.order,
@@ -226,7 +241,7 @@ def _other(line: Line, track: Track, resolution: float) -> Reading:
         "order_resolution": resolution,
         "power_ratio": line.growth,
     }
-    text = read_order(line.order, track)
+    text = read_order(_meant(line.order, track, resolution), track)
     effect = "ripple"
     ties: tuple[str, ...] = ()
     if "electrical," in text and "phases" in track.channels:

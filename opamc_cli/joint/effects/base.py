@@ -27,6 +27,10 @@ class Effect:
     name: str = ""
     domain: str = ""
     meaning: str = ""
+    origin: str = "joint"
+    """Where it comes from: the "joint" itself, where more of it is a fault; or from outside of its
+    mechanics: "environment" (temperature), "load" (tool, work piece), "measurement" (sensors,
+    drive, logger)."""
     needs: tuple[str, ...] = ()
     fast: bool = False
     """True where the regressors change too fast for a decimated grid."""
@@ -51,6 +55,11 @@ class Effect:
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
+
+    @property
+    def benign(self) -> bool:
+        """Whether a joint that has more of it is no worse for it: changed, but not at fault."""
+        return self.origin != "joint"
 
     def untestable(self, track: Track) -> str | None:
         """Why the recording cannot show this effect, or None where it can."""

@@ -19,6 +19,7 @@ class Gravity(Effect):
 
     name = "gravity"
     domain = "joint-angle"
+    origin = "load"
     meaning = "weight of the links; not a fault in itself"
     needs = ("position",)
     carries_load = True

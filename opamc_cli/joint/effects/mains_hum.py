@@ -43,6 +43,7 @@ class MainsHum(Effect):
 
     name = "mains_hum"
     domain = "frequency"
+    origin = "measurement"
     meaning = "mains pick-up in the current reading: check shielding and grounding"
     dense_guesses = True
     from_motion = True

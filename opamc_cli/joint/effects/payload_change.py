@@ -11,6 +11,7 @@ class PayloadChange(Effect):
 
     name = "payload_change"
     domain = "load"
+    origin = "load"
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True

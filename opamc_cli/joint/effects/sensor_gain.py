@@ -11,6 +11,7 @@ class SensorGain(Effect):
 
     name = "sensor_gain"
     domain = "electrical"
+    origin = "measurement"
     meaning = "gain error of a phase current sensor: recalibrate it"
     needs = ("electrical",)
     fast = True

@@ -11,6 +11,7 @@ class SensorOffset(Effect):
 
     name = "sensor_offset"
     domain = "electrical"
+    origin = "measurement"
     meaning = "zero error of a phase current sensor: recalibrate it"
     needs = ("electrical",)
     from_motion = True

@@ -13,6 +13,7 @@ class ThermalViscous(Effect):
 
     name = "thermal_viscous"
     domain = "temperature"
+    origin = "environment"
     meaning = "grease is stiffer when cold: not a fault"
     needs = ("position", "temperature")
     dense_guesses = True

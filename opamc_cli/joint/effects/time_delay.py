@@ -12,6 +12,7 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     domain = "time"
+    origin = "measurement"
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False

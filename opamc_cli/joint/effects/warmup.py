@@ -11,6 +11,7 @@ class Warmup(Effect):
 
     name = "warmup"
     domain = "time"
+    origin = "environment"
     meaning = "friction falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
     dense_guesses = True

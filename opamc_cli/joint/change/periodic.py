@@ -1,0 +1,111 @@
+"""Which periodic effect grew: over the motor angle, over time, or in the frame of the phases."""
+
+from dataclasses import dataclass, replace
+
+from opamc_cli.joint.change.energy import comb_energy
+from opamc_cli.joint.change.lines import (
+    Line,
+    OrderSpectra,
+    clocked,
+    grown_lines,
+    order_spectra,
+    turned_back,
+)
+from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
+from opamc_cli.joint.change.units import Unit
+from opamc_cli.joint.track import Floats
+
+STANDING = 0.7
+"""A ripple that is turned back to the phases' frame keeps half of its line there at most; what one
+phase picks up has as much in that frame as in either of its two lines over the motor angle."""
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """A periodic effect that grew.
+
+    Attributes
+    ----------
+    reading : Reading
+        What it means.
+    power : float
+        Mean square that it holds more in the target than in the baseline, A^2.
+    """
+
+    reading: Reading
+    power: float
+
+
+def find_periodic(
+    units: list[Unit], white: list[Floats], plain: list[Floats], between: float = 0.0
+) -> Periodic | None:
+    """Read the lines that grew.
+
+    Parameters
+    ----------
+    units : list of Unit
+        Of both sides.
+    white, plain : lists of arrays
+        Residuals of every unit's own fit on its fine track, whitened and as they are.
+    between : float
+        See `grown_lines`.
+
+    Returns
+    -------
+    Periodic or None
+        None where no line grew, or one that keeps its frequency and is not the mains'.
+    """
+    spectra = order_spectra(units, white)
+    lines = [] if spectra is None else grown_lines(spectra, between)
+    if spectra is None or not lines:
+        return None
+    timed = [clocked(unit) for unit in units]
+    hum = _picked_up(timed, white, plain, lines[0], between)
+    if hum is not None:
+        return hum
+    reading = read_lines(lines, units[0].fine, spectra.resolution)
+    if reading is None:
+        return None
+    if not reading.known:
+        # An order that means nothing may be a frequency: hum, or a structure that rings.
+        clock = order_spectra(timed, white)
+        beats = grown_lines(clock, between) if clock is not None else []
+        if clock is not None and beats and beats[0].excess > lines[0].excess:
+            at = read_frequency(beats[0], clock.resolution)
+            return None if at is None else Periodic(at, comb_energy(timed, plain, at.fundamental))
+    return Periodic(reading, comb_energy(units, plain, reading.fundamental))
+
+
+def _picked_up(
+    timed: list[Unit], white: list[Floats], plain: list[Floats], strongest: Line, between: float
+) -> Periodic | None:
+    """Mains hum of a phase, which turns against the field in the torque current."""
+    spectra = _standing_spectra(timed, white)
+    beats = [] if spectra is None else grown_lines(spectra, between)
+    if spectra is None or not beats or beats[0].excess < STANDING * strongest.excess:
+        return None
+    reading = read_frequency(beats[0], spectra.resolution)
+    if reading is None:
+        return None
+    sides = _quadratures(timed, plain)
+    # Half of it is there; the other half turns twice as fast as the field.
+    held = 2 * sum(comb_energy(timed, side, reading.fundamental) for side in sides)
+    return Periodic(reading, held)
+
+
+def _standing_spectra(timed: list[Unit], white: list[Floats]) -> OrderSpectra | None:
+    """Power over frequency in the phases' frame, summed over its two axes."""
+    sides = _quadratures(timed, white)
+    if not sides:
+        return None
+    one, other = order_spectra(timed, sides[0]), order_spectra(timed, sides[1])
+    if one is None or other is None:
+        return None
+    return replace(one, before=one.before + other.before, after=one.after + other.after)
+
+
+def _quadratures(units: list[Unit], residuals: list[Floats]) -> list[list[Floats]]:
+    """Residuals along both axes of the phases' frame; none where no phases were logged."""
+    sides = [turned_back(unit, residual) for unit, residual in zip(units, residuals, strict=True)]
+    turned = [side for side in sides if side is not None]
+    return [list(side) for side in zip(*turned, strict=True)] if len(turned) == len(units) else []
