@@ -28,22 +28,31 @@ to show."""
 PLACE_BOUND = frozenset({"spring", "hysteresis"})
 """Not sought where the phases alone give the place: it has no zero there."""
 
-EXPECTED = ("payload_change", "offset", "viscous", "coulomb")
-"""What most often changes. Each is tried as one of these four; any other effect as one of all,
-with all its guesses. Of effects that explain a change equally well, the first of these is named."""
+EXPECTED = {"payload_change": 0.1, "offset": 0.1, "viscous": 0.4, "coulomb": 0.4}
+"""What most often changes, and each one's part of the level: friction differs most from day to day
+and needs the larger parts; payload and offset, where there are any, are seen at once. Of effects
+that explain a change equally well, the first of these is named."""
 
-FRICTION = frozenset({"viscous", "coulomb", "sublinear_friction", "quadratic_friction"})
+UNEXPECTED = 0.5
+"""All other effects' part, shared by as many as there are and by all their guesses."""
 
-LARGEST_P = 0.01
+GREASE = frozenset({"viscous", "sublinear_friction", "quadratic_friction"})
+FRICTION = GREASE | {"coulomb"}
+"""How viscous friction grows with the speed is not known well enough to tell the first three apart
+by a change of it."""
+
+LARGEST_P = 0.015
 PLANNED_P = 0.05
-"""Where the logged temperature has left the baseline's range, one effect is expected."""
+HIDDEN_P = 0.001
+"""Below which a shift counts even where the target lies no farther from the baseline's mean than
+its own sessions do: what differs there by chance may happen to hide it."""
 
 SMALLEST_GAIN = 0.03
 """What explains less of the slow change is not worth a maintainer's time."""
 
 AS_GOOD, NEARLY_AS_GOOD = 0.95, 0.85
 COLLINEAR = 0.6
-SMALLEST_SHIFT = 0.02
+SMALLEST_SHIFT = 0.01
 """A shift below this share of the slow current's root mean square is of no interest."""
 
 MOST_CAUSES = 3
@@ -109,16 +118,32 @@ def find_slow_causes(
         cause = _next(ready, population, before, candidates, library)
         if cause is None:
             break
-        found = _in_turn(
-            ready, population, [*_still_needed(ready, population, found, cause), cause]
-        )
+        needed = _still_needed(ready, population, found, cause, len(candidates))
+        found = _in_turn(ready, population, [*needed, cause])
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         candidates = [term for term in candidates if term.effect.name not in gone]
-    return found
+    return _one_grease(ready, population, found)
+
+
+def _one_grease(
+    ready: list[Prepared], population: Population, found: list[SlowCause]
+) -> list[SlowCause]:
+    """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
+    grease = [cause for cause in found if cause.effect == "thermal_viscous"]
+    dry = [cause for cause in found if cause.effect == "coulomb"]
+    if not grease or not dry or not _mostly_wet(*_relative(ready, population)):
+        return found
+    rest = [cause for cause in found if cause not in (*grease, *dry)]
+    joint = _in_turn(ready, population, [*grease, *dry, *rest])
+    return [replace(joint[0], shift=joint[1].shift), *joint[2:]]
 
 
 def _still_needed(
-    ready: list[Prepared], population: Population, found: list[SlowCause], latest: SlowCause
+    ready: list[Prepared],
+    population: Population,
+    found: list[SlowCause],
+    latest: SlowCause,
+    guesses: int,
 ) -> list[SlowCause]:
     """Drop causes that the latest one has made superfluous."""
     kept = list(found)
@@ -126,7 +151,8 @@ def _still_needed(
         others = [other for other in kept if other is not cause]
         beside = tuple(other.shift.terms[-1] for other in (*others, latest))
         again = shifts(ready, population, beside, [cause.shift.terms[-1]])
-        if not again or again[0].p_value * len(EXPECTED) > LARGEST_P:
+        part = EXPECTED.get(cause.shift.terms[-1].effect.name, UNEXPECTED / guesses)
+        if not again or again[0].p_value / part > LARGEST_P:
             kept = others
     return kept
 
@@ -159,8 +185,8 @@ def _next(
     best: dict[str, tuple[float, Shift]] = {}
     for shift in shifts(ready, population, chosen, candidates):
         name = shift.terms[-1].effect.name
-        tried = len(EXPECTED) if name in EXPECTED else guesses[name] * len(guesses)
-        p_value = min(shift.p_value * tried, 1.0)
+        part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
+        p_value = min(shift.p_value / part, 1.0)
         if name not in best and _size(ready, shift) >= SMALLEST_SHIFT * population.power**0.5:
             best[name] = (p_value, shift)
     if not best:
@@ -174,8 +200,13 @@ def _next(
     left = _left(ready, before)
     gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
     most = max(gains.values())
-    if most < SMALLEST_GAIN * _changed(ready):
-        return None
+    if most < SMALLEST_GAIN * _changed(ready) or most <= 0:
+        # What healthy sessions differ by may happen to hide it.
+        surest = min(sure, key=lambda name: sure[name][0])
+        if sure[surest][0] > HIDDEN_P:
+            return None
+        gains = {surest: 0.0}
+        most = 0.0
     # Among those that explain the change equally well, the simplest is named.
     as_good = [name for name, gain in gains.items() if gain >= AS_GOOD * most]
     first = min(as_good, key=lambda name: (sure[name][1].width, _rank(name), sure[name][0]))
@@ -191,7 +222,7 @@ def _next(
     cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
     if first == "payload_change":
         return _payload(cause)
-    if "viscous" in (first, *ties):
+    if {first, *ties} & GREASE:
         return _friction(ready, population, cause, library)
     return cause
 
@@ -234,7 +265,7 @@ def _friction(
     if ready[0].unit.fine.temperature_c is not None:
         return cause  # as warm as ever
     dry, wet = _relative(ready, population)
-    if abs(wet) > 2 * abs(dry) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
+    if abs(wet) > abs(dry) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
         return _thermal(cause.shift, cause.p_value, ties, None)
     return cause
 
@@ -292,6 +323,11 @@ def _relative(ready: list[Prepared], population: Population) -> tuple[float, flo
     return changes[0], changes[1]
 
 
+def _mostly_wet(dry: float, wet: float) -> bool:
+    """Tell whether friction changed as grease of another temperature changes it."""
+    return abs(wet) > 2 * abs(dry)
+
+
 def _contribution(ready: list[Prepared], shift: Shift) -> Floats:
     """Compute the last term's current in the target's units, one after the other."""
     last = shift.terms[-1]
@@ -331,4 +367,5 @@ def _changed(ready: list[Prepared]) -> float:
 
 
 def _rank(name: str) -> int:
-    return EXPECTED.index(name) if name in EXPECTED else len(EXPECTED)
+    names = tuple(EXPECTED)
+    return names.index(name) if name in names else len(names)
