@@ -1,3 +1,5 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -97,6 +99,20 @@ def slow_dahl(position, length):
         states.append(state)
         previous = place
     return np.array(states)
+
+
+@pytest.mark.parametrize("name", VOCABULARY)
+def test_every_effect_is_a_fault_or_not_as_the_documentation_says(name):
+    text = (Path(__file__).parents[2] / "docs" / "decision.md").read_text()
+    rows = {
+        cells[1].strip(): (cells[2], cells[3].strip())
+        for line in text.splitlines()
+        if len(cells := line.split("|")) == 5
+    }
+    effect = built_in_library()[name]
+    causes, state = rows[effect.origin]
+    assert f"`{name}`" in causes
+    assert state == ("`changed`" if effect.benign else "`fault`")
 
 
 @settings(max_examples=10, deadline=None)
