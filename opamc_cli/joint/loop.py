@@ -7,6 +7,7 @@ import numpy as np
 from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
+from opamc_cli.joint.form import slow_misfit
 from opamc_cli.joint.gate import Gate, decoy_likelihood
 from opamc_cli.joint.model import Fit, Session, fit_terms
 from opamc_cli.joint.retraction import confirmed, pruned, without_imitations, without_trifles
@@ -114,7 +115,7 @@ def close_loop(
     fitted, steps, remains = without_trifles(before, fitted, steps, remains, progress)
     # Only now, and only once, are the sealed groups looked at.
     fitted, steps, remains = confirmed(before, fitted, steps, remains, progress)
-    return _summary(before, fitted, tuple(steps), progress, seen_before, remains)
+    return _summary(before, fitted, tuple(steps), progress, seen_before, remains, seed)
 
 
 def _round(
@@ -218,10 +219,17 @@ def _summary(
     progress: Progress,
     seen_before: list[Structure],
     remains: list[Structure],
+    seed: int,
 ) -> Loop:
     first, last = ceiling(before, seen_before), ceiling(after, remains)
     structured = [structure for structure in remains if structure.significant]
     rest = last.significant
+    if not steps and not structured and not rest:
+        slow = slow_misfit(after, seed)
+        if slow is not None:
+            share = slow.excess / slow.basis.shape[0]
+            remains = [Structure(slow.domain, share, float(np.sqrt(slow.excess)), slow.p_value)]
+            structured = remains
     rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
     floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))
     reach = rmse_before**2 - floor**2

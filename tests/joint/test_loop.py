@@ -81,3 +81,19 @@ def test_what_the_sealed_data_do_not_bear_out_is_taken_back():
     assert reasons["warmup"] == "does not hold on the sealed data"
     assert loop.steps == ()
     assert loop.rmse_after_a == loop.rmse_before_a
+
+
+@pytest.mark.parametrize(("seed", "quantum"), [(8, 5e-4), (32, 1e-4), (53, 5e-4)])
+def test_what_smoothing_rounds_off_in_every_cycle_is_not_called_missing(seed, quantum):
+    _, loop = close_on(seed, (), quantum=quantum)
+    assert loop.verdict == "nothing-missing"
+    assert loop.explained_share == 1.0
+
+
+@pytest.mark.parametrize("effect", ["thermal_viscous", "warmup"])
+def test_friction_that_changes_from_cycle_to_cycle_is_noticed_without_its_name(effect):
+    removed = ("thermal_viscous", "warmup")
+    _, loop = close_on(63, (effect,), ratio=0.6, without=removed)
+    assert not loop.steps
+    assert loop.verdict == "not-in-library"
+    assert loop.remaining_domain in ("temperature", "time")
