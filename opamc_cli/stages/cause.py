@@ -18,6 +18,8 @@ MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
 much better from more."""
 
+OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
+
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
@@ -98,12 +100,11 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "p_value": first.p_value,
         "ties": list(first.ties),
         "harmless": change.benign,
+        "origin": first.origin,
+        "explained": change.explained_share,
         "evidence": dict(first.evidence),
         "why": _why(first, change),
-        "others": [
-            {key: asdict(cause)[key] for key in ("effect", "parameters", "share", "interpretation")}
-            for cause in others
-        ],
+        "others": [{key: asdict(cause)[key] for key in OF_OTHERS} for cause in others],
     }
 
 
@@ -134,9 +135,9 @@ def _why(cause: Cause, change: Change) -> list[str]:
     )
     if cause.ties:
         sentences.append(f"The recordings cannot tell it from: {'; '.join(cause.ties)}.")
-    others = [f"{_effect_name(other)} ({other.share:.0%})" for other in change.causes[1:]]
-    if others:
-        sentences.append(f"Besides: {', '.join(others)}.")
+    for other in change.causes[1:]:
+        name = _effect_name(other).lower()
+        sentences.append(f"Besides, {name} explains {other.share:.0%}: {other.interpretation}.")
     if change.explained_share < WELL_EXPLAINED:
         sentences.append(
             f"{1 - change.explained_share:.0%} of the change has no cause in the library."

@@ -81,9 +81,10 @@ def reasons(
     ]
     if unhealthy and cause is not None:
         meaning = cause.get("interpretation") or cause.get("effect")
-        known = [CHECK_FIRST] if cause.get("harmless") else [FOUND, REPEAT]
+        outside = cause.get("harmless") or cause.get("origin", "joint") != "joint"
+        known = [CHECK_FIRST] if outside else [FOUND, REPEAT]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
-        if cause.get("harmless") and judgement.state == "fault":
+        if outside and judgement.state == "fault":
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]

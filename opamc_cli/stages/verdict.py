@@ -23,7 +23,7 @@ from opamc_cli.stages.score import (
     PatternRows,
     read_patterns,
 )
-from opamc_cli.stats.decision import Judgement, Policy, State, judge
+from opamc_cli.stats.decision import Judgement, Policy, judge
 from opamc_cli.storage.atomic import write_text
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import SPECTRA, read_table
@@ -31,7 +31,7 @@ from opamc_cli.storage.tables import SPECTRA, read_table
 FILE_NAME = "verdict.json"
 
 MAIN_SHARE = 0.5
-"""Share of the change from which a cause decides between changed and fault."""
+"""Share of the change from which causes decide between changed and fault."""
 
 
 @dataclass(frozen=True)
@@ -196,10 +196,13 @@ def _with_cause(judgement: Judgement, cause: Mapping[str, Any] | None) -> Judgem
     """Call a change of known cause a fault only if that cause harms the joint."""
     if cause is None or judgement.state not in ("changed", "fault"):
         return judgement
-    if float(cause.get("share", 1.0)) < MAIN_SHARE:
+    if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
         return judgement
-    state: State = "changed" if cause.get("harmless") else "fault"
-    return replace(judgement, state=state)
+    if cause.get("harmless"):
+        return replace(judgement, state="changed")
+    # A fault is named first if there is one.
+    at_fault = cause.get("origin", "joint") == "joint"
+    return replace(judgement, state="fault") if at_fault else judgement
 
 
 def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:

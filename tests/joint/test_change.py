@@ -27,6 +27,8 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
         "tooth": 1.5 * noise * np.cos(tooth * q),
         "payload": 0.3 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
         "friction": 0.5 * v / top,
+        "tooth and payload": 1.5 * noise * np.cos(tooth * q)
+        + 1.5 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
         "hum": 1.5 * noise * np.cos(2 * np.pi * 50.0 * made.time),
     }[kind]
     edges = np.linspace(0, v.size, count + 1).astype(int)
@@ -72,6 +74,14 @@ def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     # An order that a stroke cannot tell from 2 is not sold as one that it can.
     if cause.evidence["order_resolution"] > 0.05:
         assert "kinematic error" in cause.ties[0]
+    assert not change.benign
+
+
+def test_tooth_damage_is_a_fault_even_where_a_payload_hides_it():
+    change = change_of("tooth and payload")
+    assert change.causes[0].effect == "ripple"
+    assert change.causes[1].effect == "payload_change"
+    assert change.causes[1].share > 0.7
     assert not change.benign
 
 

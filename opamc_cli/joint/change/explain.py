@@ -37,6 +37,9 @@ VISIBLE = 0.5
 
 BENIGN_SHARE = 0.5
 FAULT_SHARE = 0.2
+CLEAR_GROWTH = 10.0
+"""A ripple of known meaning whose power has grown so much, its amplitude threefold, is a fault even
+beside a payload that moves the slow current far more than any ripple could."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,10 @@ class Cause:
         Probability with which healthy units show as much, corrected for what was tried.
     ties : tuple of str
         Effects or readings that explain the change as well.
-    benign : bool
-        True where it is no fault of the joint (temperature, payload, sensors).
+    origin : str
+        The effect's: "joint", or "environment", "load", "measurement", which are no fault of it.
+    serious : bool
+        True where it is the joint's and large enough to be called a fault whatever else changed.
     """
 
     effect: str
@@ -71,8 +76,14 @@ class Cause:
     share: float
     p_value: float
     ties: tuple[str, ...]
-    benign: bool
+    origin: str
+    serious: bool
     evidence: Parameters = field(default_factory=dict)
+
+    @property
+    def benign(self) -> bool:
+        """Whether the joint is no worse for it."""
+        return self.origin != "joint"
 
 
 @dataclass(frozen=True)
@@ -82,14 +93,15 @@ class Change:
     Attributes
     ----------
     causes : tuple of Cause
-        Largest share first; empty where nothing lies outside what healthy units show.
+        Serious ones first, then by share; empty where nothing lies outside what healthy units
+        show.
     excess_a : float
         Root of how much larger the mean square residual is in the target than in the baseline,
         beyond the sessions' own differences.
     explained_share : float
         Share of that excess which all causes explain together.
     benign : bool
-        True where harmless causes explain at least half of the excess and no fault a fifth.
+        True where harmless causes explain at least half of the excess and no cause is serious.
     units : tuple of int
         Baseline and target units that were compared.
     sessions : bool
@@ -169,16 +181,18 @@ def explain_change(
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
         if periodic.reading.known or carries:
             causes.append(_periodic_entry(periodic.reading, held / whole, library))
+    # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
-        (cause for cause in causes if cause.share >= SMALLEST_SHARE), key=lambda one: -one.share
+        (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
+        key=lambda one: (not one.serious, -one.share),
     )
     harmless = sum(cause.share for cause in causes if cause.benign)
-    harmful = sum(cause.share for cause in causes if not cause.benign)
+    serious = any(cause.serious for cause in causes)
     return Change(
         causes=tuple(causes),
         excess_a=float(np.sqrt(whole)) if causes else float(np.sqrt(energy.total)),
-        explained_share=min(harmless + harmful, 1.0),
-        benign=harmless >= BENIGN_SHARE and harmful < FAULT_SHARE,
+        explained_share=min(sum(cause.share for cause in causes), 1.0),
+        benign=harmless >= BENIGN_SHARE and not serious,
         units=(len(before), len(after)),
         sessions=not cycles,
         angle=units[0].fine.angle_kind,
@@ -214,7 +228,8 @@ def _slow_entries(
                 share=share,
                 p_value=found.p_value,
                 ties=found.ties,
-                benign=effect.benign,
+                origin=effect.origin,
+                serious=not effect.benign and share >= FAULT_SHARE,
             )
         )
     return causes
@@ -222,6 +237,7 @@ def _slow_entries(
 
 def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
     effect = library[reading.effect]
+    clear = reading.known and reading.evidence["power_ratio"] >= CLEAR_GROWTH
     return Cause(
         effect=reading.effect,
         domain=effect.domain,
@@ -230,6 +246,7 @@ def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
         share=share,
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
-        benign=effect.benign,
+        origin=effect.origin,
+        serious=not effect.benign and (clear or share >= FAULT_SHARE),
         evidence=reading.evidence,
     )

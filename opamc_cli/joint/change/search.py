@@ -218,6 +218,12 @@ def _next(
         and gains[name] >= NEARLY_AS_GOOD * gains[first]
         and _correlation(own, _contribution(ready, sure[name][1])) > COLLINEAR
     )
+    if first == "spring" and "payload_change" in ties:
+        # Over a short travel another weight looks like a spring, and is what changes.
+        first, ties = (
+            "payload_change",
+            ("spring", *(tie for tie in ties if tie != "payload_change")),
+        )
     p_value, shift = sure[first]
     cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
     if first == "payload_change":
