@@ -102,6 +102,7 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "harmless": change.benign,
         "origin": first.origin,
         "explained": change.explained_share,
+        "clear": first.clear,
         "evidence": dict(first.evidence),
         "why": _why(first, change),
         "others": [{key: asdict(cause)[key] for key in OF_OTHERS} for cause in others],

@@ -88,16 +88,19 @@ def run(
     tables = (normal.patterns, other.patterns, scored.scores_path, scored.features_path)
     spectra = (normal.spectra, other.spectra)
     decided = verdict.run(*tables, config, out, spectra=spectra)
-    unhealthy = [
-        entry["axis"] for entry in decided.verdict["axes"] if entry["state"] in ("changed", "fault")
+    differing = [
+        entry["axis"]
+        for entry in decided.verdict["axes"]
+        if entry["state"] in ("changed", "fault")
+        or verdict.is_excused(entry["p_adjusted"], entry["state"], config.score)
     ]
     notes: list[str] = []
-    if unhealthy and config.joint.explain:
+    if differing and config.joint.explain:
         progress("cause")
         sides = read_sources(normal.patterns), read_sources(other.patterns)
         starts = cause.first_motions(normal.patterns), cause.first_motions(other.patterns)
         causes: dict[int, dict[str, Any]] = {}
-        for axis in unhealthy:
+        for axis in differing:
             first = {**starts[0].get(axis, {}), **starts[1].get(axis, {})}
             try:
                 found = cause.explain(axis, *sides, config.joint, first)

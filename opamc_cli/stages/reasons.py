@@ -201,7 +201,7 @@ def _siblings(judgement: Judgement) -> list[str]:
             f"{text}: what moves all joints together (temperature, supply, logger, payload) is "
             "not taken for a fault of one."
         ]
-    return [f"{text}; this joint stands out from them (p = {_p(judgement.p_alone)})."]
+    return [f"{text}; what this joint shows beyond that has p = {_p(judgement.p_alone)}."]
 
 
 def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:

@@ -148,7 +148,9 @@ def decide(
     axes = []
     for axis, judgement in judgements.items():
         cause = causes.get(axis)
-        decided = _with_cause(judgement, cause)
+        decided = _with_cause(judgement, cause, config.score)
+        if decided.state == "healthy":
+            cause = None
         motions = [
             {
                 "motion": cell.motion,
@@ -192,9 +194,21 @@ def policy_of(config: ScoreConfig) -> Policy:
     )
 
 
-def _with_cause(judgement: Judgement, cause: Mapping[str, Any] | None) -> Judgement:
+def is_excused(p_adjusted: float | None, state: str, config: ScoreConfig) -> bool:
+    """Tell whether a joint is called healthy although it differs: others may differ as much."""
+    return state == "healthy" and p_adjusted is not None and p_adjusted <= config.false_alarm_rate
+
+
+def _with_cause(
+    judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
+) -> Judgement:
     """Call a change of known cause a fault only if that cause harms the joint."""
-    if cause is None or judgement.state not in ("changed", "fault"):
+    if cause is None:
+        return judgement
+    if is_excused(judgement.p_adjusted, judgement.state, config):
+        matters = judgement.effect >= config.minimum_effect
+        return replace(judgement, state="fault") if matters and cause.get("clear") else judgement
+    if judgement.state not in ("changed", "fault"):
         return judgement
     if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
         return judgement

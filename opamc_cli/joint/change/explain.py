@@ -38,8 +38,8 @@ VISIBLE = 0.5
 BENIGN_SHARE = 0.5
 FAULT_SHARE = 0.2
 CLEAR_GROWTH = 10.0
-"""A ripple of known meaning whose power has grown so much, its amplitude threefold, is a fault even
-beside a payload that moves the slow current far more than any ripple could."""
+"""The mesh's ripple whose power has grown so much, its amplitude threefold, is a fault even beside
+a payload that moves the slow current far more than any ripple could."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +67,8 @@ class Cause:
         The effect's: "joint", or "environment", "load", "measurement", which are no fault of it.
     serious : bool
         True where it is the joint's and large enough to be called a fault whatever else changed.
+    clear : bool
+        True where nothing that all joints have in common could look like it.
     """
 
     effect: str
@@ -78,6 +80,7 @@ class Cause:
     ties: tuple[str, ...]
     origin: str
     serious: bool
+    clear: bool = False
     evidence: Parameters = field(default_factory=dict)
 
     @property
@@ -237,7 +240,7 @@ def _slow_entries(
 
 def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
     effect = library[reading.effect]
-    clear = reading.known and reading.evidence["power_ratio"] >= CLEAR_GROWTH
+    clear = reading.mesh and reading.evidence["power_ratio"] >= CLEAR_GROWTH
     return Cause(
         effect=reading.effect,
         domain=effect.domain,
@@ -247,6 +250,7 @@ def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
         origin=effect.origin,
-        serious=not effect.benign and (clear or share >= FAULT_SHARE),
+        serious=clear or (not effect.benign and share >= FAULT_SHARE),
+        clear=clear,
         evidence=reading.evidence,
     )

@@ -61,6 +61,8 @@ class Reading:
         Order whose harmonics are the comb.
     known : bool
         Whether the order has a meaning in a strain wave gear.
+    mesh : bool
+        Whether it is that of the wave generator's passage over the teeth.
     """
 
     effect: str
@@ -71,6 +73,7 @@ class Reading:
     lines: tuple[Line, ...]
     fundamental: float
     known: bool
+    mesh: bool = False
 
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:
@@ -199,7 +202,7 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
     named_order = order / poles
     return Reading(
         "ripple", {"order": named_order}, evidence, interpretation, ties, tuple(lines),
-        named_order, True,
+        named_order, known=True, mesh=True,
     )  # fmt: skip
 
 
