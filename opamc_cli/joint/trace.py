@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opamc_cli.joint.coherence import disagreement
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.flux import objection_of_flux
 from opamc_cli.joint.form import pressed_limit
@@ -99,6 +100,7 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
+        why = why or disagreement(view, tested)
         if why is None and not tested.fine:
             if unnamed is None:
                 unnamed = [

@@ -94,12 +94,7 @@ def test_two_missing_effects_are_both_found(pair, sensing, floors):
 @pytest.mark.parametrize(
     ("effect", "domain", "sensing"),
     [
-        pytest.param(
-            "ripple",
-            "motor-angle",
-            "position and current",
-            marks=pytest.mark.xfail(strict=True, reason="the speed's ripple looks like a delay"),
-        ),
+        ("ripple", "motor-angle", "position and current"),
         ("ripple", "motor-angle", "phases"),
         ("mains_hum", "frequency", "position and current"),
         ("mains_hum", "frequency", "phases"),

@@ -92,6 +92,14 @@ class Effect:
         """Regressors, shape (n, m), for given non-linear parameters."""
         raise NotImplementedError
 
+    def parts(self, track: Track, parameters: Parameters) -> Floats | None:
+        """Split the effect into what it does to each fitted regressor, shape (n, k); or None.
+
+        For an effect that does the same to all of them: its one column is their sum, and fitted one
+        by one they must agree.
+        """
+        return None
+
     def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
         """Regressors after the fitted model has changed, from those before; `columns` in short."""
         return self.columns(track, parameters)

@@ -35,6 +35,10 @@ class TimeDelay(Effect):
 
         The coefficients of the unshifted fit would not do: they have already bent to the delay.
         """
+        return stack(self.parts(track, parameters).sum(axis=1))
+
+    def parts(self, track: Track, parameters: Parameters) -> Floats:
+        """Shift each regressor of the model: one clock delays them all alike."""
         rows = track.open_samples
         if not track.static_columns or rows is None:
             return np.zeros((track.size, 1))
@@ -48,7 +52,7 @@ class TimeDelay(Effect):
                 )
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        return stack((shifted - columns) @ coefficients)
+        return (shifted - columns) * coefficients
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied."""
