@@ -28,8 +28,11 @@ def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], .
     for place, (effect, term) in enumerate(declared):
         if term is not None:
             terms[place] = term
-        elif not effect.limits(session.coarse.track) and not effect.several:
-            guesses = effect.guesses(session.coarse.track, np.zeros(session.coarse.track.size))
+            continue
+        track = session.coarse.track
+        fixed = not effect.limits(track) and not effect.several
+        guesses = effect.guesses(track, np.zeros(track.size)) if fixed else []
+        if len(guesses) == 1:
             terms[place] = Term(effect, guesses[0])
         else:
             open_places.append(place)

@@ -10,7 +10,13 @@ from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.form import slow_misfit
 from opamc_cli.joint.gate import Gate, decoy_likelihood
 from opamc_cli.joint.model import Fit, Session, fit_terms
-from opamc_cli.joint.retraction import confirmed, pruned, without_imitations, without_trifles
+from opamc_cli.joint.retraction import (
+    confirmed,
+    pruned,
+    without_disagreement,
+    without_imitations,
+    without_trifles,
+)
 from opamc_cli.joint.search import Candidate
 from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.steps import Progress, Rejected, Step
@@ -105,6 +111,7 @@ def close_loop(
             fitted = step_fit
         fitted, steps = pruned(fitted, before, progress)
         found = {step.term.effect.name for step in steps}
+        fitted, steps = without_disagreement(before, fitted, steps, progress)
         remains = structures(fitted)
         fitted, steps, remains = without_imitations(before, fitted, steps, remains, progress, seed)
         wrong = found - {step.term.effect.name for step in steps}

@@ -2,11 +2,13 @@
 
 from dataclasses import replace
 
+from opamc_cli.joint.coherence import disagreement
 from opamc_cli.joint.domains import Structure, ceiling, structures
 from opamc_cli.joint.form import imitations
 from opamc_cli.joint.gate import removal_gains, sealed_falls
 from opamc_cli.joint.model import Fit, fit_terms
 from opamc_cli.joint.steps import Progress, Step
+from opamc_cli.joint.view import prepare
 
 TRIFLE_SHARE = 0.4
 PATCHWORK_KINDS = 3
@@ -27,6 +29,20 @@ def pruned(fitted: Fit, before: Fit, progress: Progress) -> tuple[Fit, list[Step
         why = "superfluous once later effects were added"
         progress.take_back(replace(gone, gain=gain, p_value=1.0), why)
         fitted = fit_terms(fitted.session, (*before.terms, *(s.term for s in steps)))
+    return fitted, steps
+
+
+def without_disagreement(
+    before: Fit, fitted: Fit, steps: list[Step], progress: Progress
+) -> tuple[Fit, list[Step]]:
+    """Take back a step on which the model, as it is with all later steps, does not agree."""
+    for step in [step for step in steps if step.term.effect.same_for_all]:
+        others = [other for other in steps if other is not step]
+        smaller = fit_terms(fitted.session, (*before.terms, *(other.term for other in others)))
+        why = disagreement(prepare(smaller, fine=step.term.effect.fast), step.term)
+        if why is not None:
+            progress.take_back(step, why)
+            fitted, steps = smaller, others
     return fitted, steps
 
 

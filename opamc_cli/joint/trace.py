@@ -100,7 +100,7 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
-        why = why or disagreement(view, tested)
+        why = why or disagreement(view, tested.term)
         if why is None and not tested.fine:
             if unnamed is None:
                 unnamed = [

@@ -52,6 +52,9 @@ class Effect:
     dense_guesses: bool = False
     """True where no guess explains anything only if nothing near it does: a step in time, say,
     hides between two guesses. A search does not refine what begins as nothing."""
+    same_for_all: bool = False
+    """True where the effect does the same to every fitted regressor: its one column is the sum of
+    its `parts`, and fitted one by one they must agree."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
@@ -92,13 +95,9 @@ class Effect:
         """Regressors, shape (n, m), for given non-linear parameters."""
         raise NotImplementedError
 
-    def parts(self, track: Track, parameters: Parameters) -> Floats | None:
-        """Split the effect into what it does to each fitted regressor, shape (n, k); or None.
-
-        For an effect that does the same to all of them: its one column is their sum, and fitted one
-        by one they must agree.
-        """
-        return None
+    def parts(self, track: Track, parameters: Parameters) -> Floats:
+        """Split what `same_for_all` does by fitted regressors, shape (n, k)."""
+        raise NotImplementedError
 
     def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
         """Regressors after the fitted model has changed, from those before; `columns` in short."""

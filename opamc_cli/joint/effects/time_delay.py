@@ -16,6 +16,7 @@ class TimeDelay(Effect):
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False
+    same_for_all = True
     dense_guesses = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -1,0 +1,88 @@
+"""The loop on a joint of configs/testbed.yaml with all its parts.
+
+Its kinematic error moves the joint near the joint's own resonance, the gear winds up, and friction
+follows load, speed and temperature. What the model does not declare may be found; what is not there
+may not: the reported current is 0.5 ms late, and nothing else is.
+"""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from opamc_cli.config.testbed import load_testbed
+from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.model import Term, open_session
+from opamc_cli.joint.recordings import grouped_track
+from opamc_cli.joint.track import Joint
+from opamc_cli.testbed.robot import simulate
+
+AXIS, RATE_HZ, SEED = 3, 2048.0, 1
+RIGID = ("inertia", "gravity", "coulomb", "viscous")
+
+
+@cache
+def recording():
+    config = load_testbed(Path(__file__).parents[2] / "configs" / "testbed.yaml")
+    program = replace(
+        config.program, axes=(AXIS,), cycles=5, dwell_jitter_s=0.0, speed_percent=30.0
+    )
+    made = simulate(config.robot, program, seed=SEED, sampling_rate_hz=RATE_HZ, axes=[AXIS]).axes[
+        AXIS
+    ]
+    joint = config.robot.joints[AXIS - 1]
+    known = Joint(joint.gear.ratio, joint.motor.pole_pairs)
+    return known, Recording(
+        "session",
+        RATE_HZ,
+        current_a=made.reported_a.astype(float),
+        position_rad=made.position_rad,
+        temperature_c=made.temperature_c.astype(float),
+    )
+
+
+def close(names, orders=()):
+    known, session = recording()
+    track, grouping = grouped_track([session], known)
+    library = built_in_library()
+    forms = {"speed": 1.0, "direction": 1.0, "load": 1.0}
+    ripple = library["ripple"]
+    lines = ((ripple, Term(ripple, {"order": order, **forms})) for order in orders)
+    declared = (*((library[name], None) for name in names), *lines)
+    return close_loop(declared_fit(open_session(track, grouping), declared), library, SEED)
+
+
+def test_what_is_found_beside_declared_parts_is_there():
+    ratio = recording()[0].gear_ratio
+    turn = (ratio + 1) / ratio
+    loop = close((*RIGID, "stribeck", "load_friction"), (2.0, 4.0, 2 * turn, 4 * turn, 60.0))
+    found = [step.term for step in loop.steps]
+    elastic = [term for term in found if term.effect.name == "elasticity"]
+    # The link on the gear's stiffness swings at 26 Hz, against the rotor at 35 Hz.
+    assert len(elastic) == 1
+    assert 15 < elastic[0].parameters["resonance_hz"] < 40
+    # Beside it, lines next to the declared order 2: it passes the resonance.
+    others = [term for term in found if term not in elastic]
+    assert {term.effect.name for term in others} <= {"ripple"}
+    assert all(1.4 < term.parameters["order"] < 2.1 for term in others)
+
+
+def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
+    loop = close(RIGID)
+    assert "time_delay" not in {step.term.effect.name for step in loop.steps}
+    refused = {entry.effect: entry.why for entry in loop.rejected}
+    assert "slow motion does not have it" in refused["time_delay"]
+
+
+def test_a_declared_effect_takes_the_best_of_its_forms():
+    known, session = recording()
+    track, grouping = grouped_track([session], known)
+    library = built_in_library()
+    declared = tuple((library[name], None) for name in (*RIGID, "load_friction"))
+    fitted = declared_fit(open_session(track, grouping), declared)
+    # Half of the inertia is the rotor's, whose torque does not pass the gear.
+    assert fitted.terms[-1].parameters["inertia_share"] == pytest.approx(0.5)
