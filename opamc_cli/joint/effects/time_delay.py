@@ -6,6 +6,9 @@ from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.normal import solve
 from opamc_cli.joint.track import Floats, Track
 
+LONGEST_FILTER_S = 4e-3
+"""What a drive's filter of its reported current may delay it: 40 Hz, of first order."""
+
 
 class TimeDelay(Effect):
     """The whole model's current, shifted in time."""
@@ -58,3 +61,11 @@ class TimeDelay(Effect):
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied."""
         return bool(0.4 < coefficients[0] < 2.5)
+
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """Name the filter that delays as much, where one may."""
+        delay_s = parameters["delay_s"]
+        if not 0 < delay_s <= LONGEST_FILTER_S:
+            return self.meaning
+        corner_hz = 1 / (2 * np.pi * delay_s)
+        return f"{self.meaning}; a filter of the current reading at {corner_hz:.0f} Hz delays as much"
