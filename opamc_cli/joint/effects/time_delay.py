@@ -68,4 +68,4 @@ class TimeDelay(Effect):
         if not 0 < delay_s <= LONGEST_FILTER_S:
             return self.meaning
         corner_hz = 1 / (2 * np.pi * delay_s)
-        return f"{self.meaning}; a filter of the current reading at {corner_hz:.0f} Hz delays as much"
+        return f"{self.meaning}; a filter of the current at {corner_hz:.0f} Hz delays as much"
