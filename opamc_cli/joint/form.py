@@ -13,6 +13,7 @@ import numpy as np
 from opamc_cli.joint.model import Fit, Session, Term
 from opamc_cli.joint.search import Candidate
 from opamc_cli.joint.span import orthonormal, orthonormal_beside
+from opamc_cli.joint.steadiness import unsteady
 from opamc_cli.joint.track import Bools, Floats, Track
 from opamc_cli.joint.view import View, blocks_of, prepare
 
@@ -35,6 +36,8 @@ SLOW_DOMAINS = ("time", "temperature")
 CLOCK_WAVES = 5
 PRESSING = 2.5
 """Standard deviations with which a parameter may press against its limit."""
+NEAR = 0.02
+"""Share of its range within which a parameter is at its limit."""
 
 
 @dataclass(frozen=True)
@@ -269,16 +272,20 @@ def imitations(fit: Fit, added: tuple[Term, ...], seed: int) -> dict[int, str]:
     dict of int to str
         Place in `added`, and the domain of what the effect imitates: one in which smooth functions
         explain more than chance and a twentieth of what the effect does, and either leave the
-        effect nothing to explain or explain more than it does.
+        effect nothing to explain or explain more than it does; or time, if it is periodic and
+        comes in bursts.
     """
     if not added:
         return {}
     view = prepare(fit, fine=False)
+    result = {}
+    if any(term.effect.fast for term in added):
+        fine = view if fit.session.coarse is fit.session.fine else prepare(fit, fine=True)
+        result = dict.fromkeys(unsteady(fit, fine, added), "time")
     found = misfits(fit, view, added, seed)
     if not found or found[0].excess < LEAST_EXCESS or found[0].p_value > LARGEST_P:
-        return {}
+        return result
     worst = found[0]
-    result = {}
     start = 0
     variance = view.power / max(view.values.size - view.span.shape[1], 1)
     model = np.concatenate(
@@ -333,12 +340,21 @@ def pressed_limit(session: Session, view: View, candidate: Candidate) -> str | N
     columns = view.whitened_rows(session.columns(term, candidate.fine))
     span = orthonormal(np.concatenate([view.span, columns], axis=1))
     rest = view.values - candidate.contribution
-    for name, (low, high) in effect.limits(view.grid.track).items():
-        if name not in term.parameters or name in effect.open_limits:
-            continue
-        value, near = term.parameters[name], 0.02 * (high - low)
-        if low + near < value < high - near:
-            continue
+    limits = {
+        name: (low, high)
+        for name, (low, high) in effect.limits(view.grid.track).items()
+        if name in term.parameters
+    }
+    at_limit = {
+        name
+        for name, (low, high) in limits.items()
+        if not low + NEAR * (high - low) < term.parameters[name] < high - NEAR * (high - low)
+    }
+    if len(at_limit) > 1 and at_limit == set(limits):
+        return "all its parameters lie at their limits"
+    for name in sorted(at_limit.difference(effect.open_limits)):
+        low, high = limits[name]
+        value, near = term.parameters[name], NEAR * (high - low)
         inward = near if value < low + near else -near
         moved = Term(effect, term.parameters | {name: value + inward}, term.keep)
         bend = (columns - view.whitened_rows(session.columns(moved, candidate.fine))) @ (

@@ -8,7 +8,7 @@ from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.form import slow_misfit
-from opamc_cli.joint.gate import Gate, decoy_likelihood
+from opamc_cli.joint.gate import Gate, decoy_likelihood, sealed_falls
 from opamc_cli.joint.model import Fit, Session, fit_terms
 from opamc_cli.joint.retraction import (
     confirmed,
@@ -21,6 +21,7 @@ from opamc_cli.joint.search import Candidate
 from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.steps import Progress, Rejected, Step
 from opamc_cli.joint.trace import Untestable, ties_of, trace_residual
+from opamc_cli.joint.view import View
 
 MOST_STEPS = 16
 ATTEMPTS = 3
@@ -103,6 +104,7 @@ def close_loop(
     usable = dict(library)
     for _ in range(ATTEMPTS):
         progress.steps.clear()
+        progress.nameless = None
         fitted = before
         while len(progress.steps) < most_steps:
             step_fit = _round(fitted, usable, gate, generator, progress)
@@ -138,13 +140,10 @@ def _round(
     progress.untestable |= {entry.effect: entry for entry in traced.untestable}
     number = len(progress.steps)
     for i in _by_merit(checked):
-        candidate = checked[i]
-        view = views[candidate.term.effect.fast]
-        decoy = decoy_likelihood(fitted, view, candidate, generator, gate.decoys)
-        share = decoy / max(candidate.likelihood, 1e-300)
-        candidate = replace(candidate, decoy_gain=candidate.gain * share)
-        if candidate.likelihood < gate.decoy_ratio * decoy:
-            checked[i] = replace(candidate, why_not="a decoy of the same form does half as well")
+        view = views[checked[i].term.effect.fast]
+        candidate = _beside_decoys(checked[i], fitted, view, gate, generator)
+        if candidate.why_not is not None:
+            checked[i] = candidate
             continue
         extended = fit_terms(session, (*fitted.terms, candidate.term))
         effect = candidate.term.effect
@@ -170,8 +169,27 @@ def _round(
         checked[i] = candidate
         _collect(progress, number, checked, candidate)
         return extended
+    for candidate in checked:
+        if candidate.imitates is not None:
+            view = views[candidate.term.effect.fast]
+            tested = replace(candidate, why_not=None)
+            if _beside_decoys(tested, fitted, view, gate, generator).why_not is None:
+                progress.nameless = candidate
+            break
     _collect(progress, number, checked, None)
     return None
+
+
+def _beside_decoys(
+    candidate: Candidate, fitted: Fit, view: View, gate: Gate, generator: np.random.Generator
+) -> Candidate:
+    """Compare a candidate with decoys; they are costly, so only what passes all else comes here."""
+    decoy = decoy_likelihood(fitted, view, candidate, generator, gate.decoys)
+    share = decoy / max(candidate.likelihood, 1e-300)
+    candidate = replace(candidate, decoy_gain=candidate.gain * share)
+    if candidate.likelihood < gate.decoy_ratio * decoy:
+        return replace(candidate, why_not="a decoy of the same form does half as well")
+    return candidate
 
 
 def _by_merit(checked: list[Candidate]) -> list[int]:
@@ -210,6 +228,16 @@ def _collect(
         )
 
 
+def _confirmed_nameless(before: Fit, progress: Progress) -> str | None:
+    """Domain of something without a name, if the sealed data bear out that it is there."""
+    candidate = progress.nameless
+    if candidate is None:
+        return None
+    imitation = fit_terms(before.session, (*before.terms, candidate.term))
+    falls = sealed_falls(before, imitation)
+    return candidate.imitates if any(fall > 0 for fall in falls) else None
+
+
 def _r2(fitted: Fit) -> float:
     opened = fitted.opened
     grid = opened.session.fine
@@ -231,7 +259,8 @@ def _summary(
     first, last = ceiling(before, seen_before), ceiling(after, remains)
     structured = [structure for structure in remains if structure.significant]
     rest = last.significant
-    if not steps and not structured and not rest:
+    nameless = None if steps else _confirmed_nameless(before, progress)
+    if not steps and not structured and not rest and nameless is None:
         slow = slow_misfit(after, seed)
         if slow is not None:
             share = slow.excess / slow.basis.shape[0]
@@ -243,16 +272,17 @@ def _summary(
     explained = (rmse_before**2 - rmse_after**2) / reach if reach > 1e-3 * rmse_before**2 else 1.0
     explained = float(np.clip(explained, 0.0, 1.0))
     if not steps:
-        verdict = "not-in-library" if rest or structured else "nothing-missing"
+        lacking = rest or bool(structured) or nameless is not None
+        verdict = "not-in-library" if lacking else "nothing-missing"
         # Something is there, and none of it is explained, even where its share is too small to say.
-        explained = 0.0 if rest or structured else 1.0
+        explained = 0.0 if lacking else 1.0
     elif (rest or structured) and explained < CLOSED_SHARE:
         verdict = "partial"
     else:
         verdict = "closed"
     domain = None
-    if verdict in ("partial", "not-in-library") and remains:
-        domain = remains[0].domain
+    if verdict in ("partial", "not-in-library"):
+        domain = remains[0].domain if remains and (structured or nameless is None) else nameless
     return Loop(
         before=before,
         after=after,

@@ -40,6 +40,10 @@ class Candidate:
         Held-out fall of the mean square (share), t over blocks, share of groups better.
     contribution : array of shape (n,)
         Whitened, projected contribution, for comparison with others.
+    why_not : str or None
+        Why it is not added.
+    imitates : str or None
+        Domain of the plain form without a name that does as well, if that is why.
     """
 
     term: Term
@@ -54,6 +58,7 @@ class Candidate:
     consistency: float = 0.0
     decoy_gain: float = 0.0
     why_not: str | None = None
+    imitates: str | None = None
 
 
 @dataclass(frozen=True)

@@ -39,12 +39,19 @@ class Rejected:
 
 @dataclass
 class Progress:
-    """What the rounds collect."""
+    """What the rounds collect.
+
+    Attributes
+    ----------
+    nameless : Candidate or None
+        What would have passed the gate in the last round, had a plain form not done as well.
+    """
 
     steps: list[Step] = field(default_factory=list)
     candidates: list[tuple[int, Candidate]] = field(default_factory=list)
     rejected: dict[str, Rejected] = field(default_factory=dict)
     untestable: dict[str, Untestable] = field(default_factory=dict)
+    nameless: Candidate | None = None
 
     def take_back(self, step: Step, why: str) -> None:
         """Note that an effect that had been added is not there, and why."""

@@ -10,7 +10,7 @@ from opamc_cli.joint.flux import objection_of_flux
 from opamc_cli.joint.form import pressed_limit
 from opamc_cli.joint.gate import Gate, consistency, held_out, prepare_held, refusal
 from opamc_cli.joint.model import Fit, Session
-from opamc_cli.joint.plain import Plain, is_in_library, plain_terms, plainer
+from opamc_cli.joint.plain import Plain, plainer, score_plain
 from opamc_cli.joint.search import Candidate, search
 from opamc_cli.joint.view import View, prepare
 
@@ -92,7 +92,7 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
     _simplest_first(found, library, session)
     held = {fine: prepare_held(fitted, fine) for fine in {each.fine for each in found}}
     checked: list[Candidate] = []
-    unnamed: list[Plain] | None = None
+    plains: list[Plain] | None = None
     for candidate in found:
         view = views[candidate.fine]
         tested = held_out(fitted, candidate, held[candidate.fine])
@@ -101,18 +101,14 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
             tested = replace(tested, consistency=consistency(session, view, candidate))
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
         why = why or disagreement(view, tested.term)
-        if why is None and not tested.fine:
-            if unnamed is None:
-                unnamed = [
-                    plain
-                    for plain in plain_terms(view)
-                    if plain.score > tested.score
-                    and not is_in_library(plain, library, session, view)
-                ]
-            plain = plainer(tested, unnamed, session, view)
+        if why is None:
+            slow = views[False]
+            plains = score_plain(slow) if plains is None else plains
+            plain = plainer(tested, plains, found, library, session, slow)
             if plain is not None:
+                tested = replace(tested, imitates=plain.domain)
                 why = (
-                    f"{plain.what} does as well with fewer parameters, and the library has no "
+                    f"{plain.what} does as well with no more parameters, and the library has no "
                     "effect of that form"
                 )
         if why is None:
