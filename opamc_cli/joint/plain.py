@@ -126,13 +126,19 @@ def plain_forms(track: Track) -> list[PlainForm]:
         one, dry, wet = (carrier[:, None] for carrier in carriers)
         for count, of in ((1, covariate), (2, f"{covariate} and its square")):
             some = powers[:, :count]
-            for name, columns in (
-                (f"{of} beside a constant", np.concatenate([one, some], axis=1)),
-                (f"the direction times {of}", dry * some),
-                (f"the velocity times {of}", wet * some),
-                (f"both frictions times {of}", np.concatenate([dry * some, wet * some], axis=1)),
-            ):
-                forms.append(PlainForm(name, domain, columns))
+            forms += [
+                PlainForm(f"{of} beside a constant", domain, np.concatenate([one, some], axis=1)),
+                PlainForm(f"the velocity times {of}", domain, wet * some),
+                PlainForm(
+                    f"both frictions times {of}",
+                    domain,
+                    np.concatenate([dry * some, wet * some], axis=1),
+                ),
+            ]
+            # Temperature acts on the lubricant. Dry friction that alone follows it, and that no
+            # library names, would be a twin of every warm-up of dry friction.
+            if domain != "temperature":
+                forms.append(PlainForm(f"the direction times {of}", domain, dry * some))
     return forms
 
 
