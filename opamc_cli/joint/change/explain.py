@@ -14,7 +14,7 @@ from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Floats, Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 
@@ -177,13 +177,18 @@ def explain_change(
 
     energy = energy_of(units, population, slow_found=bool(slow))
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    slow_power = max(energy.slow, shift_power(units, slow[-1].shift) if slow else 0.0)
-    whole = max(slow_power + max(energy.fast, held), SMALLEST_POWER)
-    causes = _slow_entries(units, population, energy, whole, slow, library)
+    powers = [shift_power(units, found.shift) for found in slow]
+    # Where healthy sessions' differences hide a change, its own power is what there is of it.
+    hidden = bool(powers) and energy.slow < VISIBLE * powers[-1]
+    moved = powers[-1] if hidden else energy.slow
+    whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
+    gains = np.diff(powers, prepend=0.0) if hidden else _gains(units, population, energy, slow)
+    causes = _slow_entries(units, gains / whole, slow, library)
     if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
         if periodic.reading.known or carries:
-            causes.append(_periodic_entry(periodic.reading, held / whole, library))
+            loaded = any(cause.origin == "load" for cause in causes)
+            causes.append(_periodic_entry(periodic.reading, held / whole, library, loaded))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -202,24 +207,20 @@ def explain_change(
     )
 
 
+def _gains(
+    units: list[Unit], population: Population, energy: Energy, slow: list[SlowCause]
+) -> Floats:
+    """Mean square that each slow cause takes from the change, in their order, A^2."""
+    rests = [energy_of(units, population, True, found.shift).total for found in slow]
+    return -np.diff(np.minimum.accumulate([energy.total, *rests]))
+
+
 def _slow_entries(
-    units: list[Unit],
-    population: Population,
-    energy: Energy,
-    whole: float,
-    slow: list[SlowCause],
-    library: Library,
+    units: list[Unit], shares: Floats, slow: list[SlowCause], library: Library
 ) -> list[Cause]:
     causes = []
-    left = energy.total
-    powers = [shift_power(units, found.shift) for found in slow]
-    # Where healthy sessions' differences hide a change, its own power is what there is of it.
-    hidden = bool(powers) and energy.slow < VISIBLE * powers[-1]
-    for found, power, before in zip(slow, powers, [0.0, *powers], strict=False):
-        rest = energy_of(units, population, True, found.shift).total
-        gained = power - before if hidden else left - rest
-        share = float(np.clip(gained / whole, 0.0, 1.0))
-        left = min(left, rest)
+    for found, unclipped in zip(slow, shares, strict=True):
+        share = float(np.clip(unclipped, 0.0, 1.0))
         effect = library[found.effect]
         causes.append(
             Cause(
@@ -238,9 +239,12 @@ def _slow_entries(
     return causes
 
 
-def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
+def _periodic_entry(reading: Reading, share: float, library: Library, loaded: bool) -> Cause:
     effect = library[reading.effect]
-    clear = reading.mesh and reading.evidence["power_ratio"] >= CLEAR_GROWTH
+    grown = reading.evidence["power_ratio"] >= CLEAR_GROWTH
+    clear = reading.mesh and grown
+    # Another payload moves a healthy gear's ripple, too.
+    enough = share >= FAULT_SHARE and (grown or not loaded)
     return Cause(
         effect=reading.effect,
         domain=effect.domain,
@@ -250,7 +254,7 @@ def _periodic_entry(reading: Reading, share: float, library: Library) -> Cause:
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
         origin=effect.origin,
-        serious=clear or (not effect.benign and share >= FAULT_SHARE),
+        serious=clear or (not effect.benign and enough),
         clear=clear,
         evidence=reading.evidence,
     )
