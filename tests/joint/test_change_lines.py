@@ -58,6 +58,10 @@ def line(order, reference=None, error=0.001):
         ([line(2.0, 2.0)], 0.02, 2.0, "kinematic error", 1),
         ([line(3.3), line(4.04), line(6.06), line(8.08)], 0.03, 2.02, "flexspline", 0),
         ([line(3.3)], 0.03, 3.3, "unknown periodic source", 0),
+        # The third harmonic alone, which turns with the flexspline; and a whole order like it.
+        ([line(6.06)], 0.04, 2.02, "inspect the flexspline", 1),
+        ([line(6.0)], 0.04, 6.0, "unknown periodic source", 0),
+        ([line(7.0)], 0.03, 7.0, "unknown periodic source", 0),
     ],
 )
 def test_lines_are_read_in_the_frame_that_they_can_be_told_to_turn_in(

@@ -14,7 +14,8 @@ from opamc_cli.joint.track import Track
 HARMONICS = 12
 SHORTEST_COMB = 3
 PASSAGES = (2, 4)
-"""Without a line at one of these per turn of the wave generator, no comb is the mesh's."""
+"""Without a line at one of these per turn of the wave generator, or at a higher one that the
+flexspline's slow turning moves away from the whole number, no comb is the mesh's."""
 
 USUAL_POLE_PAIRS = range(2, 13)
 USUAL_RATIO = 100.0
@@ -95,8 +96,7 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
         return electrical
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
-        slack = min(SIDE_RESOLUTIONS * resolution * poles, 0.25)
-        passages = [line for line in wave if _near(line, poles, track, slack) in PASSAGES]
+        passages = [line for line in wave if _passage(line, poles, track, resolution)]
         # One line is enough if it is the strongest; a comb speaks for itself.
         if lines[0] in passages or (passages and len(wave) >= SHORTEST_COMB):
             return _wave_generator(wave, track, resolution, poles)
@@ -173,6 +173,19 @@ def _family(line: Line, poles: float, track: Track, resolution: float) -> bool:
     sharp = min(0.75 * resolution * poles, 0.25)
     near = _near(line, poles, track, wide) == 2
     return near or (_near(line, poles, track, sharp) or 0) >= 2
+
+
+def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:
+    """Whether a line can only be the mesh's: not so one at 6, say, that may be the motor's."""
+    k = _near(line, poles, track, min(SIDE_RESOLUTIONS * resolution * poles, 0.25))
+    if k in PASSAGES:
+        return True
+    if k is None or k % 2 or track.joint.gear_ratio is None:
+        return False
+    sharp = 0.75 * resolution * poles
+    order = _corrected(line, poles)
+    in_flexspline = k * (1 + 1 / track.joint.gear_ratio)
+    return abs(order - in_flexspline) < sharp < abs(order - k)
 
 
 def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:
