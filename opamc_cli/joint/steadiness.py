@@ -15,7 +15,7 @@ from opamc_cli.joint.track import Floats
 from opamc_cli.joint.view import View, blocks_of
 
 BLOCKS_PER_GROUP = 16
-FEWEST_SAMPLES = 8
+FEWEST_SAMPLES = 4
 """Per column in a block."""
 LEAST_DEVIATIONS = 3.5
 """Of right forms in 30 simulated joints none reached 2."""
