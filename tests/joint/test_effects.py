@@ -12,6 +12,7 @@ from opamc_cli.joint.effects.elasticity import discrete
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
 from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.effects.time_delay import lagging
 from opamc_cli.joint.kinematics import Recording, build_track
 from opamc_cli.joint.spectra import order_peaks
 from opamc_cli.joint.track import Joint
@@ -212,3 +213,13 @@ def test_hum_has_a_phase_for_every_clock(starts, columns):
     first = track.bounds[0][1]
     assert np.any(hum[:first, 0])
     assert np.any(hum[first:, 0]) == (columns == 2)
+
+
+def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
+    rng = np.random.default_rng(3)
+    columns, samples = rng.normal(size=(50, 2)), 2.5
+    pole = np.exp(-1 / samples)
+    expected = columns.copy()
+    for i in range(1, 50):
+        expected[i] = pole * expected[i - 1] + (1 - pole) * columns[i]
+    np.testing.assert_allclose(lagging(columns, samples), expected)

@@ -1,5 +1,6 @@
 """The loop on the tests' own simulator: what it adds, what it names, and when it keeps quiet."""
 
+import numpy as np
 import pytest
 from closing import close_on
 from simulator import DECLARED
@@ -114,3 +115,11 @@ def test_friction_that_changes_from_cycle_to_cycle_is_noticed_without_its_name(e
     assert not loop.steps
     assert loop.verdict == "not-in-library"
     assert loop.remaining_domain in ("temperature", "time")
+
+
+def test_the_filter_of_a_drive_s_current_is_found_as_a_filter():
+    _, loop = close_on(29, (), ratio=0.0, current_filter_hz=148.0, current_quantum=8e-3)
+    (step,) = loop.steps
+    assert step.term.effect.name == "time_delay"
+    assert step.term.parameters["delay_s"] == pytest.approx(1 / (2 * np.pi * 148.0), rel=0.3)
+    assert "through a filter" in step.interpretation

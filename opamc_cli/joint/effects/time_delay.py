@@ -1,17 +1,17 @@
 """A current that comes later, or earlier, than the motion it belongs to."""
 
 import numpy as np
+from scipy.signal import lfilter
 
-from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.normal import solve
 from opamc_cli.joint.track import Floats, Track
 
-LONGEST_FILTER_S = 4e-3
-"""What a drive's filter of its reported current may delay it: 40 Hz, of first order."""
+SHORTEST_GUESS_S = 5e-4
 
 
 class TimeDelay(Effect):
-    """The whole model's current, shifted in time."""
+    """The whole model's current, shifted in time or (`filtered`) behind a first-order filter."""
 
     name = "time_delay"
     domain = "time"
@@ -23,12 +23,10 @@ class TimeDelay(Effect):
     dense_guesses = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Up to 60 ms either way."""
-        return [
-            {"delay_s": sign * delay}
-            for sign in (-1.0, 1.0)
-            for delay in (0.002, 0.005, 0.01, 0.02, 0.035, 0.06)
-        ]
+        """From half a millisecond to 64 ms either way, each twice the last; filters to 8 ms."""
+        delays = geometric(SHORTEST_GUESS_S, 2**7 * SHORTEST_GUESS_S, 8)
+        shifts = [{"delay_s": sign * delay} for sign in (-1.0, 1.0) for delay in delays]
+        return [*shifts, *({"delay_s": delay, "filtered": 1.0} for delay in delays[:5])]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to 120 ms either way."""
@@ -46,26 +44,47 @@ class TimeDelay(Effect):
         rows = track.open_samples
         if not track.static_columns or rows is None:
             return np.zeros((track.size, 1))
+        delay_s = parameters["delay_s"]
         columns = np.concatenate(track.static_columns, axis=1)
         shifted = np.empty_like(columns)
         for start, stop in track.bounds:
+            if parameters.get("filtered"):
+                shifted[start:stop] = lagging(columns[start:stop], delay_s * track.rate_hz)
+                continue
             times = np.arange(stop - start) / track.rate_hz
             for k in range(columns.shape[1]):
-                shifted[start:stop, k] = np.interp(
-                    times - parameters["delay_s"], times, columns[start:stop, k]
-                )
+                shifted[start:stop, k] = np.interp(times - delay_s, times, columns[start:stop, k])
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
         return (shifted - columns) * coefficients
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Only a whole shift counts: the model's current is moved, not multiplied."""
-        return bool(0.4 < coefficients[0] < 2.5)
+        """Only a whole shift counts: the model's current is moved, not multiplied.
+
+        What twice a short delay does is almost twice as large: one of the guesses fits within a
+        factor of 1.5.
+        """
+        return bool(0.6 < coefficients[0] < 1.7)
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
-        """Name the filter that delays as much, where one may."""
-        delay_s = parameters["delay_s"]
-        if not 0 < delay_s <= LONGEST_FILTER_S:
+        """Name the filter, where it is one."""
+        if not parameters.get("filtered"):
             return self.meaning
-        corner_hz = 1 / (2 * np.pi * delay_s)
-        return f"{self.meaning}; a filter of the current at {corner_hz:.0f} Hz delays as much"
+        corner_hz = 1 / (2 * np.pi * parameters["delay_s"])
+        return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
+
+
+def lagging(columns: Floats, samples: float) -> Floats:
+    """Put columns through a filter of first order, from rest at their first values.
+
+    Parameters
+    ----------
+    columns : array of shape (n, k)
+        Uniformly sampled.
+    samples : float
+        Time constant.
+    """
+    pole = np.exp(-1.0 / max(samples, 1e-3))
+    rest = pole * columns[:1]
+    smooth: Floats = lfilter([1.0 - pole], [1.0, -pole], columns, axis=0, zi=rest)[0]
+    return smooth
