@@ -102,7 +102,12 @@ def _change(
         "healthy session does"
     )
     if judgement.state == "healthy":
-        if max(judgement.p_adjusted, judgement.p_alone) > SUSPICION:
+        if judgement.p_adjusted <= SUSPICION < judgement.p_alone:
+            return [
+                f"Changed no more than the other joints of this robot: {distance}.",
+                _pattern_change(judgement, cells, motions),
+            ]
+        if judgement.p_adjusted > SUSPICION:
             return [
                 f"No change beyond what healthy sessions show: {distance}.",
                 _pattern_change(judgement, cells, motions),

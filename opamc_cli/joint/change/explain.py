@@ -37,9 +37,10 @@ VISIBLE = 0.5
 
 BENIGN_SHARE = 0.5
 FAULT_SHARE = 0.2
-CLEAR_GROWTH = 10.0
-"""The mesh's ripple whose power has grown so much, its amplitude threefold, is a fault even beside
-a payload that moves the slow current far more than any ripple could."""
+GROWTH, CLEAR_GROWTH = 4.0, 10.0
+"""A mesh's ripple of twice the amplitude, four times the power, is a fault however much more cold
+grease changed; where the payload has changed, which moves a healthy gear's ripple too, any ripple
+has to grow tenfold in power. Nothing else does that to it: such a ripple is clear."""
 
 
 @dataclass(frozen=True)
@@ -192,7 +193,7 @@ def explain_change(
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
-        key=lambda one: (not one.serious, -one.share),
+        key=lambda one: (not one.serious, not one.clear, -one.share),
     )
     harmless = sum(cause.share for cause in causes if cause.benign)
     serious = any(cause.serious for cause in causes)
@@ -243,8 +244,11 @@ def _periodic_entry(reading: Reading, share: float, library: Library, loaded: bo
     effect = library[reading.effect]
     grown = reading.evidence["power_ratio"] >= CLEAR_GROWTH
     clear = reading.mesh and grown
-    # Another payload moves a healthy gear's ripple, too.
-    enough = share >= FAULT_SHARE and (grown or not loaded)
+    if loaded:
+        enough = share >= FAULT_SHARE and grown
+    else:
+        doubled = reading.mesh and reading.evidence["power_ratio"] >= GROWTH
+        enough = share >= FAULT_SHARE or doubled
     return Cause(
         effect=reading.effect,
         domain=effect.domain,

@@ -121,6 +121,8 @@ def find_slow_causes(
         needed = _still_needed(ready, population, found, cause, len(candidates))
         found = _in_turn(ready, population, [*needed, cause])
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
+        if cause.effect == "thermal_viscous":
+            gone |= GREASE
         candidates = [term for term in candidates if term.effect.name not in gone]
     return _one_grease(ready, population, found)
 
