@@ -10,7 +10,7 @@ from opamc_cli.joint.model import Fit, Grid
 from opamc_cli.joint.normal import solve
 from opamc_cli.joint.span import orthonormal
 from opamc_cli.joint.track import Bools, Floats
-from opamc_cli.joint.whitening import autoregression, settled, whitened
+from opamc_cli.joint.whitening import Whitening, autoregression, whitening_with_gaps
 
 LEAST_DRIFT = 0.3
 BLOCKS_PER_GROUP = 8
@@ -22,7 +22,7 @@ class View:
 
     grid: Grid
     fine: bool
-    taps: Floats
+    whitening: Whitening
     valid: Bools
     span: Floats
     residual: Floats
@@ -55,7 +55,7 @@ class View:
 
     def whitened_rows(self, columns: Floats) -> Floats:
         """Regressors of the whole grid as they are on the valid samples, whitened."""
-        return whitened(columns, self.taps)[self.rows]
+        return self.whitening(columns)
 
 
 def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
@@ -75,29 +75,29 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
     own = residual_on(fit, fine)
     noise, known = noise_of(fit, fine, own)
     taps = autoregression(noise, known)
-    valid = grid.fit & settled(
-        grid.track.moving & (grid.track.group >= 0), grid.track.bounds, taps.size - 1
-    )
+    usable = grid.track.moving & (grid.track.group >= 0)
+    whitening = whitening_with_gaps(taps, usable, grid.track.bounds, grid.fit)
+    rows = whitening.rows
+    valid = np.zeros_like(grid.fit)
+    valid[rows] = True
     blocks = [session.columns(term, fine) for term in fit.terms]
     blur = grid.track.blur
     if fine and blur is not None:
         # What smoothing took from the acceleration is no effect.
         blocks.append(blur)
-    rows = np.flatnonzero(valid)
     base = np.empty((rows.size, sum(block.shape[1] for block in blocks)), order="F")
     place = 0
     for block in blocks:
         for column in block.T:
-            np.take(whitened(column, taps), rows, out=base[:, place])
+            base[:, place] = whitening(column)
             place += 1
     span = orthonormal(base)
-    signal = whitened(own if residual is None else residual, taps)
-    values = signal[valid]
+    values = whitening(own if residual is None else residual)
     values = values - span @ (span.T @ values)
     full = np.zeros(grid.track.size)
-    full[valid] = values
+    full[rows] = values
     variance = float(values @ values) / max(values.size - span.shape[1], 1)
-    return View(grid, fine, taps, valid, span, full, max(variance, 1e-300))
+    return View(grid, fine, whitening, valid, span, full, max(variance, 1e-300))
 
 
 def residual_on(fit: Fit, fine: bool) -> Floats:

@@ -1,13 +1,23 @@
 """What is left when the noise's colour is taken out: an autoregressive whitening filter."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from scipy.linalg import solve_toeplitz
+from numpy.typing import NDArray
+from scipy.linalg import solve_toeplitz, toeplitz
+from scipy.sparse import csr_array
 
 from opamc_cli.joint.track import Bools, Floats
 
 AR_ORDER = 10
 PAIRS_PER_TAP = 20
 """Samples and their predecessors that a tap takes; where there are fewer, fewer taps must do."""
+FLOOR = 1e-3
+"""Share of white noise that is always supposed."""
+LOOK_BACK = 40
+"""How far back the samples may lie that predict one after a gap."""
+LARGEST_ERROR = 1.5
+"""Variance of a prediction, relative to that from p samples, above which it is of no use."""
 
 
 def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats:
@@ -43,7 +53,10 @@ def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats
         return np.ones(1)
     covariance = np.array(known)
     # A floor under the noise: where there is none, misfits of 1/1000 would count as signals.
-    covariance[0] *= 1 + 1e-3
+    covariance[0] *= 1 + FLOOR
+    # Averages over different pairs need not be the covariance of any noise.
+    least = float(np.linalg.eigvalsh(toeplitz(covariance))[0])
+    covariance[0] += max(0.5 * FLOOR * covariance[0] - least, 0.0)
     coefficients = solve_toeplitz(covariance[:-1], covariance[1:])
     taps: Floats = np.concatenate([[1.0], -coefficients])
     return taps
@@ -98,3 +111,132 @@ def settled(valid: Bools, bounds: tuple[tuple[int, int], ...], past: int) -> Boo
             whole[past:] = run[past + 1 :] - run[: run.size - past - 1] == past + 1
         result[start:stop] = whole
     return result
+
+
+@dataclass(frozen=True)
+class Whitening:
+    """Whitening of samples with gaps: each is predicted from those before it that are valid.
+
+    Attributes
+    ----------
+    taps : array of shape (p + 1,)
+        From `autoregression`.
+    rows : int array
+        Places of the samples that can be whitened, ascending.
+    late : int array
+        Which of them have not all of their last p samples.
+    filters : sparse array of shape (late.size, n)
+        Their own filters.
+    """
+
+    taps: Floats
+    rows: NDArray[np.int64]
+    late: NDArray[np.int64]
+    filters: csr_array
+
+    def __call__(self, values: Floats) -> Floats:
+        """Whiten signals of shape (n,) or (n, m), at `rows`."""
+        white: Floats = whitened(values, self.taps)[self.rows]
+        if self.late.size:
+            white[self.late] = self.filters @ values
+        return white
+
+
+def whitening_with_gaps(
+    taps: Floats, valid: Bools, bounds: tuple[tuple[int, int], ...], wanted: Bools
+) -> Whitening:
+    """Filter for every sample that those before it predict about as well as they can.
+
+    Where the last p samples are valid the filter is the autoregression's. After a gap there are
+    fewer, or older ones; the best prediction from them has a larger error, by which the sample
+    counts less. A filter that has to fill up after every gap would lose the first p samples of
+    every move instead: half of all on a coarse grid.
+
+    Parameters
+    ----------
+    taps : array of shape (p + 1,)
+        From `autoregression`.
+    valid : bool array of shape (n,)
+        Samples that may predict.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    wanted : bool array of shape (n,)
+        Samples to be whitened, all of them valid. Those whose prediction has more than
+        `LARGEST_ERROR` of the variance that it has elsewhere are left out: they hold the level of
+        a slow noise, which other gaps than the last share. So are the first p samples of each
+        recording, which nothing is known before.
+
+    Returns
+    -------
+    Whitening
+    """
+    rows = np.flatnonzero(wanted)
+    order = taps.size - 1
+    late = np.flatnonzero(~settled(valid, bounds, order)[rows])
+    covariance = implied_covariance(taps, LOOK_BACK)
+    first = np.zeros(valid.size, dtype=np.int64)
+    for start, stop in bounds:
+        first[start:stop] = start
+    known: dict[bytes, Floats] = {}
+    weights, columns, edges = [np.zeros(0)], [np.zeros(0, dtype=np.int64)], [0]
+    kept = np.ones(rows.size, dtype=bool)
+    for place in late:
+        row = rows[place]
+        lags = row - np.arange(max(row - LOOK_BACK, first[row]), row)
+        lags = lags[valid[row - lags]][-order:]
+        key = lags.tobytes()
+        if key not in known:
+            known[key] = _prediction(lags, covariance)
+        weight = known[key]
+        if row - first[row] < order or weight[-1] ** -2 > LARGEST_ERROR:
+            kept[place] = False
+            continue
+        weights.append(weight)
+        columns.append(np.concatenate([row - lags, [row]]))
+        edges.append(edges[-1] + weight.size)
+    late = (np.cumsum(kept) - 1)[late[kept[late]]]
+    data = (np.concatenate(weights), np.concatenate(columns), edges)
+    filters = csr_array(data, shape=(late.size, valid.size))
+    return Whitening(taps, rows[kept], late, filters)
+
+
+def _prediction(lags: NDArray[np.int64], covariance: Floats) -> Floats:
+    """Filter of a sample and those `lags` before it, scaled to the full filter's error."""
+    among = covariance[np.abs(lags[:, None] - lags[None, :])]
+    with_sample = covariance[lags]
+    predictor = np.linalg.solve(among, with_sample)
+    error = covariance[0] - float(predictor @ with_sample)
+    weights: Floats = np.concatenate([-predictor, [1.0]]) / np.sqrt(max(error, 1.0))
+    return weights
+
+
+def implied_covariance(taps: Floats, longest: int) -> Floats:
+    """Autocovariance of the noise that a whitening filter turns into white noise of variance 1.
+
+    Parameters
+    ----------
+    taps : array of shape (p + 1,)
+        From `autoregression`: 1, -a_1, ..., -a_p, stationary.
+    longest : int
+        Largest lag.
+
+    Returns
+    -------
+    array of shape (longest + 1,)
+
+    References
+    ----------
+    Walker, Proceedings of the Royal Society A 131, 1931.
+    """
+    order = taps.size - 1
+    # sum_k taps[k] r[|j - k|] = 1 for j = 0, and 0 for j = 1 ... p
+    equations = np.zeros((order + 1, order + 1))
+    for j in range(order + 1):
+        for k in range(order + 1):
+            equations[j, abs(j - k)] += taps[k]
+    start = np.linalg.solve(equations, np.eye(order + 1)[0])
+    covariance = np.zeros(max(longest, order) + 1)
+    covariance[: order + 1] = start
+    for lag in range(order + 1, covariance.size):
+        covariance[lag] = -float(taps[1:] @ covariance[lag - 1 : lag - order - 1 : -1])
+    return covariance
