@@ -7,11 +7,14 @@ from scipy.special import beta
 from opamc_cli.joint.track import Bools, Floats
 
 WIDEST_HZ = 30.0
-NARROWEST_HZ = 8.0
-NOISE_SHARE = 0.02
+NARROWEST_HZ = 6.0
+NOISE_SHARE = 0.015
 """Noise of the acceleration, relative to the acceleration, that sets the bandwidth."""
 
 ANGLE_NOISE_RAD = 0.3
+FREE_RAD2 = 1e6
+"""Variance of a step of the angle about which nothing is known."""
+
 ROUGH_NOISE_RAD = 1.0
 """Error of the rough speed, as an angle over its own window of 15 samples."""
 
@@ -45,7 +48,7 @@ def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: flo
 
 
 def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float) -> float:
-    """Widest bandwidth at which the acceleration's noise is 2 % of the acceleration.
+    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration.
 
     Parameters
     ----------
@@ -59,7 +62,7 @@ def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float)
     Returns
     -------
     float
-        In Hz, at least 8, at most 30 and a twentieth of the rate.
+        In Hz, at least 6, at most 30 and a twentieth of the rate.
     """
     widest = widest_bandwidth(rate_hz)
     own = acceleration_noise(angle_noise_rad, rate_hz, widest)
@@ -95,6 +98,10 @@ def smoothed_angle(
     sure: Bools,
     rate_hz: float,
     bandwidth_hz: float,
+    *,
+    spread: Floats | None = None,
+    free: Bools | None = None,
+    turn_rad: float = np.pi,
 ) -> tuple[Floats, Floats, Floats]:
     """Follow angle, speed and acceleration through a recording and back.
 
@@ -113,6 +120,13 @@ def smoothed_angle(
     rate_hz, bandwidth_hz : float
         Sampling rate and bandwidth: slower than an electrical period at working speed, so that
         errors of sensors and inverter are not followed.
+    spread : array of shape (n,), optional
+        Variance of each measured angle, in units of the best; 1 where not given.
+    free : bool array of shape (n,), optional
+        Samples before which the angle may have changed by any amount: angles on both sides do
+        not bind each other there, speeds and accelerations do.
+    turn_rad : float
+        The measured angle is known modulo this; 0 where it is known for good.
 
     Returns
     -------
@@ -138,12 +152,29 @@ def smoothed_angle(
         walk,
         start,
         (2 * np.pi * bandwidth_hz) ** 2,
+        np.ones(angle_rad.size) if spread is None else spread,
+        np.zeros(angle_rad.size, dtype=bool) if free is None else free,
+        turn_rad,
     )
     return angle, speed, acceleration
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc,unused-ignore]
-def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk, start, spread):  # type: ignore[no-untyped-def]
+def _smooth(  # type: ignore[no-untyped-def]
+    measured,
+    strong,
+    rough,
+    sure,
+    step,
+    variance,
+    rough_variance,
+    walk,
+    start,
+    spread,
+    ease,
+    free,
+    turn,
+):
     # Scalars throughout: three states are too few for matrix calls, which cost 20 times as much.
     n = measured.size
     x = np.empty((n, 3))
@@ -169,6 +200,8 @@ def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk,
             p11 = m11 + step * m12 + grow * q11
             p12 = m12 + grow * q12
             p22 = p22 + grow * q22
+            if free[i]:
+                p00 += FREE_RAD2
         if sure[i]:
             total = p11 + rough_variance
             k0, k1, k2 = p01 / total, p11 / total, p12 / total
@@ -177,10 +210,11 @@ def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk,
             p00, p02, p22 = p00 - k0 * p01, p02 - k0 * p12, p22 - k2 * p12
             p01, p11, p12 = p01 - k0 * p11, p11 - k1 * p11, p12 - k1 * p12
         if strong[i]:
-            total = p00 + variance
+            total = p00 + variance * ease[i]
             k0, k1, k2 = p00 / total, p01 / total, p02 / total
             error = measured[i] - a
-            error -= np.pi * np.round(error / np.pi)
+            if turn > 0:
+                error -= turn * np.round(error / turn)
             a, v, c = a + k0 * error, v + k1 * error, c + k2 * error
             p11, p12, p22 = p11 - k1 * p01, p12 - k1 * p02, p22 - k2 * p02
             p00, p01, p02 = p00 - k0 * p00, p01 - k0 * p01, p02 - k0 * p02
@@ -196,6 +230,8 @@ def _smooth(measured, strong, rough, sure, step, variance, rough_variance, walk,
         m10, m11, m12 = p01 + step * p02, p11 + step * p12, p12 + step * p22
         grow = 0.0 if p22 > spread * spread else 1.0
         u00 = m00 + step * m01 + h * m02 + grow * q00
+        if free[i + 1]:
+            u00 += FREE_RAD2
         u01 = m01 + step * m02 + grow * q01
         u02 = m02 + grow * q02
         u11 = m11 + step * m12 + grow * q11

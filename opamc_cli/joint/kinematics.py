@@ -5,14 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.joint.groups import cycle_length
-from opamc_cli.joint.phases import (
-    PhaseAngle,
-    follow_phases,
-    lost,
-    side_of_torque,
-    torque_current,
-    without_slips,
-)
+from opamc_cli.joint.half_turns import lost, without_slips
+from opamc_cli.joint.phase_angle import PhaseAngle
+from opamc_cli.joint.phases import follow_phases
 from opamc_cli.joint.smoothing import (
     averaging_kernel,
     blurred,
@@ -23,6 +18,7 @@ from opamc_cli.joint.smoothing import (
     smoothing_window,
     unstepped,
 )
+from opamc_cli.joint.torque_axis import side_of_torque, torque_current
 from opamc_cli.joint.track import Bools, Floats, Joint, Track
 
 SLOWEST_SHARE = 0.02

@@ -5,16 +5,11 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint.angle_filter import acceleration_noise, smoothed_angle
+from opamc_cli.joint.half_turns import bridged, lost, without_slips
 from opamc_cli.joint.kinematics import Recording, build_track
-from opamc_cli.joint.phases import (
-    PhaseAngle,
-    follow_phases,
-    lost,
-    side_of_torque,
-    torque_current,
-    without_sensor_errors,
-    without_slips,
-)
+from opamc_cli.joint.phase_angle import PhaseAngle
+from opamc_cli.joint.phases import averaged_angle, follow_phases, without_sensor_errors
+from opamc_cli.joint.torque_axis import side_of_torque, torque_current
 from opamc_cli.joint.track import Joint
 
 
@@ -112,3 +107,69 @@ def test_zero_errors_and_unequal_gains_are_taken_out_of_the_vector():
     assert np.std(np.angle(vector * np.exp(-1j * angle))) > 0.05
     assert np.std(np.angle(mended * np.exp(-1j * angle))) < 0.005
     assert without_sensor_errors(vector, angle, ~every) is vector
+
+
+@pytest.mark.parametrize("gap_s", [0.03, 0.09, 0.12])
+def test_half_turns_are_counted_through_gaps_of_the_current(gap_s):
+    rate = 2048.0
+    time_s = np.arange(int(6 * rate)) / rate
+    true = 150 * np.sin(1.7 * time_s) + 60 * np.sin(4.1 * time_s + 1)
+    rng = np.random.default_rng(8)
+    strong = np.ones(true.size, dtype=bool)
+    for centre in np.arange(0.4, 5.8, 0.3):
+        strong[np.abs(time_s - centre) < gap_s / 2] = False
+    noise = np.where(strong, 0.02, 10.0) * rng.normal(size=true.size)
+    measured = np.mod(true + noise, np.pi)
+    none = np.zeros(true.size, dtype=bool)
+    angle, _ = bridged(measured, strong, np.zeros(true.size), none, None, rate, 30.0)
+    error = (angle - true)[strong]
+    # The recording begins in full motion: the filter needs a moment to know the speed.
+    settled = np.flatnonzero(strong) > 0.2 * rate
+    assert np.ptp(error[settled]) < 0.5
+
+
+def test_a_joint_that_rests_without_current_has_not_turned():
+    rate = 2048.0
+    time_s = np.arange(int(4 * rate)) / rate
+    velocity = 400 * np.clip(np.sin(np.pi * time_s), -0.5, 0.5)
+    velocity[np.abs(time_s - 2) < 0.4] = 0.0
+    true = np.cumsum(velocity) / rate
+    strong = np.abs(time_s - 2) > 0.3
+    measured = np.mod(true + 0.05 * np.random.default_rng(9).normal(size=true.size), np.pi)
+    none = np.zeros(true.size, dtype=bool)
+    angle, _ = bridged(measured, strong, np.zeros(true.size), none, None, rate, 30.0)
+    before, after = time_s < 1.7, time_s > 2.3
+    assert abs(np.median((angle - true)[after]) - np.median((angle - true)[before])) < 0.1
+
+
+def test_weak_currents_tell_their_angle_together():
+    rng = np.random.default_rng(10)
+    angle = np.linspace(0, 400, 4000)
+    size = np.where(np.arange(4000) < 2000, 0.25, 0.0)
+    noise = 0.1
+    vector = size * np.exp(1j * angle) + noise * (
+        rng.normal(size=4000) + 1j * rng.normal(size=4000)
+    )
+    strong, measured = averaged_angle(vector, angle + 0.2, noise, 0.0, 2048.0)
+    assert np.mean(strong[50:1950]) > 0.95
+    assert np.mean(strong[2050:]) < 0.02
+    error = np.angle(np.exp(2j * (measured - angle)))[50:1950] / 2
+    assert np.std(error[strong[50:1950]]) < 0.2
+    # One by one they would be off by more.
+    assert np.std(np.angle((vector * np.exp(-1j * angle)) ** 2)[50:1950] / 2) > 0.3
+
+
+def test_a_cycle_of_gaps_is_counted_as_most_cycles_say():
+    rate, period, cycles = 500.0, 1000, 5
+    true = 200 * np.sin(2 * np.pi * np.arange(period * cycles + 300) / period)
+    strong = np.ones(true.size, dtype=bool)
+    path = true.copy()
+    for cycle in range(cycles):
+        start = cycle * period + 230
+        strong[start : start + 40] = False
+        # The first cycle is wrong: only the others tell.
+        path[start + 20 :] += np.pi * 3 * (cycle == 0)
+    speed, blur = np.gradient(path) * rate, np.zeros((true.size, 2))
+    angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
+    freed = without_slips(angle, period, rate).angle_rad
+    assert np.ptp((freed - true)[strong]) < 1e-6
