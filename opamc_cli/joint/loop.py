@@ -101,13 +101,13 @@ def close_loop(
     generator = np.random.default_rng(seed)
     seen_before = structures(before)
     progress = Progress()
-    usable = dict(library)
+    imitations: dict[str, str] = {}
     for _ in range(ATTEMPTS):
         progress.steps.clear()
         progress.nameless = None
         fitted = before
         while len(progress.steps) < most_steps:
-            step_fit = _round(fitted, usable, gate, generator, progress)
+            step_fit = _round(fitted, library, imitations, gate, generator, progress)
             if step_fit is None:
                 break
             fitted = step_fit
@@ -120,7 +120,7 @@ def close_loop(
         if not wrong:
             break
         # What has the wrong form may have kept the right one out.
-        usable = {name: effect for name, effect in usable.items() if name not in wrong}
+        imitations |= {name: progress.rejected[name].why for name in wrong}
     fitted, steps, remains = without_trifles(before, fitted, steps, remains, progress)
     # Only now, and only once, are the sealed groups looked at.
     fitted, steps, remains = confirmed(before, fitted, steps, remains, progress)
@@ -130,12 +130,13 @@ def close_loop(
 def _round(
     fitted: Fit,
     library: Library,
+    imitations: dict[str, str],
     gate: Gate,
     generator: np.random.Generator,
     progress: Progress,
 ) -> Fit | None:
     session = fitted.session
-    traced = trace_residual(fitted, library, gate)
+    traced = trace_residual(fitted, library, gate, imitations)
     checked, views = traced.candidates, traced.views
     progress.untestable |= {entry.effect: entry for entry in traced.untestable}
     number = len(progress.steps)

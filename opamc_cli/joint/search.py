@@ -234,6 +234,8 @@ def _refined(
             step = 0.2 / length
         elif name in ("place_rad",):
             step = 0.3 * best.term.parameters.get("width_rad", high[i] - low[i])
+        elif name == "since_s":
+            step = (high[i] - low[i]) / 64
         elif name == "resonance_hz":
             step = 0.06 * start[i]
         step = step or 0.05 * (high[i] - low[i])

@@ -1,5 +1,6 @@
 """Trace a residual to its cause: every effect's best form, gated, and compared."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,6 +21,8 @@ TIE_COLLINEARITY = 0.9
 HOPELESS = -10.0
 """Score of a best guess below which no refinement has been seen to reach the gate; the largest
 rise over 600 searches was from -8 to 9, and the gate begins near 10."""
+REFUTED = ("the flux current", "leaves structure")
+"""How the reasons begin for which an effect is no tie either."""
 OUTSIDER = 0.2
 """Nor has one with a fifth of another effect's score been seen to overtake it."""
 
@@ -51,7 +54,12 @@ class Traced:
     views: dict[bool, View]
 
 
-def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> Traced:
+def trace_residual(
+    fitted: Fit,
+    library: Library,
+    gate: Gate | None = None,
+    imitations: Mapping[str, str] | None = None,
+) -> Traced:
     """Try every effect of a library on what a fit leaves.
 
     Parameters
@@ -62,6 +70,9 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
         Effects to try; those that the model holds are left out unless they may come twice.
     gate : Gate, optional
         What a candidate must show.
+    imitations : dict of str to str, optional
+        Effects whose forms have been found wrong, and why. They are not added again, but have been
+        weighed: what is of their form is of a form that the library knows.
 
     Returns
     -------
@@ -99,7 +110,8 @@ def trace_residual(fitted: Fit, library: Library, gate: Gate | None = None) -> T
         tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
-        why = refusal(tested, gate) or pressed_limit(session, view, tested)
+        wrong = (imitations or {}).get(tested.term.effect.name)
+        why = wrong or refusal(tested, gate) or pressed_limit(session, view, tested)
         why = why or disagreement(view, tested.term)
         if why is None:
             slow = views[False]
@@ -145,7 +157,7 @@ def ties_of(winner: Candidate, others: list[Candidate]) -> tuple[str, ...]:
             continue
         if other.likelihood < winner.likelihood - margin:
             continue
-        if other.why_not is not None and other.why_not.startswith("the flux current"):
+        if other.why_not is not None and other.why_not.startswith(REFUTED):
             continue
         if other.contribution.size == winner.contribution.size:
             product = float(np.dot(other.contribution, winner.contribution))

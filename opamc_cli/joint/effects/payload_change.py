@@ -5,6 +5,8 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.track import Floats, Track
 
+GUESSES = 32
+
 
 class PayloadChange(Effect):
     """Gravity and inertia that step at some time."""
@@ -19,15 +21,10 @@ class PayloadChange(Effect):
     open_limits = ("since_s",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Try a step between any two groups."""
-        groups = track.group
-        edges = np.flatnonzero(np.diff(groups) != 0) + 1
-        times = {float(track.time_s[edge]) for edge in edges}
-        length = float(track.time_s[-1] - track.time_s[0])
-        inside = [t for t in sorted(times) if 0.05 < (t - track.time_s[0]) / length < 0.95]
-        if len(inside) > 40:
-            inside = inside[:: -(-len(inside) // 40)]
-        return [{"since_s": time} for time in inside]
+        """Try steps all over the session: a stroke too early or too late, little is explained."""
+        first, last = float(track.time_s[0]), float(track.time_s[-1])
+        inside = np.linspace(first, last, GUESSES + 2)[1:-1]
+        return [{"since_s": float(time)} for time in inside]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anywhere in the session."""
