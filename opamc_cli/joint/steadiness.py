@@ -11,7 +11,7 @@ import numpy as np
 
 from opamc_cli.joint.model import Fit, Term
 from opamc_cli.joint.span import orthonormal, orthonormal_beside
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.track import Floats, Track
 from opamc_cli.joint.view import View, blocks_of
 
 BLOCKS_PER_GROUP = 16
@@ -45,7 +45,8 @@ def unsteady(fit: Fit, view: View, added: tuple[Term, ...]) -> list[int]:
     periodic = [place for place, term in enumerate(added) if term.effect.fast]
     if not periodic:
         return []
-    model = [view.whitened_rows(fit.session.columns(term, True)) for term in fit.terms]
+    raw = [fit.session.columns(term, True) for term in fit.terms]
+    model = [view.whitened_rows(columns) for columns in raw]
     alone: dict[int, float] = {}
     bursting = []
     for place in periodic:
@@ -55,8 +56,14 @@ def unsteady(fit: Fit, view: View, added: tuple[Term, ...]) -> list[int]:
         signal = view.values + model[own] @ fit.coefficients[own]
         beside = orthonormal_beside(model[own], base)
         alone[place] = float(np.sum((beside.T @ signal) ** 2)) / view.variance
-        simplest = _simplest(added[place])
-        excess, deviation = burst(view, model[own][:, simplest] if simplest else model[own])
+        simplest = _simplest(added[place]) or list(range(raw[own].shape[1]))
+        rest = view.values
+        if added[place].effect.domain != "frequency":
+            # What comes from the mains knows nothing of the motion; all else may follow it.
+            varied = view.whitened_rows(_following_motion(raw[own][:, simplest], view.grid.track))
+            following = orthonormal_beside(varied, view.span)
+            rest = rest - following @ (following.T @ rest)
+        excess, deviation = burst(view, model[own][:, simplest], rest)
         bursts = excess / max(deviation, 1e-300) > LEAST_DEVIATIONS
         if bursts and excess > LEAST_SHARE * alone[place]:
             bursting.append(place)
@@ -75,7 +82,16 @@ def _simplest(term: Term) -> list[int]:
     return list(sorted(forms, key=len)[0]) if forms else []
 
 
-def burst(view: View, columns: Floats) -> tuple[float, float]:
+def _following_motion(columns: Floats, track: Track) -> Floats:
+    """Sines whose size follows speed or load more closely than the form lets them: no bursts."""
+    speed = np.abs(track.velocity) / track.speed_scale
+    load = track.load_a / max(float(np.std(track.load_a[track.moving])), 1e-300)
+    sizes = (speed, speed**2, track.direction, load, np.abs(load))
+    varied: Floats = np.concatenate([columns * size[:, None] for size in sizes], axis=1)
+    return varied
+
+
+def burst(view: View, columns: Floats, rest: Floats) -> tuple[float, float]:
     """Compute what columns explain of a residual if every block has coefficients of its own.
 
     Parameters
@@ -84,6 +100,8 @@ def burst(view: View, columns: Floats) -> tuple[float, float]:
         Whitened residual.
     columns : array of shape (m, k)
         Whitened, on the view's valid samples.
+    rest : array of shape (m,)
+        Residual there.
 
     Returns
     -------
@@ -95,7 +113,7 @@ def burst(view: View, columns: Floats) -> tuple[float, float]:
         own = _filled(columns[block])
         if not own.shape[1] or block.size < FEWEST_SAMPLES * own.shape[1]:
             continue
-        likelihood += float(np.sum((own.T @ view.values[block]) ** 2)) / view.variance
+        likelihood += float(np.sum((own.T @ rest[block]) ** 2)) / view.variance
         free += own.shape[1]
     return likelihood - free, float(np.sqrt(2 * max(free, 1)))
 

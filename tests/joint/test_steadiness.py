@@ -24,7 +24,7 @@ def test_bursts_are_what_least_squares_finds_block_by_block(rippled):
         left = values - columns[block] @ np.linalg.lstsq(columns[block], values, rcond=None)[0]
         fall += float(values @ values - left @ left) / view.variance
         free += 2
-    excess, deviation = burst(view, columns)
+    excess, deviation = burst(view, columns, view.values)
     assert excess == pytest.approx(fall - free, rel=1e-6)
     assert deviation == pytest.approx(np.sqrt(2 * free))
 
