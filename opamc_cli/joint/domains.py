@@ -8,10 +8,11 @@ is left of it after an effect was added says that the effect has the wrong form.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 from scipy.stats import gamma
 from scipy.stats import t as student
 
-from opamc_cli.joint.model import Fit
+from opamc_cli.joint.model import Fit, Grid
 from opamc_cli.joint.normal import held_out_error, normal_equations, solve
 from opamc_cli.joint.spectra import (
     LOWEST_ORDER,
@@ -26,6 +27,8 @@ from opamc_cli.joint.view import prepare, residual_on
 
 LINE_P = 1e-4
 """Probability with which noise alone shows a line."""
+SAFETY = 4.0
+"""Times the motion's noise that may repeat and yet be no effect."""
 LEAST_GAIN = 0.02
 LARGEST_P = 1e-3
 """Least share and largest p of what counts as structure."""
@@ -248,14 +251,41 @@ def ceiling(fit: Fit, seen: list[Structure]) -> Ceiling:
     -------
     Ceiling
         The larger of the cycles' covariance at equal times (unbiased: no cycle is compared with
-        itself) and the best flexible basis.
+        itself) and the best flexible basis. A repeated path repeats its encoder's rounding, and
+        with it the noise of the acceleration: what is structured in no domain must repeat in
+        block means too, where that noise has averaged out, or exceed that noise.
     """
     best = max(seen, key=lambda structure: structure.gain, default=Structure("", 0.0, 0.0, 1.0))
     by_domain = Ceiling(max(best.gain, 0.0), best.t_value, best.p_value, "domains")
-    by_cycle = _cycle_ceiling(fit)
+    session = fit.session
+    by_cycle = _cycle_ceiling(_without_blur(fit), session.sharp)
     if by_cycle is None or by_cycle.share < by_domain.share:
         return by_domain
+    if not by_domain.significant and session.coarse is not session.fine:
+        slow = _cycle_ceiling(residual_on(fit, fine=False), session.coarse)
+        rough = SAFETY * _roughness(fit)
+        if slow is not None and not slow.significant and by_cycle.share < rough:
+            return by_domain
     return by_cycle
+
+
+def _roughness(fit: Fit) -> float:
+    """Mean square of what of the slow model varies within a block, as a share of the residual's.
+
+    Effects of the motion are smooth where the motion is: this is its noise.
+    """
+    grid = fit.session.sharp
+    width = fit.session.factor
+    slow = np.zeros(grid.track.size)
+    for term, values in zip(fit.terms, fit.coefficients, strict=True):
+        if not term.effect.fast:
+            slow += fit.session.columns(term, fine=True) @ values
+    inside = grid.fit & (uniform_filter1d(grid.track.moving.astype(float), width) > 1 - 1e-9)
+    if not inside.any():
+        return 0.0
+    rough = slow - uniform_filter1d(slow, width)
+    power = float(np.mean(fit.residual_a[grid.fit] ** 2))
+    return float(np.mean(rough[inside] ** 2)) / max(power, 1e-300)
 
 
 def _without_blur(fit: Fit) -> Floats:
@@ -276,12 +306,10 @@ def _without_blur(fit: Fit) -> Floats:
     return residual
 
 
-def _cycle_ceiling(fit: Fit) -> Ceiling | None:
-    grid = fit.session.sharp
+def _cycle_ceiling(residual: Floats, grid: Grid) -> Ceiling | None:
     period = grid.track.period_samples
     if period is None:
         return None
-    residual = _without_blur(fit)
     curves, masks = [], []
     for start, stop in grid.track.bounds:
         for begin in range(start, stop - period + 1, period):

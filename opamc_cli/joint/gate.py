@@ -7,9 +7,16 @@ from itertools import pairwise
 import numpy as np
 
 from opamc_cli.joint.model import Fit, Session
-from opamc_cli.joint.normal import Normal, appended, held_out_error, normal_equations, solve
+from opamc_cli.joint.normal import (
+    Normal,
+    appended,
+    halves,
+    held_out_error,
+    normal_equations,
+    solve,
+)
 from opamc_cli.joint.search import Candidate, Shared, search
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.track import Bools, Floats
 from opamc_cli.joint.view import BLOCKS_PER_GROUP, View, blocks_of, noise_of, residual_on
 from opamc_cli.joint.whitening import autoregression, settled, whitened
 
@@ -108,8 +115,12 @@ def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candid
     grid = session.grid(candidate.fine)
     held = held or prepare_held(fit, candidate.fine)
     own = session.columns(candidate.term, candidate.fine)[grid.fit]
-    normal = appended(held.normal, held.base, own, held.residual, grid.slices)
-    before = held_out_error(held.normal)
+    known, slices = held.normal, grid.slices
+    if candidate.term.effect.once:
+        slices = halves(slices)
+        known = normal_equations(held.base, held.residual, slices)
+    normal = appended(known, held.base, own, held.residual, slices)
+    before = held_out_error(known)
     falls = before - held_out_error(normal)
     return replace(candidate, gain=float(falls.sum() / max(before.sum(), 1e-300)))
 
@@ -133,13 +144,15 @@ def removal_gains(fit: Fit, places: Sequence[int]) -> list[float]:
     session = fit.session
     normals: dict[bool, Normal] = {}
     owner = np.repeat(np.arange(len(fit.terms)), [values.size for values in fit.coefficients])
+    once = any(term.effect.once for term in fit.terms)
     gains = []
     for place in places:
         fine = fit.terms[place].effect.fast
         if fine not in normals:
             grid = session.grid(fine)
             signal = grid.track.current_a[grid.fit]
-            normals[fine] = normal_equations(_model_rows(fit, fine), signal, grid.slices)
+            slices = halves(grid.slices) if once else grid.slices
+            normals[fine] = normal_equations(_model_rows(fit, fine), signal, slices)
         normal = normals[fine]
         others = [k for k in range(normal.moment.shape[1]) if k >= owner.size or owner[k] != place]
         before = held_out_error(normal.taken(others)).sum()
@@ -169,6 +182,8 @@ def consistency(session: Session, view: View, candidate: Candidate) -> float:
     own = view.whitened_rows(session.columns(candidate.term, candidate.fine))
     edges = np.flatnonzero(np.diff(view.grid.track.group[view.rows])) + 1
     slices = tuple(pairwise([0, *edges.tolist(), view.rows.size]))
+    if candidate.term.effect.once:
+        slices = halves(slices)
     model = normal_equations(view.span, view.values, slices)
     normal = appended(model, view.span, own, view.values, slices)
     falls = held_out_error(model) - held_out_error(normal)
@@ -249,19 +264,32 @@ def sealed_falls(before: Fit, after: Fit) -> tuple[float, float]:
     Returns
     -------
     plain, whitened : float
-        Shares of the error before; the noise's colour is the open groups' under `before`.
+        Shares of the error before; the noise's colour is the open groups' under `before`. A group
+        in which something happened once does not judge: nothing open tells when.
     """
     session = before.opened.session
     grid = session.fine
+    sealed = _judging(after)
     noise, known = noise_of(before, True, before.residual_a)
     taps = autoregression(noise, known)
     track = grid.track
-    clean = grid.sealed & settled(track.moving & (track.group >= 0), track.bounds, taps.size - 1)
+    clean = sealed & settled(track.moving & (track.group >= 0), track.bounds, taps.size - 1)
     falls = []
-    for rows, filters in ((grid.sealed, np.ones(1)), (clean, taps)):
+    for rows, filters in ((sealed, np.ones(1)), (clean, taps)):
         first, last = (
             float(np.sum(whitened(fit.opened.residual_a, filters)[rows] ** 2))
             for fit in (before, after)
         )
         falls.append(1.0 - last / first if first > 0 else 0.0)
     return falls[0], falls[1]
+
+
+def _judging(fit: Fit) -> Bools:
+    """Sealed samples, without the groups in which an effect began, if any are left."""
+    grid = fit.opened.session.fine
+    judging = grid.sealed.copy()
+    for term in fit.terms:
+        if term.effect.once and "since_s" in term.parameters:
+            at = int(np.searchsorted(grid.track.time_s, term.parameters["since_s"]))
+            judging &= grid.track.group != grid.track.group[min(at, grid.track.size - 1)]
+    return judging if judging.any() else grid.sealed

@@ -16,6 +16,7 @@ from opamc_cli.joint.smoothing import (
     noise_gain,
     quiet_block,
     smoothing_window,
+    unfollowed,
     unstepped,
 )
 from opamc_cli.joint.torque_axis import side_of_torque, torque_current
@@ -83,6 +84,8 @@ class Motion:
         Samples over which the acceleration's noise averages to almost nothing.
     blur : array of shape (n, 2) or None
         What the acceleration would gain or lose by a third and by three times the window.
+    corner : bool array of shape (n,) or None
+        Samples whose acceleration a corner of the motion spoils.
     """
 
     position_rad: Floats
@@ -93,6 +96,7 @@ class Motion:
     kernel: Floats
     quiet: int = 1
     blur: Floats | None = None
+    corner: Bools | None = None
     evenly_smooth: bool = False
 
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
@@ -149,13 +153,15 @@ def motion_from_position(
                 averaging_kernel(own, 1),
                 quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
                 blurred(speed, rate_hz, own, 1),
+                unfollowed(speed, rate_hz, own, 1),
             )
     noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
     kernel = averaging_kernel(window, 2)
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
     blur = blurred(position_rad, rate_hz, window, 2)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur)
+    corner = unfollowed(position_rad, rate_hz, window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, corner)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -170,7 +176,8 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
     blur = blurred(velocity_rad_s, rate_hz, window, 1)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur)
+    corner = unfollowed(velocity_rad_s, rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, corner)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -181,7 +188,7 @@ def direction_of(motion: Motion) -> Floats:
 
 
 def moving_samples(motion: Motion, usable: Bools) -> Bools:
-    """Tell the samples in motion: fast enough, and half a smoothing window away from any reversal.
+    """Tell the samples in motion: fast enough, half a window from any reversal, not at a corner.
 
     Parameters
     ----------
@@ -201,6 +208,8 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     uncertain[1:] |= direction[1:] != direction[:-1]
     moving: Bools = usable & ~widened(uncertain, half)
     moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
+    if motion.corner is not None:
+        moving &= ~motion.corner
     moving[:half] = False
     moving[speeds.size - half :] = False
     return moving

@@ -26,6 +26,8 @@ from opamc_cli.joint.view import View
 MOST_STEPS = 16
 ATTEMPTS = 3
 CLOSED_SHARE = 0.9
+SEALED_EXCESS = 4.0
+"""Times the open mean square error that the sealed one may be, and still nothing be missing."""
 
 
 @dataclass(frozen=True)
@@ -268,6 +270,11 @@ def _summary(
             remains = [Structure(slow.domain, share, float(np.sqrt(slow.excess)), slow.p_value)]
             structured = remains
     rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
+    excess = rmse_after**2 / max(after.rmse(sealed=False) ** 2, 1e-300)
+    if not structured and not rest and excess > SEALED_EXCESS:
+        # What began after the open groups is nothing that they could show.
+        remains = [Structure("time", 1.0 - 1.0 / excess, float(np.sqrt(excess)), 0.0)]
+        structured = remains
     floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))
     reach = rmse_before**2 - floor**2
     explained = (rmse_before**2 - rmse_after**2) / reach if reach > 1e-3 * rmse_before**2 else 1.0

@@ -16,6 +16,9 @@ from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, co
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 20_000
+MOST_ROUNDS = 12
+SETTLED = 1e-4
+"""Share of the error by which a fit of terms that follow the fitted load may still change."""
 SMALLEST_KERNEL = 5
 """A moving average of up to 5 samples needs no counterpart."""
 
@@ -240,7 +243,7 @@ class Fit:
 
 
 def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
-    """Fit all terms jointly; terms that scale with the load or the model are fitted twice.
+    """Fit all terms jointly; where some scale with the load or the model, until that settles.
 
     Parameters
     ----------
@@ -255,11 +258,16 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
     """
     circular = not all(term.effect.is_constant(term.parameters) for term in terms)
     plain = not np.any(session.fine.track.model_a)
-    rounds = 3 if circular and plain else 2 if circular else 1
+    fewest = 3 if plain else 2
     session.kept.keep(terms)
-    for _ in range(rounds):
+    before = np.inf
+    for number in range(1, MOST_ROUNDS + 1):
         fitted = _fit_once(session, terms)
-        session = fitted.session
+        error = fitted.rmse(sealed=False)
+        settled = number >= fewest and abs(before - error) <= SETTLED * error
+        if not circular or settled:
+            break
+        session, before = fitted.session, error
     return fitted
 
 

@@ -71,6 +71,12 @@ def normal_equations(
     return Normal(gram, moment, power, count)
 
 
+def halves(slices: tuple[tuple[int, int], ...]) -> tuple[tuple[int, int], ...]:
+    """Cut half-open ranges in two."""
+    parts = ((start, (start + stop) // 2, stop) for start, stop in slices)
+    return tuple(piece for a, b, c in parts for piece in ((a, b), (b, c)) if piece[1] > piece[0])
+
+
 def extended(
     known: Normal | None,
     places: Sequence[int | None],

@@ -192,7 +192,7 @@ def search(
         coefficients=best.coefficients,
         contribution=contribution,
         fine=view.fine,
-        t_value=block_t_value(view, contribution),
+        t_value=block_t_value(view, contribution, effect.once),
     )
     return candidate, tried
 

@@ -14,6 +14,9 @@ from opamc_cli.joint.whitening import Whitening, autoregression, whitening_with_
 
 LEAST_DRIFT = 0.3
 BLOCKS_PER_GROUP = 8
+FEWEST_PAIRS = 3
+STEP_POWER = 4.0
+"""Of the median: a difference of two cycles above holds more than noise."""
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,7 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
         return residual, grid.fit
     noise = np.zeros_like(residual)
     valid = np.zeros_like(grid.fit)
+    pairs: list[slice] = []
     for start, stop in grid.track.bounds:
         if stop - start <= period:
             continue
@@ -148,11 +152,30 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
         valid[start : stop - period] = (
             grid.fit[start : stop - period] & grid.fit[start + period : stop]
         )
+        pairs += [
+            slice(begin, min(begin + period, stop - period))
+            for begin in range(start, stop - period, period)
+        ]
+    _leave_out_steps(noise, valid, pairs)
     if valid.sum() < 0.2 * grid.fit.sum():
         return residual, grid.fit
     if not fine:
         _remove_drift(fit, noise, valid)
     return noise, valid
+
+
+def _leave_out_steps(noise: Floats, valid: Bools, pairs: list[slice]) -> None:
+    """Mark, in place, differences of cycles that are no noise: something happened in between.
+
+    Counted as the noise's colour, a payload that changes would hide itself.
+    """
+    known = [pair for pair in pairs if valid[pair].any()]
+    if len(known) < FEWEST_PAIRS:
+        return
+    powers = np.array([np.mean(noise[pair][valid[pair]] ** 2) for pair in known])
+    for pair, power in zip(known, powers, strict=True):
+        if power > STEP_POWER * float(np.median(powers)):
+            valid[pair] = False
 
 
 def _remove_drift(fit: Fit, noise: Floats, valid: Bools) -> None:
@@ -185,7 +208,7 @@ def blocks_of(view: View, per_group: int) -> list[NDArray[np.int64]]:
     return blocks
 
 
-def block_t_value(view: View, contribution: Floats) -> float:
+def block_t_value(view: View, contribution: Floats, once: bool = False) -> float:
     """Compute the t value of a contribution's agreement with the residual over blocks of time.
 
     Parameters
@@ -194,15 +217,19 @@ def block_t_value(view: View, contribution: Floats) -> float:
         Whitened residual.
     contribution : array of shape (m,)
         Whitened contribution on the view's valid samples.
+    once : bool
+        Whether the effect happens once.
 
     Returns
     -------
     float
         Sum over blocks of the products, over the root of their sum of squares: one lucky block
         gives 1, n equal ones the root of n. Eight blocks per group, so that effects that fade
-        or step, and live in few groups, can show themselves too.
+        or step, and live in few groups, can show themselves too; what happens once may have but a
+        part of a group, and is given twice as many.
     """
     products = contribution * view.values
-    sums = np.array([products[block].sum() for block in blocks_of(view, BLOCKS_PER_GROUP)])
+    per_group = (2 if once else 1) * BLOCKS_PER_GROUP
+    sums = np.array([products[block].sum() for block in blocks_of(view, per_group)])
     length = float(np.linalg.norm(sums))
     return float(sums.sum() / length) if length > 0 else 0.0

@@ -14,10 +14,14 @@ from opamc_cli.joint.track import Joint
 def close_on(seed, effects, ratio=0.8, without=(), **options):
     base = tuple(name for name in DECLARED if name not in effects)
     made = simulate(seed, effects, ratio, declared=base, **options)
+    return close_recording(made, made.current, base, without, seed)
+
+
+def close_recording(made, current, base=DECLARED, without=(), seed=0):
     recording = Recording(
         "run",
         made.rate_hz,
-        current_a=made.current,
+        current_a=current,
         position_rad=made.position,
         temperature_c=made.temperature,
     )

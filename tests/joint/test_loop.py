@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from closing import close_on
-from simulator import DECLARED
+from closing import close_on, close_recording
+from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.model import fit_terms
@@ -80,6 +80,29 @@ def test_two_runs_of_the_loop_are_equal():
     _, second = close_on(2, ("stribeck",), rate=250.0)
     assert first.rmse_after_a == second.rmse_after_a
     assert [s.p_value for s in first.steps] == [s.p_value for s in second.steps]
+
+
+def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
+    # Of five cycles the last is sealed, and the fourth alone knows the new payload.
+    made = simulate(3, (), rate=250.0, cycles=5)
+    changed = made.current.copy()
+    start = round(0.6 * changed.size)
+    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
+    _, loop = close_recording(made, changed)
+    assert [step.term.effect.name for step in loop.steps] == ["payload_change"]
+    found = loop.steps[0].term.parameters["since_s"]
+    # A twentieth of a cycle: the refinement ends where a slow stretch tells little.
+    assert abs(found - start / made.rate_hz) < 0.05 * 7.3
+    assert loop.rmse_after_a < 1.1 * made.noise_rms
+
+
+def test_what_begins_in_the_sealed_cycle_is_noticed():
+    made = simulate(3, (), rate=250.0, cycles=5)
+    changed = made.current.copy()
+    start = round(0.85 * changed.size)
+    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
+    _, loop = close_recording(made, changed)
+    assert (loop.verdict, loop.remaining_domain) == ("not-in-library", "time")
 
 
 def test_what_the_sealed_data_do_not_bear_out_is_taken_back():

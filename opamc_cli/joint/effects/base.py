@@ -55,6 +55,9 @@ class Effect:
     same_for_all: bool = False
     """True where the effect does the same to every fitted regressor: its one column is the sum of
     its `parts`, and fitted one by one they must agree."""
+    once: bool = False
+    """True where the effect begins at some time: the last group alone may know it, and is left
+    out by halves."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""

@@ -6,6 +6,7 @@ from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.track import Floats, Track
 
 GUESSES = 32
+NEAR = 4
 
 
 class PayloadChange(Effect):
@@ -17,6 +18,7 @@ class PayloadChange(Effect):
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
+    once = True
     free_refinement = False
     open_limits = ("since_s",)
 
@@ -38,6 +40,20 @@ class PayloadChange(Effect):
             after * np.cos(track.position_rad),
             after * track.acceleration,
         )
+
+    def settled(self, parameters: Parameters, track: Track) -> Parameters:
+        """Take the middle of a stretch that nothing open tells the time in."""
+        rows = track.open_samples
+        if rows is None:
+            return parameters
+        times = track.time_s[rows]
+        after = int(np.searchsorted(times, parameters["since_s"]))
+        # A few samples more or less on one side are no reason to prefer its end of the stretch.
+        first, last = max(after - NEAR, 0), min(after + NEAR, times.size - 1)
+        if last <= first:
+            return parameters
+        widest = first + int(np.argmax(np.diff(times[first : last + 1])))
+        return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""
