@@ -127,7 +127,6 @@ def plain_forms(track: Track) -> list[PlainForm]:
         for count, of in ((1, covariate), (2, f"{covariate} and its square")):
             some = powers[:, :count]
             forms += [
-                PlainForm(f"{of} beside a constant", domain, np.concatenate([one, some], axis=1)),
                 PlainForm(f"the velocity times {of}", domain, wet * some),
                 PlainForm(
                     f"both frictions times {of}",
@@ -135,6 +134,10 @@ def plain_forms(track: Track) -> list[PlainForm]:
                     np.concatenate([dry * some, wet * some], axis=1),
                 ),
             ]
+            # A current that drifts by itself is what slow noise looks like.
+            if domain not in ("time", "temperature"):
+                beside = np.concatenate([one, some], axis=1)
+                forms.append(PlainForm(f"{of} beside a constant", domain, beside))
             # Temperature acts on the lubricant. Dry friction that alone follows it, and that no
             # library names, would be a twin of every warm-up of dry friction.
             if domain != "temperature":
