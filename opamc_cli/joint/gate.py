@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from opamc_cli.joint.model import Fit, Session
+from opamc_cli.joint.model import Fit, Session, Term
 from opamc_cli.joint.normal import (
     Normal,
     appended,
@@ -116,7 +116,7 @@ def held_out(fit: Fit, candidate: Candidate, held: Held | None = None) -> Candid
     held = held or prepare_held(fit, candidate.fine)
     own = session.columns(candidate.term, candidate.fine)[grid.fit]
     known, slices = held.normal, grid.slices
-    if candidate.term.effect.once:
+    if _in_one_group(session, candidate.term):
         slices = halves(slices)
         known = normal_equations(held.base, held.residual, slices)
     normal = appended(known, held.base, own, held.residual, slices)
@@ -144,7 +144,7 @@ def removal_gains(fit: Fit, places: Sequence[int]) -> list[float]:
     session = fit.session
     normals: dict[bool, Normal] = {}
     owner = np.repeat(np.arange(len(fit.terms)), [values.size for values in fit.coefficients])
-    once = any(term.effect.once for term in fit.terms)
+    once = any(_in_one_group(session, term) for term in fit.terms)
     gains = []
     for place in places:
         fine = fit.terms[place].effect.fast
@@ -182,7 +182,7 @@ def consistency(session: Session, view: View, candidate: Candidate) -> float:
     own = view.whitened_rows(session.columns(candidate.term, candidate.fine))
     edges = np.flatnonzero(np.diff(view.grid.track.group[view.rows])) + 1
     slices = tuple(pairwise([0, *edges.tolist(), view.rows.size]))
-    if candidate.term.effect.once:
+    if _in_one_group(session, candidate.term):
         slices = halves(slices)
     model = normal_equations(view.span, view.values, slices)
     normal = appended(model, view.span, own, view.values, slices)
@@ -284,12 +284,16 @@ def sealed_falls(before: Fit, after: Fit) -> tuple[float, float]:
     return falls[0], falls[1]
 
 
+def _in_one_group(session: Session, term: Term) -> bool:
+    return term.effect.in_one_group(session.fine.track, term.parameters)
+
+
 def _judging(fit: Fit) -> Bools:
     """Sealed samples, without the groups in which an effect began, if any are left."""
     grid = fit.opened.session.fine
     judging = grid.sealed.copy()
     for term in fit.terms:
-        if term.effect.once and "since_s" in term.parameters:
+        if "since_s" in term.parameters:
             at = int(np.searchsorted(grid.track.time_s, term.parameters["since_s"]))
             judging &= grid.track.group != grid.track.group[min(at, grid.track.size - 1)]
     return judging if judging.any() else grid.sealed

@@ -192,7 +192,9 @@ def search(
         coefficients=best.coefficients,
         contribution=contribution,
         fine=view.fine,
-        t_value=block_t_value(view, contribution, effect.once),
+        t_value=block_t_value(
+            view, contribution, effect.in_one_group(view.grid.track, best.term.parameters)
+        ),
     )
     return candidate, tried
 

@@ -208,7 +208,7 @@ def blocks_of(view: View, per_group: int) -> list[NDArray[np.int64]]:
     return blocks
 
 
-def block_t_value(view: View, contribution: Floats, once: bool = False) -> float:
+def block_t_value(view: View, contribution: Floats, in_one_group: bool = False) -> float:
     """Compute the t value of a contribution's agreement with the residual over blocks of time.
 
     Parameters
@@ -217,19 +217,19 @@ def block_t_value(view: View, contribution: Floats, once: bool = False) -> float
         Whitened residual.
     contribution : array of shape (m,)
         Whitened contribution on the view's valid samples.
-    once : bool
-        Whether the effect happens once.
+    in_one_group : bool
+        Whether one group alone knows of the effect.
 
     Returns
     -------
     float
         Sum over blocks of the products, over the root of their sum of squares: one lucky block
         gives 1, n equal ones the root of n. Eight blocks per group, so that effects that fade
-        or step, and live in few groups, can show themselves too; what happens once may have but a
-        part of a group, and is given twice as many.
+        or step, and live in few groups, can show themselves too; what but a part
+        of one group knows is given twice as many.
     """
     products = contribution * view.values
-    per_group = (2 if once else 1) * BLOCKS_PER_GROUP
+    per_group = (2 if in_one_group else 1) * BLOCKS_PER_GROUP
     sums = np.array([products[block].sum() for block in blocks_of(view, per_group)])
     length = float(np.linalg.norm(sums))
     return float(sums.sum() / length) if length > 0 else 0.0

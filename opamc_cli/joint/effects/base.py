@@ -55,9 +55,6 @@ class Effect:
     same_for_all: bool = False
     """True where the effect does the same to every fitted regressor: its one column is the sum of
     its `parts`, and fitted one by one they must agree."""
-    once: bool = False
-    """True where the effect begins at some time: the last group alone may know it, and is left
-    out by halves."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
@@ -105,6 +102,10 @@ class Effect:
     def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
         """Regressors after the fitted model has changed, from those before; `columns` in short."""
         return self.columns(track, parameters)
+
+    def in_one_group(self, track: Track, parameters: Parameters) -> bool:
+        """Tell whether one group alone knows of the effect, and is to be left out by halves."""
+        return False
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

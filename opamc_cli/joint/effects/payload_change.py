@@ -18,7 +18,6 @@ class PayloadChange(Effect):
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
-    once = True
     free_refinement = False
     open_limits = ("since_s",)
 
@@ -54,6 +53,15 @@ class PayloadChange(Effect):
             return parameters
         widest = first + int(np.argmax(np.diff(times[first : last + 1])))
         return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
+
+    def in_one_group(self, track: Track, parameters: Parameters) -> bool:
+        """Whether all of what is open after the step, or before it, lies in one group."""
+        rows = track.open_samples
+        if rows is None:
+            return False
+        after = track.time_s[rows] >= parameters["since_s"]
+        groups = track.group[rows]
+        return any(np.unique(groups[side]).size == 1 for side in (after, ~after))
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""
