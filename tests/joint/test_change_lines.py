@@ -1,5 +1,6 @@
 """Order spectra of strokes against the sum that they stand for, and how their lines are read."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -33,7 +34,7 @@ def test_binned_transform_is_the_plain_sum_over_the_angle(units):
     spectra = order_spectra(units, white)
     unit, residual = units[0], white[0]
     pieces = strokes(unit.fine, unit.fine_rows & (residual != 0))
-    samples = sum(stop - start for start, stop in pieces)
+    samples = sum(np.count_nonzero(residual[start:stop]) for start, stop in pieces)
     for k in range(0, spectra.orders.size, spectra.orders.size // 7):
         plain = 0.0
         for start, stop in pieces:
@@ -42,6 +43,17 @@ def test_binned_transform_is_the_plain_sum_over_the_angle(units):
             plain += abs(np.sum(residual[start:stop] * turned)) ** 2
         assert spectra.before[0, k] == pytest.approx(plain / samples, rel=0.1, abs=0.05)
     assert spectra.before.mean() == pytest.approx(1.0, abs=0.1)
+
+
+def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units):
+    unit = units[0]
+    (start, stop), *_ = strokes(unit.fine, unit.fine_rows)
+    middle = (start + stop) // 2
+    rows = unit.fine_rows.copy()
+    rows[middle - 5 : middle + 5] = False
+    assert strokes(unit.fine, rows)[0] == (start, stop)
+    followed = replace(unit.fine, channels=unit.fine.channels - {"logged"})
+    assert strokes(followed, rows)[0][1] <= middle - 5
 
 
 def line(order, reference=None, error=0.001):

@@ -112,10 +112,11 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
         top = highest_order(unit.fine)
         orders = [k * fundamental for k in range(1, MOST_HARMONICS + 1) if k * fundamental < top]
         for start, stop in strokes(unit.fine, unit.fine_rows):
-            angle = unit.fine.machine_angle_rad[start:stop]
+            rows = start + np.flatnonzero(unit.fine_rows[start:stop])
+            angle = unit.fine.machine_angle_rad[rows]
             knots = np.linspace(float(angle.min()), float(angle.max()), KNOTS)
             weights = hats(angle, knots)
-            values = residual[start:stop]
+            values = residual[rows]
             for order in orders:
                 waves = np.exp(1j * order * angle)
                 columns = np.concatenate(

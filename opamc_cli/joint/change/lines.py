@@ -128,6 +128,10 @@ def turned_back(unit: Unit, residual: Floats) -> tuple[Floats, Floats] | None:
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     """Half-open stretches of motion in one direction long enough to count orders."""
     side = np.where(rows, track.direction, 0.0)
+    if "logged" in track.channels:
+        # Samples that do not count, at a corner of the acceleration say, do not end a stroke: the
+        # angle is known on both sides of them.
+        side = _bridged(side, track)
     edges = np.flatnonzero(np.diff(side) != 0) + 1
     edges = np.concatenate([[0], edges, [side.size]])
     shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
@@ -138,6 +142,18 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
         if side[start] != 0 and long_enough and np.ptp(angle) >= shortest_rad:
             found.append((int(start), int(stop)))
     return found
+
+
+def _bridged(side: Floats, track: Track) -> Floats:
+    """Directions with gaps filled inside which the joint goes on in the direction of both ends."""
+    bridged = side.copy()
+    for first, last in track.bounds:
+        known = first + np.flatnonzero(side[first:last])
+        for place in np.flatnonzero(np.diff(known) > 1):
+            start, stop = known[place], known[place + 1]
+            if side[start] == side[stop] and np.all(track.direction[start:stop] == side[start]):
+                bridged[start:stop] = side[start]
+    return bridged
 
 
 def order_spectra(units: list[Unit], white: list[Floats]) -> OrderSpectra | None:
@@ -175,7 +191,7 @@ def order_spectra(units: list[Unit], white: list[Floats]) -> OrderSpectra | None
             index = ((angle - angle.min()) / width).astype(np.int64)
             binned = np.bincount(index, weights=residual[start:stop], minlength=bins)
             power += np.abs(rfft(binned[:bins], length)[:kept]) ** 2
-            samples += stop - start
+            samples += int(np.count_nonzero(residual[start:stop]))
         rows[unit.after].append(power[first:] / samples)
     if len(rows[False]) < 2 or not rows[True]:
         return None
