@@ -1,13 +1,13 @@
 """How often the loop adds what is not there, finds what is, and names it rightly.
 
-    python benchmarks/loop.py [--quick] [--seeds N] [--first-seed 17000] [--mode position|phases]
+    python benchmarks/loop.py [--quick] [--seeds N] [--first-seed 22000] [--mode position|phases]
     python benchmarks/loop.py --write     # and updates docs/validation.md
 
-Every trial is a joint of the tests' own simulator: trajectory, rate, robot, noise colour and effect
-are drawn from the seed. Tuning used seeds below 100 only. Of five joints with nothing missing, one
-is measured without fault, three with encoders of 1e-5, 1e-4 and 5e-4 rad, and one through a
-drive's filter with a coarse current; to find that filter's delay, and nothing else, is not wrong.
-Shares come with Wilson's 95 % interval.
+Every trial is a joint of the tests' own simulator: trajectory, rate, robot, noise colour and
+effect are drawn from the seed. Tuning used seeds below 100 only. Of four joints with nothing
+missing, one is measured without fault, three with encoders of 1e-5, 1e-4 and 5e-4 rad; a fifth of
+them is measured once more, through a drive's filter with a coarse current. Shares come with
+Wilson's 95 % interval.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from opamc_cli.joint.track import Joint
 ROOT = Path(__file__).parents[1]
 BEGIN, END = "<!-- loop: begin -->", "<!-- loop: end -->"
 NULLS_PER_SEED = 20
-FILTERED = "current through a drive's filter"
+FILTERS_PER_SEED = 4
 
 PHASE_EFFECTS = (
     "stribeck", "ripple", "quadratic_friction", "sublinear_friction", "position_drag",
@@ -186,53 +186,62 @@ class Study:
 
 
 def sensors(seed: int) -> dict[str, object]:
-    """Draw encoder and drive of a joint with nothing missing."""
+    """Draw the encoder of a joint with nothing missing."""
+    return {"quantum": (None, 1e-5, 1e-4, 5e-4)[seed % 4]}
+
+
+def drive_filter(seed: int) -> dict[str, object]:
+    """Draw a drive that reports the current late and coarsely."""
     rng = np.random.default_rng([seed, 5])
-    if seed % 5 == 4:
-        return {
-            "current_filter_hz": rng.uniform(100.0, 300.0),
-            "current_quantum": float(np.exp(rng.uniform(np.log(1e-3), np.log(1e-2)))),
-        }
-    return {"quantum": (None, 1e-5, 1e-4, 5e-4)[seed % 5]}
-
-
-def kind_of_sensors(seed: int) -> str:
-    """Name what `sensors` draws."""
-    fine = "encoder of 1e-4 rad or better"
-    return (fine, fine, fine, "encoder of 5e-4 rad", FILTERED)[seed % 5]
-
-
-def is_filter(trial: Trial, corner_hz: float | None) -> bool:
-    """Tell whether all that was added is the delay of the drive's filter, which is there."""
-    if corner_hz is None or len(trial.loop.steps) != 1:
-        return False
-    step = trial.loop.steps[0]
-    delay_ms = 1e3 * step.term.parameters.get("delay_s", 0.0)
-    true_ms = 1e3 / (2 * np.pi * corner_hz)
-    return step.term.effect.name == "time_delay" and abs(delay_ms / true_ms - 1) < 0.3
+    return {
+        "current_filter_hz": rng.uniform(100.0, 300.0),
+        "current_quantum": float(np.exp(rng.uniform(np.log(1e-3), np.log(1e-2)))),
+    }
 
 
 def nothing_missing(study: Study) -> list[Share]:
     """Count wrong additions, and verdicts, where nothing is missing."""
     wrong: dict[str, int] = defaultdict(int)
     tried: dict[str, int] = defaultdict(int)
-    verdicts = filters = 0
+    verdicts = 0
     for seed in study.nulls:
-        kind = kind_of_sensors(seed)
-        options = {**sensors(seed), **study.options}
-        trial = run_trial(seed, (), 0.0, mode=study.mode, **options)
+        kind = "encoder of 5e-4 rad" if seed % 4 == 3 else "encoder of 1e-4 rad or better"
+        trial = run_trial(seed, (), 0.0, mode=study.mode, **sensors(seed), **study.options)
         tried[kind] += 1
-        found = is_filter(trial, options.get("current_filter_hz"))
-        filters += found
-        wrong[kind] += bool(trial.added) and not found
+        wrong[kind] += bool(trial.added)
         verdicts += trial.loop.verdict == "nothing-missing"
         if trial.added:
             study.say(f"null {seed} at {trial.simulated.rate_hz} Hz: {trial.added}")
     return [
         Share("nothing missing: wrong additions", "≤ 2 %", sum(wrong.values()), len(study.nulls)),
         *(Share(f"… {kind}", "≤ 2 %", wrong[kind], tried[kind]) for kind in tried),
-        Share("… the filter found, not counted", "–", filters, tried[FILTERED]),
         Share("nothing missing: verdict says so", "–", verdicts, len(study.nulls)),
+    ]
+
+
+def through_a_filter(study: Study) -> list[Share]:
+    """Count what is added where a drive's filter delays the current, and nothing else is missing.
+
+    The filter's half to two milliseconds are a `time_delay` that the model lacks: it may be found
+    or pass unnoticed, but nothing else may be added.
+    """
+    delays = others = 0
+    seeds = study.nulls[:: NULLS_PER_SEED // FILTERS_PER_SEED]
+    for seed in seeds:
+        trial = run_trial(seed, (), 0.0, mode=study.mode, **drive_filter(seed), **study.options)
+        steps = trial.loop.steps
+        wrong = [
+            step.term.effect.name
+            for step in steps
+            if "time_delay" not in (step.term.effect.name, *step.ties)
+        ]
+        others += bool(wrong)
+        delays += bool(steps) and not wrong
+        if steps:
+            study.say(f"filter {seed} at {trial.simulated.rate_hz} Hz: {trial.added}")
+    return [
+        Share("only a drive's filter missing: something else added", "–", others, len(seeds)),
+        Share("… found as `time_delay`", "–", delays, len(seeds)),
     ]
 
 
@@ -319,7 +328,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a few seeds only")
     parser.add_argument("--seeds", type=int, default=0, help="seeds per effect; null runs: x 20")
-    parser.add_argument("--first-seed", type=int, default=17000)
+    parser.add_argument("--first-seed", type=int, default=22000)
     parser.add_argument("--mode", choices=("position", "phases"), default="position")
     parser.add_argument("--only", default="", help="effects, separated by commas; or null, removed")
     parser.add_argument("--ratios", default="0.3,0.6")
@@ -350,7 +359,7 @@ def main() -> None:
     rows: list[Share] = []
     notes: list[str] = []
     if "null" in study.chosen:
-        rows += nothing_missing(study)
+        rows += nothing_missing(study) + through_a_filter(study)
         print(*(row.row() for row in rows), sep="\n", flush=True)
     if study.chosen & set(effects):
         for ratio in (float(text) for text in arguments.ratios.split(",")):

@@ -125,7 +125,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
             msg = f"{source}: {key} is missing; add it"
         else:
             value = first["input"]
-            msg = f"{source}: {key} is {value!r}; {_lower_first(first['msg'])}"
+            wanted = _lower_first(first["msg"]).replace("a valid tuple", "a list, in brackets")
+            msg = f"{source}: {key} is {value!r}; {wanted}"
         raise ConfigError(msg) from error
 
 
