@@ -1,6 +1,7 @@
 """`opamc model`: fit a declared joint model, trace what it lacks, close the loop."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -8,6 +9,7 @@ import typer
 
 from opamc_cli.commands.options import DEFAULT_OUT, Json, Out, Quiet
 from opamc_cli.commands.output import Output
+from opamc_cli.errors import ConfigError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -44,7 +46,7 @@ def fit(
 
     output = Output(as_json, quiet)
     declared = load_joint_model(model)
-    with output_lock(out):
+    with output_lock(out), _naming(model):
         outcome = stage.fit(declared, find_runs(runs), axis or (), out)
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
@@ -73,7 +75,7 @@ def trace(
 
     output = Output(as_json, quiet)
     declared = load_joint_model(model)
-    with output_lock(out):
+    with output_lock(out), _naming(model):
         outcome = stage.trace(declared, find_runs(runs), axis or (), out)
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
@@ -103,7 +105,7 @@ def close(
 
     output = Output(as_json, quiet)
     declared = load_joint_model(model)
-    with output_lock(out):
+    with output_lock(out), _naming(model):
         outcome = stage.close(declared, find_runs(runs), axis or (), out, seed)
     output.result(
         {"axes": list(outcome.results)},
@@ -113,6 +115,16 @@ def close(
     raise typer.Exit(
         output.failures([str(error) for error in outcome.errors], len(outcome.results))
     )
+
+
+@contextmanager
+def _naming(model: Path) -> Iterator[None]:
+    """Name the model's file in what is wrong with its declarations."""
+    try:
+        yield
+    except ConfigError as error:
+        msg = f"{model}: {error}"
+        raise ConfigError(msg) from error
 
 
 def _parameters(values: dict[str, float]) -> str:

@@ -234,12 +234,6 @@ def _inverse(gram: Floats) -> Floats:
     return inverse
 
 
-def fitted_error(normal: Normal) -> float:
-    """Sum of squared residuals of the fit to all groups."""
-    coefficients = solve(normal.gram.sum(axis=0), normal.moment.sum(axis=0))
-    return float(normal.power.sum() - coefficients @ normal.moment.sum(axis=0))
-
-
 def held_out_error(normal: Normal, ridged: int = 0) -> Floats:
     """Sum of squared residuals in each group of the fit to all other groups.
 
