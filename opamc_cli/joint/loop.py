@@ -1,5 +1,6 @@
 """Close the loop: find what the model lacks, add it, and open the sealed data once."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.form import slow_misfit
-from opamc_cli.joint.gate import Gate, decoy_likelihood, sealed_falls
+from opamc_cli.joint.gate import Gate, sealed_falls
 from opamc_cli.joint.model import Fit, Session, fit_terms
 from opamc_cli.joint.retraction import (
     confirmed,
@@ -17,11 +18,11 @@ from opamc_cli.joint.retraction import (
     without_imitations,
     without_trifles,
 )
+from opamc_cli.joint.rounds import Round, Rules
 from opamc_cli.joint.search import Candidate
 from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.joint.steps import Progress, Rejected, Step
-from opamc_cli.joint.trace import Untestable, ties_of, trace_residual
-from opamc_cli.joint.view import View
+from opamc_cli.joint.trace import Untestable, ties_of
 
 MOST_STEPS = 16
 ATTEMPTS = 3
@@ -100,19 +101,20 @@ def close_loop(
     Loop
     """
     gate = gate or Gate()
-    generator = np.random.default_rng(seed)
     seen_before = structures(before)
     progress = Progress()
     imitations: dict[str, str] = {}
+    first = Round(before, Rules(library, gate, np.random.default_rng(seed)))
     for _ in range(ATTEMPTS):
         progress.steps.clear()
         progress.nameless = None
-        fitted = before
+        last: Round = first
         while len(progress.steps) < most_steps:
-            step_fit = _round(fitted, library, imitations, gate, generator, progress)
-            if step_fit is None:
+            following = _taken(last, imitations, progress)
+            if following is None:
                 break
-            fitted = step_fit
+            last = following
+        fitted = last.fitted
         fitted, steps = pruned(fitted, before, progress)
         found = {step.term.effect.name for step in steps}
         fitted, steps = without_disagreement(before, fitted, steps, progress)
@@ -129,70 +131,54 @@ def close_loop(
     return _summary(before, fitted, tuple(steps), progress, seen_before, remains, seed)
 
 
-def _round(
-    fitted: Fit,
-    library: Library,
-    imitations: dict[str, str],
-    gate: Gate,
-    generator: np.random.Generator,
-    progress: Progress,
-) -> Fit | None:
-    session = fitted.session
-    traced = trace_residual(fitted, library, gate, imitations)
-    checked, views = traced.candidates, traced.views
+def _taken(current: Round, imitations: Mapping[str, str], progress: Progress) -> Round | None:
+    """Add the best candidate that passes the gate; return the round that follows, if any does."""
+    traced = current.traced(imitations)
+    checked, fitted = traced.candidates, current.fitted
     progress.untestable |= {entry.effect: entry for entry in traced.untestable}
     number = len(progress.steps)
-    for i in _by_merit(checked):
-        view = views[checked[i].term.effect.fast]
-        candidate = _beside_decoys(checked[i], fitted, view, gate, generator)
-        if candidate.why_not is not None:
-            checked[i] = candidate
-            continue
-        extended = fit_terms(session, (*fitted.terms, candidate.term))
-        effect = candidate.term.effect
-        if not effect.plausible(extended.coefficients[-1], candidate.term.parameters):
-            checked[i] = replace(candidate, why_not="fitted jointly, its sign is not physical")
-            continue
-        ties = ties_of(candidate, checked)
-        progress.steps.append(
-            Step(
-                term=candidate.term,
-                interpretation=effect.interpretation(candidate.term.parameters, session.fine.track),
-                gain=candidate.gain,
-                p_value=candidate.p_value,
-                decoy_gain=candidate.decoy_gain,
-                t_value=candidate.t_value,
-                consistency=candidate.consistency,
-                ties=ties,
-                experiment=separating_experiment(effect.name, ties),
-                rmse_before_a=fitted.rmse(sealed=False),
-                rmse_after_a=extended.rmse(sealed=False),
+    try:
+        for i in _by_merit(checked):
+            candidate = current.beside_decoys(checked[i])
+            if candidate.why_not is not None:
+                checked[i] = candidate
+                continue
+            following = current.following(candidate)
+            extended = following.fitted
+            effect = candidate.term.effect
+            if not effect.plausible(extended.coefficients[-1], candidate.term.parameters):
+                checked[i] = replace(candidate, why_not="fitted jointly, its sign is not physical")
+                continue
+            ties = ties_of(candidate, checked)
+            track = fitted.session.fine.track
+            progress.steps.append(
+                Step(
+                    term=candidate.term,
+                    interpretation=effect.interpretation(candidate.term.parameters, track),
+                    gain=candidate.gain,
+                    p_value=candidate.p_value,
+                    decoy_gain=candidate.decoy_gain,
+                    t_value=candidate.t_value,
+                    consistency=candidate.consistency,
+                    ties=ties,
+                    experiment=separating_experiment(effect.name, ties),
+                    rmse_before_a=fitted.rmse(sealed=False),
+                    rmse_after_a=extended.rmse(sealed=False),
+                )
             )
-        )
-        checked[i] = candidate
-        _collect(progress, number, checked, candidate)
-        return extended
-    for candidate in checked:
-        if candidate.imitates is not None:
-            view = views[candidate.term.effect.fast]
-            tested = replace(candidate, why_not=None)
-            if _beside_decoys(tested, fitted, view, gate, generator).why_not is None:
-                progress.nameless = candidate
-            break
-    _collect(progress, number, checked, None)
-    return None
-
-
-def _beside_decoys(
-    candidate: Candidate, fitted: Fit, view: View, gate: Gate, generator: np.random.Generator
-) -> Candidate:
-    """Compare a candidate with decoys; they are costly, so only what passes all else comes here."""
-    decoy = decoy_likelihood(fitted, view, candidate, generator, gate.decoys)
-    share = decoy / max(candidate.likelihood, 1e-300)
-    candidate = replace(candidate, decoy_gain=candidate.gain * share)
-    if candidate.likelihood < gate.decoy_ratio * decoy:
-        return replace(candidate, why_not="a decoy of the same form does half as well")
-    return candidate
+            checked[i] = candidate
+            _collect(progress, number, checked, candidate)
+            return following
+        for candidate in checked:
+            if candidate.imitates is not None:
+                tested = replace(candidate, why_not=None)
+                if current.beside_decoys(tested).why_not is None:
+                    progress.nameless = candidate
+                break
+        _collect(progress, number, checked, None)
+        return None
+    finally:
+        current.rest()
 
 
 def _by_merit(checked: list[Candidate]) -> list[int]:

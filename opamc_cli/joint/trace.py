@@ -1,6 +1,5 @@
 """Trace a residual to its cause: every effect's best form, gated, and compared."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,7 +57,6 @@ def trace_residual(
     fitted: Fit,
     library: Library,
     gate: Gate | None = None,
-    imitations: Mapping[str, str] | None = None,
 ) -> Traced:
     """Try every effect of a library on what a fit leaves.
 
@@ -70,9 +68,6 @@ def trace_residual(
         Effects to try; those that the model holds are left out unless they may come twice.
     gate : Gate, optional
         What a candidate must show.
-    imitations : dict of str to str, optional
-        Effects whose forms have been found wrong, and why. They are not added again, but have been
-        weighed: what is of their form is of a form that the library knows.
 
     Returns
     -------
@@ -110,8 +105,7 @@ def trace_residual(
         tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
         if tested.p_value <= gate.largest_p:
             tested = replace(tested, consistency=consistency(session, view, candidate))
-        wrong = (imitations or {}).get(tested.term.effect.name)
-        why = wrong or refusal(tested, gate) or pressed_limit(session, view, tested)
+        why = refusal(tested, gate) or pressed_limit(session, view, tested)
         why = why or disagreement(view, tested.term)
         if why is None:
             slow = views[False]
