@@ -86,3 +86,20 @@ def test_averages_over_few_pairs_still_make_a_filter():
     taps = autoregression(values, valid)
     covariance = implied_covariance(taps, 40)
     assert np.linalg.eigvalsh(toeplitz(covariance))[0] > 0
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+def test_columns_are_whitened_one_by_one_whatever_their_layout(order):
+    rng = np.random.default_rng(6)
+    columns = np.asarray(rng.normal(size=(900, 3)), order=order)
+    valid = gappy(rng, 900, 60, 20)
+    taps = autoregression(lfilter([1], [1, -0.8], rng.normal(size=900)), valid)
+    whitening = whitening_with_gaps(taps, valid, ((0, 400), (400, 900)), valid)
+    full = np.convolve(columns[:, 1], taps)[:900][whitening.rows]
+    full[whitening.late] = whitening.filters @ columns[:, 1]
+    white = whitening(columns)
+    assert white.shape == (whitening.rows.size, 3)
+    np.testing.assert_allclose(white[:, 1], full, rtol=0, atol=1e-12)
+    np.testing.assert_array_equal(white[:, 1], whitening(columns[:, 1]))
+    nothing = whitening_with_gaps(taps, valid, ((0, 900),), np.zeros(900, dtype=bool))
+    assert nothing(columns).shape == (0, 3)
