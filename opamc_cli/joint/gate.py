@@ -205,7 +205,12 @@ def _excitation(normal: Normal, base: int) -> Floats:
 
 
 def decoy_likelihood(
-    fit: Fit, view: View, candidate: Candidate, generator: np.random.Generator, count: int
+    fit: Fit,
+    view: View,
+    candidate: Candidate,
+    generator: np.random.Generator,
+    count: int,
+    enough: float = np.inf,
 ) -> float:
     """Best likelihood that the same search finds where the candidate's effect is not.
 
@@ -227,6 +232,8 @@ def decoy_likelihood(
         For the signs.
     count : int
         Decoys.
+    enough : float
+        A decoy that reaches more is the last.
 
     Returns
     -------
@@ -250,6 +257,8 @@ def decoy_likelihood(
         found, _tried = search(fit.session, decoy, candidate.term.effect, shared=shared)
         if found is not None:
             worst = max(worst, found.likelihood)
+        if worst > enough:
+            break
     return worst
 
 

@@ -70,12 +70,13 @@ class Round:
         if name not in self._beside_decoys:
             gate = self._rules.gate
             view = self._view(candidate.fine)
+            enough = candidate.likelihood / gate.decoy_ratio
             decoy = decoy_likelihood(
-                self.fitted, view, candidate, self._rules.generator, gate.decoys
+                self.fitted, view, candidate, self._rules.generator, gate.decoys, enough
             )
             share = decoy / max(candidate.likelihood, 1e-300)
             tested = replace(candidate, decoy_gain=candidate.gain * share)
-            if candidate.likelihood < gate.decoy_ratio * decoy:
+            if decoy > enough:
                 tested = replace(tested, why_not="a decoy of the same form does half as well")
             self._beside_decoys[name] = tested
         return self._beside_decoys[name]

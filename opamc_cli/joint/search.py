@@ -18,6 +18,9 @@ from opamc_cli.joint.view import View, block_t_value
 
 SCORE_PER_PARAMETER = 6.0
 """What a free parameter must earn in log-likelihood ratio (BIC of some 400 samples)."""
+FINEST_STEP = 0.05
+"""Share of a parameter's first step below which nobody needs to know it, if besides the likelihood
+is the same."""
 BATCH_VALUES = 1_000_000
 """Values that are multiplied with the model's span at once: more would leave the cache."""
 
@@ -214,8 +217,9 @@ def _refined(
     champion = best
     keep = best.term.keep
 
-    def cost(values: Floats) -> float:
+    def cost(steps: Floats) -> float:
         nonlocal champion
+        values = start + steps * scale
         inside = np.clip(values, low, high)
         parameters = best.term.parameters | dict(zip(names, inside.tolist(), strict=True))
         top = -np.inf
@@ -228,27 +232,37 @@ def _refined(
         penalty = float(np.sum(np.abs(values - inside) / (high - low)))
         return -top + 1e3 * penalty if np.isfinite(top) else 1e12
 
-    simplex = np.tile(start, (len(names) + 1, 1))
-    for i, name in enumerate(names):
-        step = 0.15 * abs(start[i]) if name.endswith(("_speed", "_s", "_rad", "damping")) else 0.0
-        if name == "frequency_hz":
-            length = float(np.ptp(view.grid.track.time_s)) + 1e-9
-            step = 0.2 / length
-        elif name in ("place_rad",):
-            step = 0.3 * best.term.parameters.get("width_rad", high[i] - low[i])
-        elif name == "since_s":
-            step = (high[i] - low[i]) / 64
-        elif name == "resonance_hz":
-            step = 0.06 * start[i]
-        step = step or 0.05 * (high[i] - low[i])
-        simplex[i + 1, i] += step if start[i] + step < high[i] else -step
+    scale = np.array([_first_step(session, best, name, limits[name]) for name in names])
+    scale[start + scale >= high] *= -1
     minimize(
         cost,
-        start,
+        np.zeros(len(names)),
         method="Nelder-Mead",
-        options={"initial_simplex": simplex, "maxfev": 14 + 12 * len(names), "fatol": 0.3},
+        options={
+            "initial_simplex": np.vstack([np.zeros(len(names)), np.eye(len(names))]),
+            "maxfev": 14 + 12 * len(names),
+            "fatol": 0.3,
+            "xatol": FINEST_STEP,
+        },
     )
     return champion
+
+
+def _first_step(session: Session, best: Scored, name: str, limits: tuple[float, float]) -> float:
+    """How far from the best guess a parameter is varied first."""
+    low, high = limits
+    parameters = best.term.parameters
+    if name == "frequency_hz":
+        return 0.2 / (float(np.ptp(session.fine.track.time_s)) + 1e-9)
+    if name == "place_rad":
+        return 0.3 * parameters.get("width_rad", high - low)
+    if name == "since_s":
+        return (high - low) / 64
+    if name == "resonance_hz":
+        return 0.06 * parameters[name]
+    if name.endswith(("_speed", "_s", "_rad", "damping")) and parameters[name]:
+        return 0.15 * abs(parameters[name])
+    return 0.05 * (high - low)
 
 
 def _products(
