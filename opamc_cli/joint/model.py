@@ -16,6 +16,8 @@ from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, co
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 20_000
+COARSE_OF_LONG = 12_000
+"""Likewise of a long recording, of which a sample stands for all: every round costs as many."""
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
@@ -168,13 +170,16 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     sealed = whole_groups(track, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
     opened = Session(grid, grid, 1, grouping, groups, kept=Kept(storing=False))
-    return replace(_session(cut(track, pieces), grouping, groups), opened=opened)
+    session = _session(cut(track, pieces), grouping, groups, COARSE_OF_LONG)
+    return replace(session, opened=opened)
 
 
-def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Session:
+def _session(
+    track: Track, grouping: Grouping, groups: tuple[int, ...], coarse_samples: int = COARSE_SAMPLES
+) -> Session:
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
-    factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
+    factor = max(min(by_rate, inside // coarse_samples), 1)
     # With shorter blocks the whitening would amplify what the average has taken away.
     width = 1.0 / float(np.sum(track.kernel**2))
     factor = max(factor, int(0.8 * width), track.quiet)
