@@ -7,6 +7,7 @@ kind and the seed, not on the effect.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -147,7 +148,7 @@ def stops(rng: np.random.Generator, rate_hz: float, move: Move, *, repeat: bool)
         places = np.array([0.0, *rng.uniform(-1.5, 1.5, 40)])
     places = start + places[np.concatenate([[True], np.diff(places) != 0])]
     parts: list[tuple[Floats, Floats, Floats]] = []
-    for here, there in zip(places[:-1], places[1:], strict=True):
+    for here, there in pairwise(places):
         path = move(there - here, speed, steepest, rate_hz)
         parts.append((here + path.position, path.velocity, path.acceleration))
         rest = int(PAUSE_S * rate_hz * (1.0 if repeat else rng.uniform(0.5, 1.5)))
@@ -381,7 +382,9 @@ def record(motion: str, effect: str | None, strength: float, seed: int) -> Recor
     if effect is not None:
         own = np.random.default_rng([seed, list(EFFECTS).index(effect), 1])
         shape = EFFECTS[effect](joint, own, strength)
-        current += shape if effect == "time_delay" else strength * noise_a * shape / rest(shape, path)
+        current += (
+            shape if effect == "time_delay" else strength * noise_a * shape / rest(shape, path)
+        )
     position = path.position
     if encoder_rad:
         position = np.round(position / encoder_rad) * encoder_rad

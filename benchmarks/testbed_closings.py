@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
-from testbed_closing import EFFECTS, SENSING, close_on_testbed, names_of, record
+from testbed_closing import EFFECTS, SENSING, close_on_testbed, error_on, names_of, record
+
+from opamc_cli.joint.track import Floats
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Closing:
     floor_a: float
 
 
-def close_one(effect: str, sensing: str, seed: int, floor_a: float) -> Closing:
+def close_one(effect: str, sensing: str, seed: int, healthy_a: Floats) -> Closing:
     """Switch an effect on and close the loop."""
     loop = close_on_testbed((effect,), sensing, seed)
     return Closing(
@@ -38,7 +40,7 @@ def close_one(effect: str, sensing: str, seed: int, floor_a: float) -> Closing:
         verdict=loop.verdict,
         before_a=loop.rmse_before_a,
         after_a=loop.rmse_after_a,
-        floor_a=floor_a,
+        floor_a=error_on(healthy_a, loop),
     )
 
 
@@ -74,12 +76,12 @@ def run(seeds: range, removed_seeds: range, *, verbose: bool) -> None:
         Print every closing that is not as it should be.
     """
     began = time.time()
-    floors: dict[tuple[str, int], float] = {}
+    healthy: dict[tuple[str, int], Floats] = {}
     wrong = silent = 0
     for sensing in SENSING:
         for seed in seeds:
             loop = close_on_testbed((), sensing, seed)
-            floors[sensing, seed] = loop.rmse_before_a
+            healthy[sensing, seed] = loop.before.residual_a
             wrong += bool(loop.steps)
             silent += loop.verdict == "nothing-missing"
             if verbose and loop.verdict != "nothing-missing":
@@ -96,7 +98,7 @@ def run(seeds: range, removed_seeds: range, *, verbose: bool) -> None:
     for effect in EFFECTS:
         record.cache_clear()
         for sensing in SENSING:
-            closings = [close_one(effect, sensing, s, floors[sensing, s]) for s in seeds]
+            closings = [close_one(effect, sensing, s, healthy[sensing, s]) for s in seeds]
             print_row(effect, sensing, closings)
             for seed, closing in zip(seeds, closings, strict=True):
                 as_it_should = closing.untestable or (closing.named and len(closing.added) == 1)

@@ -277,7 +277,7 @@ def sealed_falls(before: Fit, after: Fit) -> tuple[float, float]:
         in which something happened once does not judge: nothing open tells when.
     """
     session = before.opened.session
-    grid = session.fine
+    grid = session.sharp
     sealed = _judging(after)
     noise, known = noise_of(before, True, before.residual_a)
     taps = autoregression(noise, known)
@@ -299,7 +299,7 @@ def _in_one_group(session: Session, term: Term) -> bool:
 
 def _judging(fit: Fit) -> Bools:
     """Sealed samples, without the groups in which an effect began, if any are left."""
-    grid = fit.opened.session.fine
+    grid = fit.opened.session.sharp
     judging = grid.sealed.copy()
     for term in fit.terms:
         if "since_s" in term.parameters:

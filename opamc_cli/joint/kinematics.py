@@ -4,11 +4,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opamc_cli.joint.angle_filter import NOISE_SHARE
+from opamc_cli.joint.corners import clear_of_corners, widened
 from opamc_cli.joint.groups import cycle_length
 from opamc_cli.joint.half_turns import lost, without_slips
 from opamc_cli.joint.phase_angle import PhaseAngle
 from opamc_cli.joint.phases import follow_phases
 from opamc_cli.joint.smoothing import (
+    SHORTEST_WINDOW,
     averaging_kernel,
     blurred,
     derivatives,
@@ -16,7 +19,7 @@ from opamc_cli.joint.smoothing import (
     noise_gain,
     quiet_block,
     smoothing_window,
-    unfollowed,
+    taken_noise_gain,
     unstepped,
 )
 from opamc_cli.joint.torque_axis import side_of_torque, torque_current
@@ -84,8 +87,9 @@ class Motion:
         Samples over which the acceleration's noise averages to almost nothing.
     blur : array of shape (n, 2) or None
         What the acceleration would gain or lose by a third and by three times the window.
-    corner : bool array of shape (n,) or None
-        Samples whose acceleration a corner of the motion spoils.
+    taken_noise : float
+        Standard deviation of the noise in what the window would take from the acceleration a
+        second time; 0 where it is not known.
     """
 
     position_rad: Floats
@@ -96,7 +100,7 @@ class Motion:
     kernel: Floats
     quiet: int = 1
     blur: Floats | None = None
-    corner: Bools | None = None
+    taken_noise: float = 0.0
     evenly_smooth: bool = False
 
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
@@ -153,15 +157,15 @@ def motion_from_position(
                 averaging_kernel(own, 1),
                 quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
                 blurred(speed, rate_hz, own, 1),
-                unfollowed(speed, rate_hz, own, 1),
+                measurement_noise(speed) * taken_noise_gain(rate_hz, own, 1),
             )
     noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
     kernel = averaging_kernel(window, 2)
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
     blur = blurred(position_rad, rate_hz, window, 2)
-    corner = unfollowed(position_rad, rate_hz, window, 2)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, corner)
+    taken = measurement_noise(position_rad) * taken_noise_gain(rate_hz, window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
 
 
 def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
@@ -176,8 +180,8 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     spread = float(np.std(acceleration))
     quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
     blur = blurred(velocity_rad_s, rate_hz, window, 1)
-    corner = unfollowed(velocity_rad_s, rate_hz, window, 1)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, corner)
+    taken = measurement_noise(velocity_rad_s) * taken_noise_gain(rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -188,7 +192,7 @@ def direction_of(motion: Motion) -> Floats:
 
 
 def moving_samples(motion: Motion, usable: Bools) -> Bools:
-    """Tell the samples in motion: fast enough, half a window from any reversal, not at a corner.
+    """Tell the samples in motion: fast enough, half a window from any reversal.
 
     Parameters
     ----------
@@ -208,21 +212,9 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     uncertain[1:] |= direction[1:] != direction[:-1]
     moving: Bools = usable & ~widened(uncertain, half)
     moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
-    if motion.corner is not None:
-        moving &= ~motion.corner
     moving[:half] = False
     moving[speeds.size - half :] = False
     return moving
-
-
-def widened(rows: Bools, reach: int) -> Bools:
-    """Rows that are true, or nearer than `reach` to one that is."""
-    change = np.zeros(rows.size + 1, dtype=np.int64)
-    at = np.flatnonzero(rows)
-    np.add.at(change, np.maximum(at - reach, 0), 1)
-    np.add.at(change, np.minimum(at + reach + 1, rows.size), -1)
-    wide: Bools = np.cumsum(change[:-1]) > 0
-    return wide
 
 
 def filled(values: Floats) -> Floats:
@@ -294,6 +286,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         angle_kind=pieces[0].angle_kind,
         direction=join("direction"),
         moving=np.concatenate([piece.moving for piece in pieces]),
+        clear=np.concatenate([piece.clear for piece in pieces]),
         group=np.full(n, -1, dtype=np.int64),
         load_a=np.zeros(n),
         model_a=np.zeros(n),
@@ -394,6 +387,13 @@ def _one(recording: Recording, joint: Joint) -> Track:
     if temperature is not None:
         channels |= {"temperature"}
     n = motion.velocity.size
+    moving = moving_samples(motion, usable)
+    clear = clear_of_corners(
+        motion.acceleration, current, moving, motion.kernel, motion.taken_noise
+    )
+    if motion.window <= SHORTEST_WINDOW:
+        # The coarse grid has no counterpart for so short an average.
+        moving &= clear
     return Track(
         rate_hz=rate,
         bounds=((0, n),),
@@ -406,7 +406,8 @@ def _one(recording: Recording, joint: Joint) -> Track:
         machine_angle_rad=machine,
         angle_kind=angle_kind,
         direction=direction_of(motion),
-        moving=moving_samples(motion, usable),
+        moving=moving,
+        clear=clear,
         group=np.full(n, -1, dtype=np.int64),
         load_a=np.zeros(n),
         model_a=np.zeros(n),
@@ -431,5 +432,7 @@ def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
         0.0,
         phase_angle.kernel,
         blur=phase_angle.blur * scale,
+        # So the bandwidth was chosen.
+        taken_noise=NOISE_SHARE * scale * float(np.std(phase_angle.acceleration_rad_s2)),
         evenly_smooth=True,
     )

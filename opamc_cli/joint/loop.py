@@ -229,7 +229,7 @@ def _confirmed_nameless(before: Fit, progress: Progress) -> str | None:
 
 def _r2(fitted: Fit) -> float:
     opened = fitted.opened
-    grid = opened.session.fine
+    grid = opened.session.sharp
     current = grid.track.current_a[grid.sealed]
     power = float(np.sum((current - current.mean()) ** 2))
     rest = float(np.sum(opened.residual_a[grid.sealed] ** 2))

@@ -6,7 +6,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.corners import clear_of_corners
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
 from opamc_cli.joint.kept import Kept
@@ -88,8 +87,6 @@ class Session:
         Groups that may be looked at before the end.
     kept : Kept
         What fits share.
-    clear : bool array of shape (n,) or None
-        Fine samples at which fast effects are looked for; None where those are all.
     """
 
     fine: Grid
@@ -99,15 +96,17 @@ class Session:
     fit_groups: tuple[int, ...]
     opened: "Session | None" = None
     kept: Kept = field(default_factory=Kept, repr=False, compare=False)
-    clear: Bools | None = None
 
     @cached_property
     def sharp(self) -> Grid:
-        """The fine grid without the samples that the smoothing of the motion has spoilt."""
-        if self.clear is None:
-            return self.fine
+        """The fine grid without the samples whose acceleration the smoothing has spoilt.
+
+        All samples are fitted, since some effects live there; residuals are looked at on these.
+        """
         track = self.fine.track
-        track = replace(track, moving=track.moving & self.clear)
+        if track.clear[self.fine.fit | self.fine.sealed].all():
+            return self.fine
+        track = replace(track, moving=track.moving & track.clear)
         return _grid(track, self.fit_groups, self.grouping.sealed)
 
     def columns(self, term: Term, fine: bool) -> Floats:
@@ -186,8 +185,7 @@ def _session(
     coarse_track = coarsen(track, factor)
     fine = _grid(track, groups, grouping.sealed)
     coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
-    clear = None if coarse is fine else clear_of_corners(track)
-    return Session(fine, coarse, factor, grouping, groups, clear=clear)
+    return Session(fine, coarse, factor, grouping, groups)
 
 
 def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
@@ -242,7 +240,7 @@ class Fit:
     def rmse(self, sealed: bool) -> float:
         """Root mean square residual on the open or on the sealed samples."""
         fit = self.opened if sealed else self
-        grid = fit.session.fine
+        grid = fit.session.sharp
         values = fit.residual_a[grid.sealed if sealed else grid.fit]
         return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 

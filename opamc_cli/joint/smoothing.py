@@ -1,21 +1,17 @@
 """Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
 
 import numpy as np
-from scipy.ndimage import binary_closing
 from scipy.signal import savgol_coeffs, savgol_filter
 
-from opamc_cli.joint.track import Bools, Floats, averaged
+from opamc_cli.joint.track import Floats
 
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
 ALLOWED_NOISE_SHARE = 0.01
 QUIET_NOISE_SHARE = 0.0025
-ALLOWED_CORNER_SHARE = 0.05
-"""Error of a derivative, as a share of its spread, that a corner may cause and be overlooked."""
-CERTAIN = 5.0
-"""Standard deviations of a derivative's noise."""
-MOST_CORNERS = 1 / 3
+ROUNDING = 1e-12
+"""Share of the largest value below which a difference is the computer's rounding."""
 
 
 def measurement_noise(path: Floats) -> float:
@@ -30,10 +26,11 @@ def measurement_noise(path: Floats) -> float:
     -------
     float
         Robust estimate in the path's unit (median absolute difference; the sum of squares of
-        the fourth difference's weights 1, -4, 6, -4, 1 is 70).
+        the fourth difference's weights 1, -4, 6, -4, 1 is 70). Where a path in steps of an
+        encoder hardly changes from sample to sample, most differences are none: they do not count.
     """
     differences = np.diff(path, 4)
-    changed = differences[differences != 0] if np.any(differences) else differences
+    changed = differences[np.abs(differences) > ROUNDING * np.max(np.abs(path))]
     return float(np.median(np.abs(changed)) / 0.6745 / np.sqrt(70.0)) if changed.size else 0.0
 
 
@@ -139,39 +136,27 @@ def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Float
     )
 
 
-def unfollowed(path: Floats, rate_hz: float, window: int, derivative: int) -> Bools:
-    """Tell the samples whose window holds a corner that no cubic can follow.
-
-    At a step of the acceleration the derivative is wrong by up to half the step, half a window to
-    each side. What the window takes from the derivative is about what it would take a second time
-    (Tukey's twicing): there, more than its noise.
+def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
+    """Compute the standard deviation of what a window takes from a derivative a second time.
 
     Parameters
     ----------
-    path : array of shape (n,)
-        Position or speed, n >= window.
     rate_hz : float
         Sampling rate.
-    window, derivative : int
-        Of the local polynomial.
+    window : int
+        Odd number of samples.
+    derivative : int
+        1 or 2.
 
     Returns
     -------
-    bool array of shape (n,)
-        None true where it would be more than a third of the moving path: that is no corner, but
-        the path's nature.
+    float
+        For a path that is white noise of unit deviation.
     """
-    values = derivatives(path, rate_hz, window, derivative)
-    taken = values - averaged(values, ((0, path.size),), averaging_kernel(window, derivative))
-    noise = measurement_noise(path) * noise_gain(rate_hz, window, derivative)
-    limit = max(ALLOWED_CORNER_SHARE * float(np.std(values)), CERTAIN * noise)
-    # At the corner itself nothing is taken, on its two sides the more.
-    found: Bools = binary_closing(np.abs(taken) > limit, np.ones(window // 2 + 1))
-    moves = np.abs(derivatives(path, rate_hz, window, derivative - 1))
-    moving = moves > 0.02 * float(np.quantile(moves, 0.98))
-    if np.count_nonzero(found & moving) > MOST_CORNERS * np.count_nonzero(moving):
-        return np.zeros(path.size, dtype=bool)
-    return found
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
+    half = (twice.size - kernel.size) // 2
+    return float(np.linalg.norm(np.pad(kernel, half) - twice))
 
 
 def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivative: int) -> int:

@@ -22,6 +22,7 @@ SAMPLED = (
     "machine_angle_rad",
     "direction",
     "moving",
+    "clear",
     "group",
     "load_a",
     "model_a",
@@ -66,6 +67,10 @@ class Track:
         -1, 0 or 1; 0 where the joint is too slow to tell.
     moving : bool array of shape (n,)
         Samples that count: the joint moves and its direction is certain.
+    clear : bool array of shape (n,)
+        Samples at which the smoothing of the motion takes nothing from the acceleration. On the
+        coarse grid, where the current is equally smooth, others count as well; at the full rate
+        residuals are looked at on these.
     group : int array of shape (n,)
         Cycle, recording or block that is left out as one; -1 outside all of them.
     load_a, model_a : array of shape (n,)
@@ -107,6 +112,7 @@ class Track:
     angle_kind: str
     direction: Floats
     moving: Bools
+    clear: Bools
     group: Ints
     load_a: Floats
     model_a: Floats
@@ -256,6 +262,7 @@ def coarsen(track: Track, factor: int) -> Track:
         bounds.append((offset, offset + blocks))
         offset += blocks
     group = mean(track.group.astype(float))
+    clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
     moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
     period = track.period_samples
@@ -272,6 +279,7 @@ def coarsen(track: Track, factor: int) -> Track:
         machine_angle_rad=mean(track.machine_angle_rad),
         direction=np.sign(mean(track.direction)),
         moving=moving,
+        clear=clear,
         group=np.where(whole, group, -1).astype(np.int64),
         load_a=mean(track.load_a),
         model_a=mean(track.model_a),

@@ -35,13 +35,17 @@ def test_binned_transform_is_the_plain_sum_over_the_angle(units):
     unit, residual = units[0], white[0]
     pieces = strokes(unit.fine, unit.fine_rows & (residual != 0))
     samples = sum(np.count_nonzero(residual[start:stop]) for start, stop in pieces)
-    for k in range(0, spectra.orders.size, spectra.orders.size // 7):
+    errors = []
+    for k in range(0, spectra.orders.size, spectra.orders.size // 40):
         plain = 0.0
         for start, stop in pieces:
             angle = unit.fine.machine_angle_rad[start:stop]
             turned = np.exp(-1j * spectra.orders[k] * angle)
             plain += abs(np.sum(residual[start:stop] * turned)) ** 2
-        assert spectra.before[0, k] == pytest.approx(plain / samples, rel=0.1, abs=0.05)
+        errors.append(abs(spectra.before[0, k] - plain / samples) / max(plain / samples, 0.5))
+    # At the highest orders a bin is a sixteenth of a wave: single ones may be off by more.
+    assert np.mean(errors) < 0.05
+    assert np.max(errors[:20]) < 0.1
     assert spectra.before.mean() == pytest.approx(1.0, abs=0.1)
 
 

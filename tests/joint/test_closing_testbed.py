@@ -7,10 +7,17 @@ anything was run on it.
 
 import numpy as np
 import pytest
-from testbed_closing import EFFECTS, SENSING, close_on_testbed, declared_on_testbed, names_of
+from testbed_closing import (
+    EFFECTS,
+    SENSING,
+    close_on_testbed,
+    declared_on_testbed,
+    error_on,
+    names_of,
+)
 
 from opamc_cli.joint.loop import Loop
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Floats, Joint
 
 SEED = 100
 
@@ -31,14 +38,14 @@ def cases():
 
 
 @pytest.fixture(scope="session")
-def floors() -> dict[str, float]:
-    """Sealed error of the healthy joint, by what is logged."""
-    return {sensing: close_on_testbed((), sensing, SEED).rmse_before_a for sensing in SENSING}
+def healthy() -> dict[str, Floats]:
+    """Residual of the joint that lacks nothing, by what is logged."""
+    return {sensing: declared_on_testbed(sensing, SEED).residual_a for sensing in SENSING}
 
 
-def fall(loop: Loop, floor: float) -> float:
-    """Share of the sealed mean square above the floor that is gone."""
-    excess = loop.rmse_before_a**2 - floor**2
+def fall(loop: Loop, healthy_a: Floats) -> float:
+    """Share of the sealed mean square above that of the healthy joint that is gone."""
+    excess = loop.rmse_before_a**2 - error_on(healthy_a, loop) ** 2
     return float((loop.rmse_before_a**2 - loop.rmse_after_a**2) / excess)
 
 
@@ -50,7 +57,7 @@ def test_nothing_is_added_to_a_healthy_joint(sensing):
 
 
 @pytest.mark.parametrize(("effect", "sensing"), list(cases()))
-def test_the_missing_effect_is_found_alone(effect, sensing, floors):
+def test_the_missing_effect_is_found_alone(effect, sensing, healthy):
     loop = close_on_testbed((effect,), sensing, SEED)
     assert len(loop.steps) == 1
     if effect in TIED:
@@ -59,7 +66,7 @@ def test_the_missing_effect_is_found_alone(effect, sensing, floors):
         assert loop.steps[0].term.effect.name == effect
     assert loop.verdict == "closed"
     assert loop.rmse_after_a < loop.rmse_before_a
-    assert fall(loop, floors[sensing]) > 0.85
+    assert fall(loop, healthy[sensing]) > 0.85
 
 
 @pytest.mark.parametrize(("effect", "sensing"), sorted(UNTESTABLE))
@@ -83,12 +90,12 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("pair", "sensing"), PAIRS)
-def test_two_missing_effects_are_both_found(pair, sensing, floors):
+def test_two_missing_effects_are_both_found(pair, sensing, healthy):
     loop = close_on_testbed(pair, sensing, SEED)
     for effect in pair:
         assert any(effect in names for names in names_of(loop))
     assert len(loop.steps) == 2
-    assert fall(loop, floors[sensing]) > 0.85
+    assert fall(loop, healthy[sensing]) > 0.85
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from opamc_cli.joint.smoothing import (
     derivatives,
     measurement_noise,
     smoothing_window,
-    unfollowed,
+    taken_noise_gain,
     unstepped,
 )
 from opamc_cli.joint.track import averaged
@@ -55,35 +55,20 @@ def test_clean_paths_get_the_shortest_window_and_noisy_ones_a_longer():
     assert smoothing_window(noisy, 1000.0) > 21
 
 
-def trapezoid(rate, step=0.0):
-    """Move with steps of the acceleration at 0.5, 1.5 and 2 s, its position rounded to `step`."""
-    t = np.arange(0, 2.5, 1 / rate)
-    acceleration = np.where(t < 0.5, 2.0, np.where((t >= 1.5) & (t < 2.0), -2.0, 0.0))
-    position = np.cumsum(np.cumsum(acceleration)) / rate**2
-    return t, acceleration, np.round(position / step) * step if step else position
+def test_noise_of_a_quantised_path_at_high_rate_is_not_the_rounding_of_the_computer():
+    # A hundred samples per step of the encoder: most fourth differences are rounding alone.
+    path = np.round(np.linspace(0.3, 0.4, 20_000) / 5e-4) * 5e-4
+    assert measurement_noise(path) > 1e-5
+    assert measurement_noise(np.linspace(0.3, 0.4, 20_000)) == 0.0
 
 
-@pytest.mark.parametrize(("rate", "step"), [(100.0, 0.0), (500.0, 1e-5), (1000.0, 2e-5)])
-def test_corners_of_a_trapezoidal_speed_are_told_and_nothing_else(rate, step):
-    t, acceleration, path = trapezoid(rate, step)
-    window = smoothing_window(path, rate)
-    corner = unfollowed(path, rate, window, 2)
-    wrong = np.abs(derivatives(path, rate, window, 2) - acceleration)
-    inside = slice(window, -window)
-    assert wrong[inside].max() > 0.5
-    assert wrong[inside][~corner[inside]].max() < 0.3
-    far = np.min(np.abs(t[:, None] - [0.5, 1.5, 2.0]), axis=1) > window / rate
-    assert not corner[far].any()
-    for at in (0.5, 1.5, 2.0):
-        assert corner[round(at * rate)]
-
-
-def test_a_smooth_move_has_no_corner_and_a_jerky_path_is_not_all_corners():
-    share = np.linspace(0, 1, 2000)
-    smooth = 10 * share**3 - 15 * share**4 + 6 * share**5
-    assert not unfollowed(smooth, 1000.0, 5, 2).any()
-    jerky = np.cumsum(np.cumsum(np.random.default_rng(3).choice([-1.0, 1.0], size=2000)))
-    assert not unfollowed(jerky, 1000.0, 21, 2).any()
+@pytest.mark.parametrize("derivative", [1, 2])
+def test_noise_of_what_a_window_takes_twice_is_that_of_noise_put_through_it(derivative):
+    noise = np.random.default_rng(4).normal(size=40_000)
+    values = derivatives(noise, 100.0, 21, derivative)
+    taken = values - averaged(values, ((0, noise.size),), averaging_kernel(21, derivative))
+    expected = taken_noise_gain(100.0, 21, derivative)
+    np.testing.assert_allclose(np.std(taken[50:-50]), expected, rtol=0.03)
 
 
 def test_steps_of_a_coarse_temperature_are_bridged():

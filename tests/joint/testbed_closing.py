@@ -4,6 +4,8 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
@@ -11,7 +13,7 @@ from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.model import Fit, open_session
 from opamc_cli.joint.recordings import grouped_track
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Floats, Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import AxisRecording, simulate
 
@@ -89,6 +91,15 @@ def close_on_testbed(
     """Close the loop on a session, with what `sensing` logs; what is missing is not declared."""
     fitted = declared_on_testbed(sensing, seed, names=names)
     return close_loop(fitted, built_in_library(without), seed)
+
+
+def error_on(healthy_a: Floats, loop: Loop) -> float:
+    """Error of a healthy session, from its residual, on the samples that judged another's loop.
+
+    Which samples corners of the motion spoil depends on the noise of the current.
+    """
+    sealed = loop.after.session.sharp.sealed
+    return float(np.sqrt(np.mean(healthy_a[sealed] ** 2)))
 
 
 def names_of(loop: Loop) -> list[set[str]]:

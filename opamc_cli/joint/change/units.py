@@ -116,8 +116,9 @@ def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bo
         coarse = coarsen(fine, factor)
         members = _cycles(fine, grouping.names) if cycles else [fine.group >= 0]
         for member in members:
-            rows = fine.moving & member
-            slow = block_mean(rows.astype(float), fine.bounds, factor) > 1 - 1e-9
+            moving = fine.moving & member
+            rows = moving & fine.clear
+            slow = block_mean(moving.astype(float), fine.bounds, factor) > 1 - 1e-9
             if np.count_nonzero(slow & coarse.moving) >= FEWEST_SAMPLES:
                 units.append(Unit(fine, coarse, factor, rows, slow & coarse.moving, after))
     return units
