@@ -7,6 +7,10 @@ from opamc_cli.joint.track import Floats, Track
 
 GUESSES = 32
 NEAR = 4
+MOSTLY = 0.9
+"""Share of what is open on one side of the step: a few samples more tell nothing of a payload."""
+LEAST_SIDE = 0.03
+"""Share of the open samples before or after the step."""
 
 
 class PayloadChange(Effect):
@@ -23,13 +27,12 @@ class PayloadChange(Effect):
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
-        first, last = float(track.time_s[0]), float(track.time_s[-1])
-        inside = np.linspace(first, last, GUESSES + 2)[1:-1]
-        return [{"since_s": float(time)} for time in inside]
+        first, last = _judgeable(track)
+        return [{"since_s": float(time)} for time in np.linspace(first, last, GUESSES)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """Anywhere in the session."""
-        return {"since_s": (float(track.time_s[0]), float(track.time_s[-1]))}
+        """Anywhere in the session, but not so close to its ends that one side tells nothing."""
+        return {"since_s": _judgeable(track)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Gravity's and inertia's regressors after the step."""
@@ -55,14 +58,22 @@ class PayloadChange(Effect):
         return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
 
     def in_one_group(self, track: Track, parameters: Parameters) -> bool:
-        """Whether all of what is open after the step, or before it, lies in one group."""
+        """Whether what is open after the step, or before it, lies in one group, nearly all."""
         rows = track.open_samples
         if rows is None:
             return False
         after = track.time_s[rows] >= parameters["since_s"]
         groups = track.group[rows]
-        return any(np.unique(groups[side]).size == 1 for side in (after, ~after))
+        counts = [np.bincount(groups[side], minlength=1) for side in (after, ~after)]
+        return any(bool(count.max() >= MOSTLY * count.sum()) for count in counts)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""
         return [(parameters | {"inertia": 0.0}, (0, 1))]
+
+
+def _judgeable(track: Track) -> tuple[float, float]:
+    """Find the times with enough of the open samples on both sides."""
+    rows = track.moving if track.open_samples is None else track.open_samples
+    first, last = np.quantile(track.time_s[rows], [LEAST_SIDE, 1 - LEAST_SIDE])
+    return float(first), float(last)
