@@ -9,7 +9,7 @@ from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.form import slow_misfit
-from opamc_cli.joint.gate import Gate, sealed_falls
+from opamc_cli.joint.gate import Gate, sealed_fall
 from opamc_cli.joint.model import Fit, Session, fit_terms
 from opamc_cli.joint.retraction import (
     confirmed,
@@ -127,7 +127,7 @@ def close_loop(
         imitations |= {name: progress.rejected[name].why for name in wrong}
     fitted, steps, remains = without_trifles(before, fitted, steps, remains, progress)
     # Only now, and only once, are the sealed groups looked at.
-    fitted, steps, remains = confirmed(before, fitted, steps, remains, progress)
+    fitted, steps, remains = confirmed(before, fitted, steps, remains, progress, gate)
     return _summary(before, fitted, tuple(steps), progress, seen_before, remains, seed)
 
 
@@ -223,8 +223,8 @@ def _confirmed_nameless(before: Fit, progress: Progress) -> str | None:
     if candidate is None:
         return None
     imitation = fit_terms(before.session, (*before.terms, candidate.term))
-    falls = sealed_falls(before, imitation)
-    return candidate.imitates if any(fall > 0 for fall in falls) else None
+    fall = sealed_fall(before, imitation)
+    return candidate.imitates if fall.plain > 0 or fall.likelihood > 0 else None
 
 
 def _r2(fitted: Fit) -> float:

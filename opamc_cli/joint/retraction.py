@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
+
 from opamc_cli.joint.coherence import disagreement
 from opamc_cli.joint.domains import Structure, ceiling, structures
 from opamc_cli.joint.form import imitations
-from opamc_cli.joint.gate import removal_gains, sealed_falls
+from opamc_cli.joint.gate import Gate, removal_gains, sealed_fall
 from opamc_cli.joint.model import Fit, fit_terms
 from opamc_cli.joint.steps import Progress, Step
 from opamc_cli.joint.view import prepare
@@ -14,6 +16,9 @@ TRIFLE_SHARE = 0.4
 PATCHWORK_KINDS = 3
 PATCHWORK_SHARE = 0.6
 PRUNE_GAIN = 0.003
+MOST_UNLUCKY = 6.0
+"""Rise of the sealed whitened error, in likelihood units. What a true effect that explains m there
+makes fall is m, give or take twice its root: below -5.3 one time in a hundred, whatever m is."""
 
 
 def pruned(fitted: Fit, before: Fit, progress: Progress) -> tuple[Fit, list[Step]]:
@@ -113,14 +118,19 @@ def confirmed(
     steps: list[Step],
     remains: list[Structure],
     progress: Progress,
+    gate: Gate,
 ) -> tuple[Fit, list[Step], list[Structure]]:
     """Take everything back where the sealed data do not bear it out.
 
     All steps stand or fall together: a choice among them would make the sealed data a part of
-    the search. Slow noise can hide a true fall of the plain error, and whitening an effect that
-    is slow itself, so that one of the two has to fall.
+    the search. Slow noise can hide a true fall of the plain error. The whitened one of a true
+    effect falls but for bad luck; it may rise by as much as the open data had beyond the gate.
     """
-    if not steps or any(error > 0 for error in sealed_falls(before, fitted)):
+    if not steps:
+        return fitted, steps, remains
+    fall = sealed_fall(before, fitted)
+    beyond = 2 * sum(np.log(gate.largest_p / max(step.p_value, 1e-300)) for step in steps)
+    if fall.plain > 0 or fall.likelihood > -min(float(beyond), MOST_UNLUCKY):
         return fitted, steps, remains
     return before, [], _given_up(before, steps, "does not hold on the sealed data", progress)
 

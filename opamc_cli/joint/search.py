@@ -41,6 +41,8 @@ class Candidate:
         Chi-square of the likelihood, times the numbers of guesses and of effects tried.
     gain, t_value, consistency : float
         Held-out fall of the mean square (share), t over blocks, share of groups better.
+    expected_consistency : float
+        Share that an effect of its size has at least, but for one time in six.
     contribution : array of shape (n,)
         Whitened, projected contribution, for comparison with others.
     why_not : str or None
@@ -59,6 +61,7 @@ class Candidate:
     gain: float = 0.0
     t_value: float = 0.0
     consistency: float = 0.0
+    expected_consistency: float = 1.0
     decoy_gain: float = 0.0
     why_not: str | None = None
     imitates: str | None = None

@@ -3,13 +3,15 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.stats import chi2
 
 from opamc_cli.joint.coherence import disagreement
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.flux import objection_of_flux
 from opamc_cli.joint.form import pressed_limit
-from opamc_cli.joint.gate import Gate, consistency, held_out, prepare_held, refusal
+from opamc_cli.joint.gate import Gate, held_out, prepare_held, refusal, with_consistency
 from opamc_cli.joint.model import Fit, Session
+from opamc_cli.joint.multiplicity import drawn_p_value
 from opamc_cli.joint.plain import Plain, plainer, score_plain
 from opamc_cli.joint.search import Candidate, search
 from opamc_cli.joint.view import View, prepare
@@ -102,9 +104,9 @@ def trace_residual(
     for candidate in found:
         view = views[candidate.fine]
         tested = held_out(fitted, candidate, held[candidate.fine])
-        tested = replace(tested, p_value=min(tested.p_value * max(trials, 1), 1.0))
+        tested = replace(tested, p_value=_p_value(session, view, tested, trials, gate))
         if tested.p_value <= gate.largest_p:
-            tested = replace(tested, consistency=consistency(session, view, candidate))
+            tested = with_consistency(session, view, tested)
         why = refusal(tested, gate) or pressed_limit(session, view, tested)
         why = why or disagreement(view, tested.term)
         if why is None:
@@ -122,6 +124,19 @@ def trace_residual(
             why = objection_of_flux(session, term.effect, term.parameters, tested.coefficients)
         checked.append(replace(tested, why_not=why))
     return Traced(checked, untestable, views)
+
+
+def _p_value(session: Session, view: View, candidate: Candidate, trials: int, gate: Gate) -> float:
+    """P-value among all that was tried: every guess counts, or, if that decides, what it adds."""
+    effect = candidate.term.effect
+    trials = max(trials, 1)
+    if effect.fast:
+        return min(candidate.p_value * trials * effect.choices(view.grid.track), 1.0)
+    p_value = min(candidate.p_value * trials, 1.0)
+    alone = float(chi2.sf(candidate.likelihood, candidate.coefficients.size))
+    if p_value > gate.largest_p and alone * trials <= gate.largest_p:
+        return min(p_value, drawn_p_value(session, view, candidate) * trials)
+    return p_value
 
 
 def _simplest_first(found: list[Candidate], library: Library, session: Session) -> None:

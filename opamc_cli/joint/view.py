@@ -8,15 +8,24 @@ from numpy.typing import NDArray
 
 from opamc_cli.joint.model import Fit, Grid
 from opamc_cli.joint.normal import solve
+from opamc_cli.joint.slow_noise import noise_model
 from opamc_cli.joint.span import orthonormal
 from opamc_cli.joint.track import Bools, Floats
-from opamc_cli.joint.whitening import Whitening, autoregression, whitening_with_gaps
+from opamc_cli.joint.whitening import (
+    NoiseModel,
+    Whitening,
+    autoregression,
+    whitening_with_gaps,
+)
 
 LEAST_DRIFT = 0.3
 BLOCKS_PER_GROUP = 8
 FEWEST_PAIRS = 3
 STEP_POWER = 4.0
 """Of the median: a difference of two cycles above holds more than noise."""
+AVERAGED = 16
+STEP_LEVEL = 8.0
+"""Of the least, averaged over a sixteenth of a cycle: slow noise alone was seen to reach 4.6."""
 
 
 @dataclass(frozen=True)
@@ -76,10 +85,9 @@ def prepare(fit: Fit, fine: bool, residual: Floats | None = None) -> View:
     session = fit.session
     grid = session.grid(fine)
     own = residual_on(fit, fine)
-    noise, known = noise_of(fit, fine, own)
-    taps = autoregression(noise, known)
     usable = grid.track.moving & (grid.track.group >= 0)
-    whitening = whitening_with_gaps(taps, usable, grid.track.bounds, grid.fit)
+    noise = noise_of(fit, fine, own)
+    whitening = whitening_with_gaps(noise, usable, grid.track.bounds, grid.fit)
     rows = whitening.rows
     valid = np.zeros_like(grid.fit)
     valid[rows] = True
@@ -118,8 +126,8 @@ def residual_on(fit: Fit, fine: bool) -> Floats:
     return residual
 
 
-def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
-    """Estimate what does not repeat in a residual, with the samples where that is known.
+def noise_of(fit: Fit, fine: bool, residual: Floats) -> NoiseModel:
+    """Estimate the colour of what does not repeat in a residual.
 
     Parameters
     ----------
@@ -132,14 +140,14 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
 
     Returns
     -------
-    noise, valid : arrays of shape (n,)
-        Half the difference of successive cycles (scaled to the noise's own variance) where the
-        motion repeats; else the residual itself.
+    NoiseModel
+        Of the difference of successive cycles where the motion repeats; else of the residual
+        itself, without a slow part: that might as well be an effect.
     """
     grid = fit.session.grid(fine)
     period = grid.track.period_samples
     if period is None:
-        return residual, grid.fit
+        return NoiseModel(autoregression(residual, grid.fit))
     noise = np.zeros_like(residual)
     valid = np.zeros_like(grid.fit)
     pairs: list[slice] = []
@@ -158,10 +166,12 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> tuple[Floats, Bools]:
         ]
     _leave_out_steps(noise, valid, pairs)
     if valid.sum() < 0.2 * grid.fit.sum():
-        return residual, grid.fit
+        return NoiseModel(autoregression(residual, grid.fit))
     if not fine:
         _remove_drift(fit, noise, valid)
-    return noise, valid
+    blocks = [fit.session.columns(term, fine) for term in fit.terms if not term.effect.fast]
+    columns = np.concatenate([np.zeros((noise.size, 0)), *blocks], axis=1)
+    return noise_model(noise, valid, pairs, columns)
 
 
 def _leave_out_steps(noise: Floats, valid: Bools, pairs: list[slice]) -> None:
@@ -173,8 +183,13 @@ def _leave_out_steps(noise: Floats, valid: Bools, pairs: list[slice]) -> None:
     if len(known) < FEWEST_PAIRS:
         return
     powers = np.array([np.mean(noise[pair][valid[pair]] ** 2) for pair in known])
-    for pair, power in zip(known, powers, strict=True):
-        if power > STEP_POWER * float(np.median(powers)):
+    width = max(max(pair.stop - pair.start for pair in known) // AVERAGED, 1)
+    kernel = np.ones(width) / width
+    slow = np.convolve(np.where(valid, noise, 0.0), kernel, mode="same")
+    levels = np.array([np.mean(slow[pair][valid[pair]] ** 2) for pair in known])
+    least = STEP_LEVEL * float(levels.min())
+    for pair, power, level in zip(known, powers, levels, strict=True):
+        if power > STEP_POWER * float(np.median(powers)) or level > least:
             valid[pair] = False
 
 

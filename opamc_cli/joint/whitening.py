@@ -1,15 +1,17 @@
 """What is left when the noise's colour is taken out: an autoregressive whitening filter."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz, toeplitz
 from scipy.sparse import csr_array
 
 from opamc_cli.joint.track import Bools, Floats
+from opamc_cli.joint.tracking import SlowPart, Tracking
 
 AR_ORDER = 10
 PAIRS_PER_TAP = 20
@@ -20,6 +22,40 @@ LOOK_BACK = 40
 """How far back the samples may lie that predict one after a gap."""
 LARGEST_ERROR = 1.5
 """Variance of a prediction, relative to that from p samples, above which it is of no use."""
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """A noise's fast part, by its whitening filter 1, -a_1, ..., -a_p, and its slow part."""
+
+    taps: Floats
+    slow: SlowPart | None = None
+
+
+def autocovariance(noise: Floats, valid: Bools, longest: int) -> tuple[Floats, Floats]:
+    """Autocovariance of a noise with gaps, by averages over the pairs that are there.
+
+    Parameters
+    ----------
+    noise : array of shape (n,)
+        Residual; samples that are not valid do not count.
+    valid : bool array of shape (n,)
+        Samples that count.
+    longest : int
+        Largest lag.
+
+    Returns
+    -------
+    covariance, counts : arrays of shape (longest + 1,)
+        Averages, and how many pairs each is of.
+    """
+    values = np.where(valid, noise, 0.0)
+    longest = min(longest, values.size - 1)
+    length = next_fast_len(values.size + longest, real=True)
+    spectra = (rfft(values, length), rfft(valid.astype(float), length))
+    sums, counts = (irfft(np.abs(one) ** 2, length)[: longest + 1] for one in spectra)
+    counts = np.round(counts)
+    return sums / np.maximum(counts, 1.0), counts
 
 
 def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats:
@@ -38,22 +74,28 @@ def autoregression(noise: Floats, valid: Bools, order: int = AR_ORDER) -> Floats
     -------
     array of shape (p + 1,)
         Taps 1, -a_1, ..., -a_p; p is the order, or less where there are too few samples.
+    """
+    return filter_of(*autocovariance(noise, valid, order))
+
+
+def filter_of(covariance: Floats, counts: Floats) -> Floats:
+    """Whitening filter of a noise with a given autocovariance, by the Yule-Walker equations.
+
+    Parameters
+    ----------
+    covariance, counts : arrays of shape (p + 1,)
+        From `autocovariance`; lags of which there are too few pairs, and those beyond, do not
+        count.
 
     References
     ----------
     Walker, Proceedings of the Royal Society A 131, 1931.
     """
-    values = np.where(valid, noise, 0.0)
-    weight = valid.astype(float)
-    known: list[float] = []
-    for lag in range(order + 1):
-        pairs = float(np.dot(weight[lag:], weight[: weight.size - lag]))
-        if pairs < PAIRS_PER_TAP * (lag + 1):
-            break
-        known.append(float(np.dot(values[lag:], values[: values.size - lag])) / pairs)
-    if len(known) < 2 or known[0] <= 0:
+    enough = counts >= PAIRS_PER_TAP * (np.arange(covariance.size) + 1)
+    known = covariance.size if enough.all() else int(np.argmin(enough))
+    covariance = covariance[:known].copy()
+    if known < 2 or covariance[0] <= 0:
         return np.ones(1)
-    covariance = np.array(known)
     # A floor under the noise: where there is none, misfits of 1/1000 would count as signals.
     covariance[0] *= 1 + FLOOR
     # Averages over different pairs need not be the covariance of any noise.
@@ -129,12 +171,15 @@ class Whitening:
         Which of them have not all of their last p samples.
     filters : sparse array of shape (late.size, n)
         Their own filters.
+    tracking : Tracking or None
+        Takes the noise's slow part out, if there is one.
     """
 
     taps: Floats
     rows: NDArray[np.int64]
     late: NDArray[np.int64]
     filters: csr_array
+    tracking: Tracking | None = None
 
     def __call__(self, values: Floats) -> Floats:
         """Whiten signals of shape (n,) or (n, m), at `rows`."""
@@ -144,6 +189,8 @@ class Whitening:
         for k in range(columns.shape[1]):
             signal = np.ascontiguousarray(columns[:, k], dtype=np.float64)
             _filter_rows(signal, self.taps, self.rows, self._runs, *own, white[:, k])
+        if self.tracking is not None:
+            self.tracking.take_out(white)
         return white.reshape((self.rows.size, *values.shape[1:]), order="F")
 
     @cached_property
@@ -185,7 +232,7 @@ def _filter_rows(
 
 
 def whitening_with_gaps(
-    taps: Floats, valid: Bools, bounds: tuple[tuple[int, int], ...], wanted: Bools
+    noise: NoiseModel, valid: Bools, bounds: tuple[tuple[int, int], ...], wanted: Bools
 ) -> Whitening:
     """Filter for every sample that those before it predict about as well as they can.
 
@@ -196,8 +243,8 @@ def whitening_with_gaps(
 
     Parameters
     ----------
-    taps : array of shape (p + 1,)
-        From `autoregression`.
+    noise : NoiseModel
+        Of what is to become white.
     valid : bool array of shape (n,)
         Samples that may predict.
     bounds : tuple of (int, int)
@@ -213,6 +260,7 @@ def whitening_with_gaps(
     Whitening
     """
     rows = np.flatnonzero(wanted)
+    taps = noise.taps
     order = taps.size - 1
     late = np.flatnonzero(~settled(valid, bounds, order)[rows])
     covariance = implied_covariance(taps, LOOK_BACK)
@@ -239,7 +287,13 @@ def whitening_with_gaps(
     late = (np.cumsum(kept) - 1)[late[kept[late]]]
     data = (np.concatenate(weights), np.concatenate(columns), edges)
     filters = csr_array(data, shape=(late.size, valid.size))
-    return Whitening(taps, rows[kept], late, filters)
+    fast = Whitening(taps, rows[kept], late, filters)
+    if noise.slow is None:
+        return fast
+    steps = np.diff(fast.rows, prepend=fast.rows[:1])
+    begins = np.searchsorted(fast.rows, [start for start, _ in bounds])
+    steps[begins[begins < steps.size]] = 0
+    return replace(fast, tracking=Tracking.of(noise.slow, steps, fast(np.ones(valid.size))))
 
 
 def _prediction(lags: NDArray[np.int64], covariance: Floats) -> Floats:

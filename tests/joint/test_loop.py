@@ -6,6 +6,7 @@ from closing import close_on, close_recording
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.gate import Gate
 from opamc_cli.joint.model import fit_terms
 from opamc_cli.joint.retraction import confirmed
 from opamc_cli.joint.steps import Progress, Step
@@ -118,7 +119,7 @@ def test_what_the_sealed_data_do_not_bear_out_is_taken_back():
     assert closed_error < open_error
     step = Step(term, "", 0.1, 1e-4, 0.0, 3.0, 1.0, (), None, open_error, closed_error)
     progress = Progress(steps=[step])
-    after, steps, _ = confirmed(before, fitted, [step], [], progress)
+    after, steps, _ = confirmed(before, fitted, [step], [], progress, Gate())
     assert steps == []
     assert after is before
     assert progress.rejected["warmup"].why == "does not hold on the sealed data"

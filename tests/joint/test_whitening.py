@@ -5,6 +5,7 @@ from scipy.signal import lfilter
 
 from opamc_cli.joint.whitening import (
     LOOK_BACK,
+    NoiseModel,
     autoregression,
     implied_covariance,
     settled,
@@ -42,7 +43,7 @@ def test_each_sample_is_predicted_from_the_valid_ones_before_it(pole):
     bounds = ((0, 1500), (1500, 4000))
     taps = autoregression(values, valid)
     wanted = valid & (np.arange(valid.size) % 3 == 0)
-    whitening = whitening_with_gaps(taps, valid, bounds, wanted)
+    whitening = whitening_with_gaps(NoiseModel(taps), valid, bounds, wanted)
     white, rows = whitening(values), whitening.rows
     assert np.count_nonzero(wanted) >= rows.size > 0.7 * np.count_nonzero(wanted)
     covariance = implied_covariance(taps, LOOK_BACK)
@@ -59,7 +60,7 @@ def test_what_follows_a_gap_is_as_white_as_the_rest():
     values = lfilter([1], [1, -0.95], rng.normal(size=60_000)) + rng.normal(size=60_000)
     valid = gappy(rng, values.size, 50, 12)
     taps = autoregression(values, valid)
-    whitening = whitening_with_gaps(taps, valid, ((0, values.size),), valid)
+    whitening = whitening_with_gaps(NoiseModel(taps), valid, ((0, values.size),), valid)
     white, rows = whitening(values), whitening.rows
     whole = settled(valid, ((0, values.size),), taps.size - 1)[rows]
     assert 0.2 < np.mean(whole) < 0.9
@@ -75,7 +76,7 @@ def test_implied_covariance_is_that_of_the_process():
 def test_without_taps_nothing_changes():
     values = np.random.default_rng(6).normal(size=(50, 2))
     valid = np.arange(50) % 7 != 3
-    whitening = whitening_with_gaps(np.ones(1), valid, ((0, 50),), valid)
+    whitening = whitening_with_gaps(NoiseModel(np.ones(1)), valid, ((0, 50),), valid)
     np.testing.assert_array_equal(whitening(values), values[valid])
 
 
@@ -94,12 +95,12 @@ def test_columns_are_whitened_one_by_one_whatever_their_layout(order):
     columns = np.asarray(rng.normal(size=(900, 3)), order=order)
     valid = gappy(rng, 900, 60, 20)
     taps = autoregression(lfilter([1], [1, -0.8], rng.normal(size=900)), valid)
-    whitening = whitening_with_gaps(taps, valid, ((0, 400), (400, 900)), valid)
+    whitening = whitening_with_gaps(NoiseModel(taps), valid, ((0, 400), (400, 900)), valid)
     full = np.convolve(columns[:, 1], taps)[:900][whitening.rows]
     full[whitening.late] = whitening.filters @ columns[:, 1]
     white = whitening(columns)
     assert white.shape == (whitening.rows.size, 3)
     np.testing.assert_allclose(white[:, 1], full, rtol=0, atol=1e-12)
     np.testing.assert_array_equal(white[:, 1], whitening(columns[:, 1]))
-    nothing = whitening_with_gaps(taps, valid, ((0, 900),), np.zeros(900, dtype=bool))
+    nothing = whitening_with_gaps(NoiseModel(taps), valid, ((0, 900),), np.zeros(900, dtype=bool))
     assert nothing(columns).shape == (0, 3)

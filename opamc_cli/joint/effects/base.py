@@ -83,6 +83,16 @@ class Effect:
         """
         return [{}]
 
+    def choices(self, track: Track) -> float:
+        """Count what each guess was chosen from, where the residual says where to guess.
+
+        Parameters
+        ----------
+        track : Track
+            As for the guesses.
+        """
+        return 1.0
+
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Bounds of the non-linear parameters that may be refined."""
         return {}

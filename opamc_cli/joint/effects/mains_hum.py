@@ -33,6 +33,11 @@ def _mains_lines(rate_hz: float) -> list[_Line]:
     return lines
 
 
+def _reach_hz(line: _Line) -> float:
+    """How far from a multiple of the mains' nominal frequency a line may lie."""
+    return max(TOLERANCE * line.true_hz, 0.1)
+
+
 class MainsHum(Effect):
     """A line at a multiple of 50 or 60 Hz, folded where the sampling rate is low.
 
@@ -47,7 +52,6 @@ class MainsHum(Effect):
     meaning = "mains pick-up in the current reading: check shielding and grounding"
     dense_guesses = True
     from_motion = True
-    free_refinement = False
     fast = True
     several = True
     static = False
@@ -58,7 +62,7 @@ class MainsHum(Effect):
         for turning, signals in standing_views(track, residual):
             frequencies, power = line_power(track, signals)
             for line in _mains_lines(track.rate_hz):
-                reach = max(TOLERANCE * line.true_hz, 0.1)
+                reach = _reach_hz(line)
                 first = int(np.searchsorted(frequencies, line.shown_hz - reach))
                 last = int(np.searchsorted(frequencies, line.shown_hz + reach, side="right"))
                 if last > first:
@@ -68,6 +72,12 @@ class MainsHum(Effect):
         return [
             {"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found[:2]
         ]
+
+    def choices(self, track: Track) -> float:
+        """Count the lines that the session's length can tell apart within the tolerance."""
+        resolution_hz = 1.0 / max(float(np.ptp(track.time_s)), 1e-9)
+        widths = [2 * _reach_hz(line) / resolution_hz for line in _mains_lines(track.rate_hz)]
+        return max(0.5 * sum(max(width, 1.0) for width in widths), 1.0)
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to the highest frequency that the rate can show."""
