@@ -10,6 +10,8 @@ SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
 ALLOWED_NOISE_SHARE = 0.01
 QUIET_NOISE_SHARE = 0.0025
+OFF_GRID = 0.05
+"""Share of a step by which a change may miss a multiple of it."""
 ROUNDING = 1e-12
 """Share of the largest value below which a difference is the computer's rounding."""
 
@@ -29,9 +31,22 @@ def measurement_noise(path: Floats) -> float:
         the fourth difference's weights 1, -4, 6, -4, 1 is 70). Where a path in steps of an
         encoder hardly changes from sample to sample, most differences are none: they do not count.
     """
-    differences = np.diff(path, 4)
-    changed = differences[np.abs(differences) > ROUNDING * np.max(np.abs(path))]
-    return float(np.median(np.abs(changed)) / 0.6745 / np.sqrt(70.0)) if changed.size else 0.0
+    rounding = ROUNDING * float(np.max(np.abs(path)))
+    differences = np.abs(np.diff(path, 4))
+    if _in_steps(path, rounding):
+        differences = differences[differences > rounding]
+    middle = float(np.median(differences)) if differences.size else 0.0
+    return middle / 0.6745 / np.sqrt(70.0) if middle > rounding else 0.0
+
+
+def _in_steps(path: Floats, rounding: float) -> bool:
+    """Whether all changes of a path are multiples of the least: a path in an encoder's steps."""
+    changes = np.abs(np.diff(path))
+    changes = changes[changes > rounding]
+    if not changes.size:
+        return False
+    steps = changes / changes.min()
+    return bool(np.quantile(np.abs(steps - np.round(steps)), 0.9) < OFF_GRID)
 
 
 def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:

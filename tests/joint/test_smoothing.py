@@ -1,7 +1,9 @@
 import numpy as np
 import pytest
+from simulator import simulate
 
 from opamc_cli.joint.smoothing import (
+    SHORTEST_WINDOW,
     averaging_kernel,
     derivatives,
     measurement_noise,
@@ -80,3 +82,11 @@ def test_steps_of_a_coarse_temperature_are_bridged():
     assert np.max(np.abs(unstepped(logged) - true)[inside]) < 0.05
     noisy = np.random.default_rng(0).normal(size=100)
     assert unstepped(noisy) is noisy
+
+
+def test_a_motion_that_is_measured_without_fault_has_no_noise():
+    # Corners of the acceleration, four in every move, are no noise, and a slow rate has few samples
+    # beside them.
+    made = simulate(22324, (), rate=100.0, kind="trapezoid")
+    assert measurement_noise(made.position) < 1e-8
+    assert smoothing_window(made.position, 100.0) == SHORTEST_WINDOW
