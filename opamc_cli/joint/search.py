@@ -21,6 +21,8 @@ SCORE_PER_PARAMETER = 6.0
 FINEST_STEP = 0.05
 """Share of a parameter's first step below which nobody needs to know it, if besides the likelihood
 is the same."""
+AS_WELL = 1.0
+"""In likelihood units."""
 BATCH_VALUES = 1_000_000
 """Values that are multiplied with the model's span at once: more would leave the cache."""
 
@@ -183,6 +185,7 @@ def search(
             same_form = result.term.keep == best.term.keep
             if same_form and result.term.parameters == settled_parameters:
                 best = result
+    best = _rescaled(session, view, effect, best)
     likelihood = best.score + SCORE_PER_PARAMETER * (best.coefficients.size + len(limits))
     tried = max(len(guesses), 1)
     # Guesses that lie close together pay for the choice by their number; others do not.
@@ -266,6 +269,16 @@ def _first_step(session: Session, best: Scored, name: str, limits: tuple[float, 
     if name.endswith(("_speed", "_s", "_rad", "damping")) and parameters[name]:
         return 0.15 * abs(parameters[name])
     return 0.05 * (high - low)
+
+
+def _rescaled(session: Session, view: View, effect: Effect, best: Scored) -> Scored:
+    """Move into the parameters what they can take of the coefficients, if that fits as well."""
+    parameters = effect.rescaled(best.term.parameters, best.coefficients)
+    if parameters != best.term.parameters:
+        for result in _evaluate(session, view, effect, parameters):
+            if result.term.keep == best.term.keep and result.score > best.score - AS_WELL:
+                return result
+    return best
 
 
 def _products(

@@ -129,6 +129,10 @@ class Effect:
         """Parameters moved to a value with a meaning where the data cannot tell the difference."""
         return parameters
 
+    def rescaled(self, parameters: Parameters, coefficients: Floats) -> Parameters:
+        """Parameters that do with coefficients of 1 what these do with others, where they can."""
+        return parameters
+
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say what the effect with these parameters means to a maintainer."""
         return self.meaning

@@ -66,6 +66,10 @@ class TimeDelay(Effect):
         """
         return bool(0.6 < coefficients[0] < 1.7)
 
+    def rescaled(self, parameters: Parameters, coefficients: Floats) -> Parameters:
+        """Lengthen the delay: short ones differ by their size alone."""
+        return parameters | {"delay_s": parameters["delay_s"] * float(coefficients[0])}
+
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Name the filter, where it is one."""
         if not parameters.get("filtered"):
