@@ -357,7 +357,9 @@ def _one(recording: Recording, joint: Joint) -> Track:
                 motion = motion.later(lag_s, rate)
         else:
             electrical = phase_angle.angle_rad
-        current, current_d = torque_current(phases, electrical, motion.velocity)
+        current, current_d = torque_current(
+            phases, electrical, motion.velocity, motion.position_rad
+        )
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
             current, current_d = side * current, side * current_d

@@ -9,10 +9,12 @@ from opamc_cli.joint.phases import current_vector
 from opamc_cli.joint.track import Floats
 
 SIDE_ROUNDS = 8
+SLOWEST_SHARE = 0.05
+"""Of the top speed: slower, friction has no certain direction."""
 
 
 def torque_current(
-    phases_a: Floats, electrical_rad: Floats, velocity: Floats
+    phases_a: Floats, electrical_rad: Floats, velocity: Floats, position_rad: Floats
 ) -> tuple[Floats, Floats]:
     """Split the current along and across the electrical angle.
 
@@ -22,8 +24,10 @@ def torque_current(
         Phase currents.
     electrical_rad : array of shape (n,)
         Electrical angle of the torque axis.
-    velocity : array of shape (n,)
-        Speed; the sign is taken so that the current does work on average: friction resists.
+    velocity, position_rad : array of shape (n,)
+        Of the motion, in any unit. The sign is taken so that friction resists: of the torque, what
+        depends on the direction and the speed, beside a smooth function of the position, does
+        work. The whole torque need not, where gravity is large and the path is not closed.
 
     Returns
     -------
@@ -31,8 +35,31 @@ def torque_current(
     """
     rotated = current_vector(phases_a) * np.exp(-1j * electrical_rad)
     torque = rotated.real
-    side = 1.0 if float(np.dot(torque, np.sign(velocity))) >= 0 else -1.0
+    speeds = np.abs(velocity)
+    moving = speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
+    columns = np.concatenate([_frictions(velocity), _powers(position_rad)], axis=1)[moving]
+    friction = _frictions(velocity)[moving] @ _fitted(columns, torque[moving])[:2]
+    side = 1.0 if float(np.dot(friction, velocity[moving])) >= 0 else -1.0
     return side * torque, side * rotated.imag
+
+
+def _frictions(velocity: Floats) -> Floats:
+    """Dry and lubricant friction."""
+    return np.stack([np.sign(velocity), velocity], axis=1)
+
+
+def _powers(position: Floats) -> Floats:
+    """Lowest powers of the position, for whatever holds the joint in place."""
+    place = position / max(float(np.ptp(position)), 1e-9) * 2
+    place = place - place.mean()
+    return np.stack([place**k for k in range(4)], axis=1)
+
+
+def _fitted(columns: Floats, values: Floats) -> Floats:
+    """Least squares, whatever the columns' units are."""
+    scale = np.sqrt(np.mean(columns**2, axis=0)) if columns.size else np.ones(columns.shape[1])
+    scaled = columns / (scale + 1e-300)
+    return solve(scaled.T @ scaled, scaled.T @ values) / (scale + 1e-300)
 
 
 def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
@@ -61,12 +88,10 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     if not pieces:
         return np.ones(torque_a.size)
     speed = angle.velocity_rad_s
-    moving = angle.strong & (np.abs(speed) > 0.05 * float(np.quantile(np.abs(speed), 0.98)))
-    place = angle.angle_rad / max(float(np.ptp(angle.angle_rad)), 1e-9) * 2
-    place = place - place.mean()
-    columns = np.stack(
-        [np.sign(speed), speed, angle.acceleration_rad_s2, *(place**k for k in range(4))], axis=1
-    )
+    slowest = SLOWEST_SHARE * float(np.quantile(np.abs(speed), 0.98))
+    moving = angle.strong & (np.abs(speed) > slowest)
+    inertia = angle.acceleration_rad_s2[:, None]
+    columns = np.concatenate([_frictions(speed), inertia, _powers(angle.angle_rad)], axis=1)
     columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
     sides = []
     grams, moments = [], []

@@ -17,7 +17,7 @@ from opamc_cli.joint.track import Joint
 def test_torque_current_keeps_its_sign_through_zeros_and_reversals(seed):
     made = simulate(seed, rate=2048.0)
     angle = follow_phases(made.phases, made.rate_hz)
-    torque, _ = torque_current(made.phases, angle.angle_rad, angle.velocity_rad_s)
+    torque, _ = torque_current(made.phases, angle.angle_rad, angle.velocity_rad_s, angle.angle_rad)
     torque = torque * side_of_torque(torque, angle, made.rate_hz)
     clear = np.abs(made.current) > 5 * made.noise_rms
     clear &= np.abs(made.velocity) > 0.05 * np.abs(made.velocity).max()
@@ -173,3 +173,38 @@ def test_a_cycle_of_gaps_is_counted_as_most_cycles_say():
     angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
     freed = without_slips(angle, period, rate).angle_rad
     assert np.ptp((freed - true)[strong]) < 1e-6
+
+
+def test_the_angle_follows_a_position_of_unknown_ratio_through_half_turns_lost():
+    rate, ratio, lag_s = 1000.0, 812.7, 0.0021
+    rng = np.random.default_rng(12)
+    time_s = np.arange(9000) / rate
+    position, speed = 0.9 * np.sin(1.3 * time_s) + 0.2 * np.sin(3.1 * time_s), np.zeros(9000)
+    speed[:] = np.gradient(position) * rate
+    path = ratio * np.interp(time_s - lag_s, time_s, position) + 0.4
+    # Within a stroke the torque passes zero, and the count of half turns is lost.
+    slips = np.zeros(9000)
+    slips[rng.integers(0, 9000, 25)] = np.pi * rng.choice([-2, -1, 1, 2], 25)
+    followed = path + np.cumsum(slips) + 0.05 * rng.normal(size=9000)
+    every, blur = np.ones(9000, dtype=bool), np.zeros((9000, 2))
+    angle = PhaseAngle(followed, np.gradient(path) * rate, speed, every, every, 5, np.ones(1), blur)
+    electrical, lag = angle.aligned_with(position, speed, None, rate)
+    assert lag == pytest.approx(lag_s, abs=5e-5)
+    rest = (electrical - path)[100:-100]
+    assert np.ptp(rest) < 0.1
+    assert abs(np.angle(np.exp(2j * rest.mean()))) < 0.1
+
+
+def test_friction_tells_the_side_of_the_torque_where_gravity_is_large():
+    time_s = np.arange(4000) / 1000.0
+    # Slowly up, fast down, and not closed: as time goes, gravity seems to drive backwards.
+    position = np.interp(time_s, [0, 2.6, 3.0, 4.0], [0.0, 1.2, 0.1, 0.4])
+    velocity = np.gradient(position) * 1000
+    torque = -3 * np.sin(position + 0.2) + 0.4 * np.sign(velocity) + 0.1 * velocity
+    electrical = 500 * position
+    vector = torque * np.exp(1j * electrical)
+    phases = np.stack([(vector * np.exp(-2j * np.pi * k / 3)).real for k in range(3)], axis=1)
+    for turned in (0.0, np.pi):
+        found, flux = torque_current(phases, electrical + turned, velocity, position)
+        np.testing.assert_allclose(found, torque, atol=1e-9)
+        np.testing.assert_allclose(flux, 0.0, atol=1e-9)
