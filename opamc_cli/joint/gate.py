@@ -34,7 +34,7 @@ class Gate:
     smallest_t: float = 2.0
     smallest_consistency: float = 0.7
     decoy_ratio: float = 2.0
-    largest_p: float = 5e-3
+    largest_p: float = 1e-2
     decoys: int = 5
 
 
