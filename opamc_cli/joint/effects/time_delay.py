@@ -67,8 +67,12 @@ class TimeDelay(Effect):
         return bool(0.6 < coefficients[0] < 1.7)
 
     def rescaled(self, parameters: Parameters, coefficients: Floats) -> Parameters:
-        """Lengthen the delay: short ones differ by their size alone."""
-        return parameters | {"delay_s": parameters["delay_s"] * float(coefficients[0])}
+        """Lengthen the delay where more than a whole shift is asked for.
+
+        Short delays differ by their size alone. Less than a whole shift is another matter: then
+        something of the current is not delayed.
+        """
+        return parameters | {"delay_s": parameters["delay_s"] * max(float(coefficients[0]), 1.0)}
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Name the filter, where it is one."""
