@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.joint.model import Fit, Grid
+from opamc_cli.joint.narrow_lines import without_lines
 from opamc_cli.joint.normal import solve
 from opamc_cli.joint.slow_noise import noise_model
 from opamc_cli.joint.span import orthonormal
@@ -164,6 +165,7 @@ def noise_of(fit: Fit, fine: bool, residual: Floats) -> NoiseModel:
             slice(begin, min(begin + period, stop - period))
             for begin in range(start, stop - period, period)
         ]
+    noise = without_lines(noise, valid, grid.track.rate_hz)
     _leave_out_steps(noise, valid, pairs)
     if valid.sum() < 0.2 * grid.fit.sum():
         return NoiseModel(autoregression(residual, grid.fit))
