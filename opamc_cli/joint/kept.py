@@ -1,4 +1,4 @@
-"""What one fit computes and the next needs again: regressors, their averages, their products."""
+"""What one fit computes and the next needs again: regressors and their products."""
 
 from collections.abc import Callable, Sequence
 
@@ -26,13 +26,11 @@ class Kept:
         self.storing = storing
         self._terms: dict[int, object] = {}
         self._columns: dict[tuple[int, bool], tuple[Track | None, Floats]] = {}
-        self._means: dict[int, tuple[Floats, Floats]] = {}
         self._products: tuple[tuple[Floats, ...], Normal] | None = None
 
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
         self.keep(())
-        self._means = {}
         self._products = None
 
     def keep(self, terms: Sequence[object]) -> None:
@@ -68,17 +66,6 @@ class Kept:
         if key[0] in self._terms:
             self._columns[key] = (follows, columns)
         return columns
-
-    def means(
-        self, blocks: Sequence[Floats], mean: Callable[[Floats], Floats]
-    ) -> tuple[Floats, ...]:
-        """Averages of blocks of regressors; those of the call before are not computed again."""
-        means = {}
-        for block in blocks:
-            found = self._means.get(id(block))
-            means[id(block)] = found if found is not None else (block, mean(block))
-        self._means = means
-        return tuple(means[id(block)][1] for block in blocks)
 
     def products(
         self, blocks: Sequence[Floats], signal: Floats, rows: Sequence[NDArray[np.int64]]

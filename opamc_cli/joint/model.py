@@ -128,20 +128,12 @@ class Session:
         """Return the grid on which fast effects are searched, or the coarse one."""
         return self.sharp if fine else self.coarse
 
-    def with_model(self, load: Floats, model: Floats, static: tuple[Floats, ...]) -> "Session":
+    def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Session":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
-        bounds = self.fine.track.bounds
         fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
         if self.coarse is self.fine:
             return replace(self, fine=fine, coarse=fine)
-        coarse = replace(
-            self.coarse,
-            track=self.coarse.track.with_model(
-                block_mean(load, bounds, self.factor),
-                block_mean(model, bounds, self.factor),
-                self.kept.means(static, lambda block: block_mean(block, bounds, self.factor)),
-            ),
-        )
+        coarse = replace(self.coarse, track=self.coarse.track.with_model(load, model, static))
         return replace(self, fine=fine, coarse=coarse)
 
 
@@ -290,7 +282,7 @@ def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
         total += part
         if term.effect.static and not term.effect.fast:
             model += part
-            static.append(block)
+            static.append(term)
         if term.effect.carries_load:
             load += part
     session = session.with_model(load, model, tuple(static))

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,8 +78,8 @@ class Track:
         Current that carries the load, and the whole fitted current (zero before a fit).
     temperature_c, current_d_a, electrical_rad : array of shape (n,) or None
         Where known: temperature, current in the flux axis, electrical angle.
-    static_columns : tuple of arrays of shape (n, k), or None
-        Regressors of the fitted terms that neither shift nor ripple, term by term.
+    static_terms : tuple
+        Fitted terms that neither shift nor ripple.
     open_samples : bool array of shape (n,) or None
         Moving samples that a fit may look at: none that are sealed.
     kernel : array of odd length
@@ -96,6 +97,9 @@ class Track:
         scale, temperature, phases, electrical.
     period_samples : int or None
         Length of a cycle, if the motion repeats.
+    full : Track or None
+        What an averaged track is the block means of: the same recordings at the full rate, with
+        current, position, speed and direction as smooth as the acceleration.
     own_clocks_s : tuple of float
         `time_s` at which each recording begins, where recordings have no common clock.
     """
@@ -122,12 +126,13 @@ class Track:
     current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
     period_samples: int | None = None
-    static_columns: tuple[Floats, ...] | None = None
+    static_terms: "tuple[Regressors, ...]" = ()
     open_samples: Bools | None = None
     kernel: Floats = field(default_factory=lambda: np.ones(1))
     evenly_smooth: bool = False
     quiet: int = 1
     blur: Floats | None = None
+    full: "Track | None" = None
     own_clocks_s: tuple[float, ...] = ()
 
     @property
@@ -141,11 +146,36 @@ class Track:
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
 
+    @cached_property
+    def static_columns(self) -> Floats:
+        """Regressors of the static terms, shape (m, k), on the full rate's samples."""
+        source = self.full or self
+        blocks = [term.columns(source) for term in self.static_terms]
+        return np.concatenate([np.zeros((source.size, 0)), *blocks], axis=1)
+
     def with_model(
-        self, load_a: Floats, model_a: Floats, static_columns: tuple[Floats, ...]
+        self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":
-        """Return the same track with the fitted load and model currents."""
-        return replace(self, load_a=load_a, model_a=model_a, static_columns=static_columns)
+        """Return the same track with the fitted load and model currents, given at its full rate."""
+        if self.full is None:
+            return replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms)
+        bounds = self.full.bounds
+        factor = round(self.full.rate_hz / self.rate_hz)
+        return replace(
+            self,
+            load_a=block_mean(load_a, bounds, factor),
+            model_a=block_mean(model_a, bounds, factor),
+            static_terms=static_terms,
+            full=replace(self.full, load_a=load_a, model_a=model_a),
+        )
+
+
+class Regressors(Protocol):
+    """What has regressors on every track: a fitted term."""
+
+    def columns(self, track: Track) -> Floats:
+        """Regressors, shape (n, k)."""
+        ...
 
 
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
@@ -216,7 +246,7 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     lengths = [stop - start for start, stop in spans]
     bounds = tuple((int(b) - n, int(b)) for b, n in zip(stops, lengths, strict=True))
     group = np.where(inside, track.group, -1)
-    track = replace(track, group=group, static_columns=None)
+    track = replace(track, group=group)
     sampled = {name: getattr(track, name) for name in SAMPLED}
     taken = {name: values[rows] for name, values in sampled.items() if values is not None}
     return replace(track, bounds=bounds, **taken)
@@ -248,9 +278,13 @@ def coarsen(track: Track, factor: int) -> Track:
         return block_mean(values, track.bounds, factor)
 
     def smooth(values: Floats) -> Floats:
-        return mean(averaged(values, track.bounds, track.kernel))
+        return averaged(values, track.bounds, track.kernel)
 
-    motion = mean if track.evenly_smooth else smooth
+    full = replace(track, current_a=smooth(track.current_a), direction=smooth(track.direction))
+    if not track.evenly_smooth:
+        full = replace(
+            full, position_rad=smooth(track.position_rad), velocity=smooth(track.velocity)
+        )
 
     def optional(values: Floats | None) -> Floats | None:
         return None if values is None else mean(values)
@@ -272,9 +306,9 @@ def coarsen(track: Track, factor: int) -> Track:
         bounds=tuple(bounds),
         time_s=mean(track.time_s),
         run_time_s=mean(track.run_time_s),
-        current_a=smooth(track.current_a),
-        position_rad=motion(track.position_rad),
-        velocity=motion(track.velocity),
+        current_a=mean(full.current_a),
+        position_rad=mean(full.position_rad),
+        velocity=mean(full.velocity),
         acceleration=mean(track.acceleration),
         machine_angle_rad=mean(track.machine_angle_rad),
         direction=np.sign(mean(track.direction)),
@@ -287,5 +321,6 @@ def coarsen(track: Track, factor: int) -> Track:
         current_d_a=optional(track.current_d_a),
         electrical_rad=optional(track.electrical_rad),
         blur=None,
+        full=full,
         period_samples=None if period is None else round(period / factor),
     )

@@ -1,21 +1,23 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.signal import bilinear
+from scipy.signal import bilinear, lfilter
 from simulator import simulate
 
 from opamc_cli.errors import ConfigError
-from opamc_cli.joint.effects.elasticity import discrete
+from opamc_cli.joint.effects.elasticity import Elasticity, discrete
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
 from opamc_cli.joint.effects.ripple import read_order
-from opamc_cli.joint.effects.time_delay import lagging
+from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.kinematics import Recording, build_track
+from opamc_cli.joint.model import Term
 from opamc_cli.joint.spectra import order_peaks
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Joint, averaged, block_mean, coarsen
 
 VOCABULARY = [
     "inertia",
@@ -223,3 +225,56 @@ def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
     for i in range(1, 50):
         expected[i] = pole * expected[i - 1] + (1 - pole) * columns[i]
     np.testing.assert_allclose(lagging(columns, samples), expected)
+
+
+@pytest.mark.parametrize("samples", [0.0, 3.0, 7.4, -2.6, 55.0])
+@pytest.mark.parametrize("factor", [1, 8])
+def test_means_of_late_blocks_are_those_of_the_interpolated_signal(samples, factor):
+    columns = np.random.default_rng(0).normal(size=(203, 3)).cumsum(axis=0)
+    places = np.arange(203.0)
+    late = np.stack([np.interp(places - samples, places, column) for column in columns.T], axis=1)
+    expected = block_mean(late, ((0, 203),), factor)
+    np.testing.assert_allclose(late_means(columns, samples, factor), expected, atol=1e-9)
+
+
+def test_wind_up_on_the_coarse_grid_is_the_average_of_that_at_the_full_rate():
+    _, track = track_of(quantum=2e-4)
+    coarse = coarsen(track, 25)
+    parameters = {"resonance_hz": 7.0, "damping": 0.05}
+    w = 2 * 500.0 * np.tan(2 * np.pi * 7.0 / 1000.0)
+    below = (1.0, 2 * 0.05 * w, w * w)
+    acceleration = track.acceleration
+    slow = []
+    for above in ((-1.0, -2 * 0.05 * w, 0.0), (0.0, w, 0.0)):
+        zeros, poles = discrete(above, below, 500.0)
+        # A long time at the first acceleration, instead of a state to begin with.
+        settled = np.concatenate([np.full(20_000, acceleration[0]), acceleration])
+        slow.append(lfilter(zeros, poles, settled)[20_000:])
+    expected = block_mean(np.stack(slow, axis=1), track.bounds, 25)
+    scale = np.abs(expected).max()
+    columns = Elasticity().columns(coarse, parameters)
+    np.testing.assert_allclose(columns, expected, atol=1e-6 * scale)
+
+
+def test_a_delay_shorter_than_the_coarse_samples_has_its_own_length_and_a_coefficient_of_one():
+    _, track = track_of(quantum=2e-4)
+    library = built_in_library()
+    names = ("inertia", "gravity", "coulomb", "viscous")
+    terms = tuple(Term(library[name], {}) for name in names)
+    sizes = (0.3, 1.0, 2.0, 0.5, 0.3)
+    sharp = np.concatenate([term.columns(track) for term in terms], axis=1)
+    # What was averaged already is not averaged again.
+    smooth = averaged(sharp, track.bounds, track.kernel)
+    smooth[:, 0] = track.acceleration
+    late = np.interp(np.arange(track.size) - 4.0, np.arange(track.size), smooth @ sizes)
+    coarse = coarsen(track, 25)
+    moving = coarse.moving
+    coarse = replace(
+        coarse.with_model(np.zeros(track.size), np.zeros(track.size), terms),
+        current_a=block_mean(late, track.bounds, 25),
+        open_samples=moving,
+    )
+    wanted = coarse.current_a - block_mean((smooth @ sizes)[:, None], track.bounds, 25)[:, 0]
+    column = TimeDelay().columns(coarse, {"delay_s": 4.0 / 500.0})[:, 0]
+    assert np.dot(column, wanted) / np.dot(column, column) == pytest.approx(1.0, abs=0.05)
+    assert np.std((wanted - column)[moving]) < 0.1 * np.std(wanted[moving])

@@ -63,21 +63,17 @@ class Unit:
 
     def with_model(self, terms: tuple[Term, ...], coefficients: Floats) -> "Unit":
         """Put the fitted load and the whole fitted current on both tracks."""
-        tracks = []
-        for track in (self.fine, self.coarse):
-            load, model = np.zeros(track.size), np.zeros(track.size)
-            first = 0
-            static = []
-            for term in terms:
-                columns = term.columns(track)
-                part = columns @ coefficients[first : first + columns.shape[1]]
-                first += columns.shape[1]
-                model += part
-                static.append(columns)
-                if term.effect.carries_load:
-                    load += part
-            tracks.append(track.with_model(load, model, tuple(static)))
-        return replace(self, fine=tracks[0], coarse=tracks[1])
+        load, model = np.zeros(self.fine.size), np.zeros(self.fine.size)
+        first = 0
+        for term in terms:
+            columns = term.columns(self.fine)
+            part = columns @ coefficients[first : first + columns.shape[1]]
+            first += columns.shape[1]
+            model += part
+            if term.effect.carries_load:
+                load += part
+        fine = self.fine.with_model(load, model, terms)
+        return replace(self, fine=fine, coarse=self.coarse.with_model(load, model, terms))
 
 
 def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bool) -> list[Unit]:

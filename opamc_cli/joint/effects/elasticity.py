@@ -1,9 +1,9 @@
 """A joint that winds up and rings."""
 
 import numpy as np
-from scipy.signal import lfilter
+from numba import njit
 
-from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric
 from opamc_cli.joint.track import Floats, Track
 
 
@@ -11,7 +11,9 @@ class Elasticity(Effect):
     """Response of a sprung load to the acceleration: what it adds to the rigid model.
 
     The load side follows ``x'' + 2 d w x' + w^2 (x - q) = 0``; the rigid model's acceleration is
-    taken out, so that only ringing and wind-up remain.
+    taken out, so that only ringing and wind-up remain. On an averaged grid the full rate's
+    acceleration is filtered, then averaged: with a coarse encoder the blocks are not much shorter
+    than the joint's period.
     """
 
     name = "elasticity"
@@ -23,8 +25,8 @@ class Elasticity(Effect):
     free_refinement = False
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Resonances from 2 Hz to a quarter of the rate, three dampings."""
-        high = min(60.0, track.rate_hz / 4)
+        """Resonances from 2 Hz up, three dampings."""
+        high = 0.9 * _highest(track)
         return [
             {"resonance_hz": resonance, "damping": damping}
             for damping in (0.03, 0.1, 0.2)
@@ -32,27 +34,29 @@ class Elasticity(Effect):
         ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """From slow swaying to a third of the sampling rate; damped more, nothing rings."""
-        return {"resonance_hz": (1.0, min(60.0, track.rate_hz / 3)), "damping": (0.005, 0.25)}
+        """From slow swaying to what the grid can show; damped more, nothing rings."""
+        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
         w = 2 * np.pi * parameters["resonance_hz"]
         damping = parameters["damping"]
+        full = track.full or track
         # The bilinear transform bends frequencies; start from the bent one.
-        w = 2 * track.rate_hz * np.tan(w / (2 * track.rate_hz))
+        w = 2 * full.rate_hz * np.tan(w / (2 * full.rate_hz))
         below = (1.0, 2 * damping * w, w * w)
-        load = discrete((-1.0, -2 * damping * w, 0.0), below, track.rate_hz)
-        rate = discrete((0.0, w, 0.0), below, track.rate_hz)
-        excess = np.empty(track.size)
-        change = np.empty(track.size)
-        for start, stop in track.bounds:
-            part = track.acceleration[start:stop]
-            for filtered, (above, poles) in ((excess, load), (change, rate)):
-                # As if the first acceleration had lasted for ever: no ringing from the start.
-                rest = _at_rest(above, poles) * part[0]
-                filtered[start:stop] = lfilter(above, poles, part, zi=rest)[0]
-        return stack(excess, change)
+        load, poles = discrete((-1.0, -2 * damping * w, 0.0), below, full.rate_hz)
+        rate, _ = discrete((0.0, w, 0.0), below, full.rate_hz)
+        factor = round(full.rate_hz / track.rate_hz)
+        means = np.empty((2, track.size))
+        begin = 0
+        for start, stop in full.bounds:
+            end = begin + (stop - start) // factor
+            _filter_and_average(
+                full.acceleration[start:stop], load, rate, poles, factor, means[:, begin:end]
+            )
+            begin = end
+        return means.T
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
@@ -90,8 +94,39 @@ def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats
     return in_z(above) / first, in_z(below) / first
 
 
-def _at_rest(above: Floats, below: Floats) -> Floats:
-    """State of a filter of second order that has had 1 as its input for ever."""
-    level = above.sum() / below.sum()
-    last = above[2] - below[2] * level
-    return np.array([above[1] - below[1] * level + last, last])
+def _highest(track: Track) -> float:
+    """Highest resonance that a grid shows, in hertz."""
+    if track.full is None:
+        return min(60.0, track.rate_hz / 3)
+    return min(60.0, 0.45 * track.rate_hz, track.full.rate_hz / 3)
+
+
+@njit(cache=True, nogil=True)
+def _filter_and_average(
+    values: Floats, first: Floats, second: Floats, poles: Floats, factor: int, means: Floats
+) -> None:
+    """Put a signal through two filters with the same poles, and average the outcomes over blocks.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+        As if the first had lasted for ever: no ringing from the start.
+    first, second, poles : arrays of shape (3,)
+        Coefficients of 1, 1/z and 1/z^2; `poles` begins with 1.
+    factor : int
+        Samples per block.
+    means : array of shape (2, n // factor)
+        Filled with the means of both outcomes.
+    """
+    last = values[0] / (1.0 + poles[1] + poles[2])
+    before = last
+    for block in range(means.shape[1]):
+        one = two = 0.0
+        for i in range(block * factor, (block + 1) * factor):
+            state = values[i] - poles[1] * last - poles[2] * before
+            one += first[0] * state + first[1] * last + first[2] * before
+            two += second[0] * state + second[1] * last + second[2] * before
+            before = last
+            last = state
+        means[0, block] = one / factor
+        means[1, block] = two / factor

@@ -5,9 +5,10 @@ from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.normal import solve
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.track import Floats, Track, block_mean
 
-SHORTEST_GUESS_S = 5e-4
+SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
+LONGEST_FILTER_S = 8e-3
 
 
 class TimeDelay(Effect):
@@ -23,10 +24,15 @@ class TimeDelay(Effect):
     dense_guesses = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """From half a millisecond to 64 ms either way, each twice the last; filters to 8 ms."""
-        delays = geometric(SHORTEST_GUESS_S, 2**7 * SHORTEST_GUESS_S, 8)
+        """From half a millisecond to 64 ms either way, filters to 8 ms.
+
+        Each is a quarter more than the last: at a step of the acceleration what half as long a
+        delay does again is three times as small, and not a whole shift any more.
+        """
+        delays = geometric(SHORTEST_GUESS_S, LONGEST_GUESS_S, 22)
         shifts = [{"delay_s": sign * delay} for sign in (-1.0, 1.0) for delay in delays]
-        return [*shifts, *({"delay_s": delay, "filtered": 1.0} for delay in delays[:5])]
+        filters = geometric(SHORTEST_GUESS_S, LONGEST_FILTER_S, 5)
+        return [*shifts, *({"delay_s": delay, "filtered": 1.0} for delay in filters)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to 120 ms either way."""
@@ -42,27 +48,27 @@ class TimeDelay(Effect):
     def parts(self, track: Track, parameters: Parameters) -> Floats:
         """Shift each regressor of the model: one clock delays them all alike."""
         rows = track.open_samples
-        if not track.static_columns or rows is None:
+        columns = track.static_columns
+        if not columns.shape[1] or rows is None:
             return np.zeros((track.size, 1))
-        delay_s = parameters["delay_s"]
-        columns = np.concatenate(track.static_columns, axis=1)
-        shifted = np.empty_like(columns)
-        for start, stop in track.bounds:
-            if parameters.get("filtered"):
-                shifted[start:stop] = lagging(columns[start:stop], delay_s * track.rate_hz)
-                continue
-            times = np.arange(stop - start) / track.rate_hz
-            for k in range(columns.shape[1]):
-                shifted[start:stop, k] = np.interp(times - delay_s, times, columns[start:stop, k])
+        full = track.full or track
+        factor = round(full.rate_hz / track.rate_hz)
+        samples = parameters["delay_s"] * full.rate_hz
+        if parameters.get("filtered"):
+            late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
+            shifted = block_mean(np.concatenate(late), full.bounds, factor)
+        else:
+            pieces = [columns[start:stop] for start, stop in full.bounds]
+            shifted = np.concatenate([late_means(piece, samples, factor) for piece in pieces])
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        return (shifted - columns) * coefficients
+        return (shifted - block_mean(columns, full.bounds, factor)) * coefficients
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
 
-        What twice a short delay does is almost twice as large: one of the guesses fits within a
-        factor of 1.5.
+        A delay much shorter than the samples are apart may have any length, and the coefficient
+        that goes with it: hence the wide margin.
         """
         return bool(0.6 < coefficients[0] < 1.7)
 
@@ -80,6 +86,35 @@ class TimeDelay(Effect):
             return self.meaning
         corner_hz = 1 / (2 * np.pi * parameters["delay_s"])
         return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
+
+
+def late_means(columns: Floats, samples: float, factor: int) -> Floats:
+    """Means of blocks of columns that come later, the first and the last values held.
+
+    Parameters
+    ----------
+    columns : array of shape (n, k)
+        Uniformly sampled.
+    samples : float
+        Delay; between samples, what a straight line between them gives.
+    factor : int
+        Samples per block.
+
+    Returns
+    -------
+    array of shape (n // factor, k)
+        From running sums: as quick for blocks of a hundred samples as for one.
+    """
+    size = columns.shape[0]
+    reach = int(np.ceil(abs(samples))) + 1
+    held = np.pad(columns, ((reach, reach), (0, 0)), mode="edge")
+    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(held, axis=0)])
+    edges = factor * np.arange(size // factor + 1) + reach - samples
+    whole = np.floor(edges).astype(np.int64)
+    share = (edges - whole)[:, None]
+    at_edges = (1 - share) * sums[whole] + share * sums[whole + 1]
+    means: Floats = np.diff(at_edges, axis=0) / factor
+    return means
 
 
 def lagging(columns: Floats, samples: float) -> Floats:
