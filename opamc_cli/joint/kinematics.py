@@ -25,6 +25,8 @@ from opamc_cli.joint.smoothing import (
 from opamc_cli.joint.torque_axis import side_of_torque, torque_current
 from opamc_cli.joint.track import Bools, Floats, Joint, Track
 
+LEAST_CORNER = 0.05 / 3
+"""Share of the acceleration; three times that is lacking at a corner of a path without noise."""
 SLOWEST_SHARE = 0.02
 """Samples below this share of the top speed do not count: their direction is not certain."""
 
@@ -390,9 +392,11 @@ def _one(recording: Recording, joint: Joint) -> Track:
         channels |= {"temperature"}
     n = motion.velocity.size
     moving = moving_samples(motion, usable)
-    clear = clear_of_corners(
-        motion.acceleration, current, moving, motion.kernel, motion.taken_noise
-    )
+    uncertain = motion.taken_noise
+    if motion.window <= SHORTEST_WINDOW:
+        # Without an encoder's noise vibration shows, of which the window takes a little everywhere.
+        uncertain = max(uncertain, LEAST_CORNER * float(np.std(motion.acceleration)))
+    clear = clear_of_corners(motion.acceleration, current, moving, motion.kernel, uncertain)
     if motion.window <= SHORTEST_WINDOW:
         # The coarse grid has no counterpart for so short an average.
         moving &= clear
