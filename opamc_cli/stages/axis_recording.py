@@ -6,8 +6,12 @@ from datetime import datetime
 import numpy as np
 
 from opamc_cli.errors import InputError
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.kinematics import Recording, speed_ratio
 from opamc_cli.storage.runs import Array, Run
+
+UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
+"""Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
+SAME_RATIO = 0.03
 
 
 def axes_of(runs: Sequence[Run]) -> list[int]:
@@ -60,6 +64,7 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
         )
     for channel, values in samples.items():
         _check_channel(run, channel, values)
+    _check_units(run, axis, arrays["position"], arrays["velocity"])
     return Recording(
         name=run.name,
         rate_hz=run.sampling_rate_hz,
@@ -84,6 +89,22 @@ def _check_channel(run: Run, name: str, values: Array) -> None:
             f"{len(values)} samples; check the sensor"
         )
         raise InputError(msg)
+
+
+def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | None) -> None:
+    """Refuse a position and a speed that are the same motion in different units."""
+    if position is None or velocity is None:
+        return
+    ratio = speed_ratio(position, velocity, run.sampling_rate_hz)
+    for known, unit in UNITS.items():
+        if ratio is not None and abs(ratio / known - 1) < SAME_RATIO:
+            name, asked = ("position", "rad") if unit == "deg" else ("velocity", "rad/s")
+            msg = (
+                f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
+                f"axis{axis}_position: axis{axis}_{name} seems to be in {unit}; convert it to "
+                f"{asked}, or name its unit in the map of opamc ingest"
+            )
+            raise InputError(msg)
 
 
 def _seconds(run: Run) -> float | None:

@@ -125,6 +125,27 @@ def test_too_little_motion_to_seal_anything_off(folder, capsys):
     assert "too little to seal" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("place", "speed", "words"),
+    [
+        (1.0, 180 / np.pi, "axis1_velocity seems to be in deg/s"),
+        (1.0, 30 / np.pi, "axis1_velocity seems to be in rpm"),
+        (180 / np.pi, 1.0, "axis1_position seems to be in deg"),
+    ],
+)
+def test_position_and_speed_in_different_units_are_refused(folder, capsys, place, speed, words):
+    made = simulate(3, (), 0.0, rate=250.0, cycles=6)
+    write_run(
+        folder / "run.parquet",
+        250.0,
+        axis1_current=made.current,
+        axis1_position=place * made.position,
+        axis1_velocity=speed * made.velocity,
+    )
+    assert close(folder, "--axis", "1") == 3
+    assert words in capsys.readouterr().err
+
+
 def test_a_users_effect_is_used_by_name(folder):
     (folder / "mine.py").write_text(
         "import numpy as np\n"
