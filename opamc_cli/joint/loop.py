@@ -138,7 +138,7 @@ def _taken(current: Round, imitations: Mapping[str, str], progress: Progress) ->
     progress.untestable |= {entry.effect: entry for entry in traced.untestable}
     number = len(progress.steps)
     try:
-        for i in _by_merit(checked):
+        for i in _by_merit(checked, current):
             candidate = current.beside_decoys(checked[i])
             if candidate.why_not is not None:
                 checked[i] = candidate
@@ -181,16 +181,23 @@ def _taken(current: Round, imitations: Mapping[str, str], progress: Progress) ->
         current.rest()
 
 
-def _by_merit(checked: list[Candidate]) -> list[int]:
+def _by_merit(checked: list[Candidate], current: Round) -> list[int]:
     """Places of the candidates that pass, best first.
 
     The likelihood leads; but a candidate that explains twice as much of what was held out, at no
-    less than half the likelihood, comes before: the whitened fit alone may hang on a detail.
+    less than half the likelihood, comes before: the whitened fit alone may hang on a detail. A
+    fast and a slow candidate are compared where the fast one was searched.
     """
     places = [i for i, candidate in enumerate(checked) if candidate.why_not is None]
     for k in range(1, len(places)):
         first, other = checked[places[0]], checked[places[k]]
-        if other.gain > 2 * first.gain and other.likelihood > 0.5 * first.likelihood:
+        least, likelihood = 0.5 * first.likelihood, other.likelihood
+        if first.fine and not other.fine:
+            likelihood = current.likelihood_among_fast(other)
+            if likelihood > first.likelihood:
+                least = 0.0
+        better = other.gain > 2 * first.gain or (least == 0.0 and other.gain > first.gain)
+        if better and likelihood > least:
             places.insert(0, places.pop(k))
     return places
 

@@ -9,6 +9,7 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.gate import Gate, decoy_likelihood
 from opamc_cli.joint.model import Fit, fit_terms
 from opamc_cli.joint.search import Candidate
+from opamc_cli.joint.span import orthonormal_beside
 from opamc_cli.joint.trace import Traced, trace_residual
 from opamc_cli.joint.view import View, prepare
 
@@ -80,6 +81,15 @@ class Round:
                 tested = replace(tested, why_not="a decoy of the same form does half as well")
             self._beside_decoys[name] = tested
         return self._beside_decoys[name]
+
+    def likelihood_among_fast(self, candidate: Candidate) -> float:
+        """Likelihood of a slow candidate's form on the grid of the fast ones."""
+        view = self._view(fine=True)
+        columns = view.whitened_rows(self.fitted.session.columns(candidate.term, fine=True))
+        own = orthonormal_beside(columns, view.span)
+        left = view.power - float(np.sum((own.T @ view.values) ** 2))
+        left = max(left, 1e-12 * view.power)
+        return view.freedom(own.shape[1]) * float(np.log(view.power / left))
 
     def following(self, candidate: Candidate) -> "Round":
         """Fit the model that holds the candidate too; return its round."""

@@ -99,8 +99,8 @@ def order_spectrum(track: Track, residual: Floats) -> tuple[Floats, Floats, int]
     return orders, power, max(classes, 1)
 
 
-def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
-    """Orders that stand out of the noise, strongest first.
+def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
+    """Orders that stand out of the noise with their power, strongest first.
 
     Parameters
     ----------
@@ -113,9 +113,9 @@ def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
 
     Returns
     -------
-    list of float
-        Refined by a parabola over the oversampled spectrum; at least 1.5 resolutions apart. White
-        noise alone gives one in a thousand times.
+    list of (float, float)
+        Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
+        and their power in units of white noise's. White noise alone gives one in a thousand times.
     """
     orders, power, classes = order_spectrum(track, residual)
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
@@ -128,7 +128,7 @@ def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
     threshold = float(gamma.isf(FALSE_PEAK / trials, classes))
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
-    peaks: list[float] = []
+    peaks: list[tuple[float, float]] = []
     for _ in range(count):
         best = int(np.argmax(power))
         if power[best] < threshold:
@@ -138,7 +138,8 @@ def order_peaks(track: Track, residual: Floats, count: int) -> list[float]:
             left, middle, right = power[best - 1 : best + 2]
             curvature = left - 2 * middle + right
             shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
-        peaks.append(float(orders[best] + np.clip(shift, -1, 1) * spacing))
+        order = float(orders[best] + np.clip(shift, -1, 1) * spacing)
+        peaks.append((order, float(power[best])))
         power[max(best - guard, 0) : best + guard + 1] = 0
     return peaks
 

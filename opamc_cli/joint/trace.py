@@ -9,7 +9,7 @@ from opamc_cli.joint.coherence import disagreement
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.flux import objection_of_flux
 from opamc_cli.joint.form import pressed_limit
-from opamc_cli.joint.gate import Gate, held_out, prepare_held, refusal, with_consistency
+from opamc_cli.joint.gate import Gate, Held, held_out, prepare_held, refusal, with_consistency
 from opamc_cli.joint.model import Fit, Session
 from opamc_cli.joint.multiplicity import drawn_p_value
 from opamc_cli.joint.plain import Plain, plainer, score_plain
@@ -103,7 +103,7 @@ def trace_residual(
     plains: list[Plain] | None = None
     for candidate in found:
         view = views[candidate.fine]
-        tested = held_out(fitted, candidate, held[candidate.fine])
+        tested = _predicting_best(fitted, view, candidate, held[candidate.fine])
         tested = replace(tested, p_value=_p_value(session, view, tested, trials, gate))
         if tested.p_value <= gate.largest_p:
             tested = with_consistency(session, view, tested)
@@ -137,6 +137,25 @@ def _p_value(session: Session, view: View, candidate: Candidate, trials: int, ga
     if p_value > gate.largest_p and alone * trials <= gate.largest_p:
         return min(p_value, drawn_p_value(session, view, candidate) * trials)
     return p_value
+
+
+def _predicting_best(fitted: Fit, view: View, candidate: Candidate, held: Held) -> Candidate:
+    """Leave groups out of a candidate and of its simpler forms; take the one that gains most.
+
+    The likelihood is of what was fitted, and whitened: it hardly sees slow regressors that are
+    nearly the same, whose coefficients mean nothing elsewhere.
+    """
+    best = tried = held_out(fitted, candidate, held)
+    while (effect := tried.term.effect.simpler(tried.term.parameters)) is not None:
+        found, _tried = search(fitted.session, view, effect)
+        if found is None:
+            break
+        tried = held_out(fitted, found, held)
+        if tried.gain > best.gain:
+            best = tried
+        elif best.gain > 0:
+            break
+    return best
 
 
 def _simplest_first(found: list[Candidate], library: Library, session: Session) -> None:

@@ -9,14 +9,15 @@ from scipy.signal import bilinear, lfilter
 from simulator import simulate
 
 from opamc_cli.errors import ConfigError
-from opamc_cli.joint.effects.elasticity import Elasticity, discrete
+from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
 from opamc_cli.joint.effects.ripple import read_order
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.kinematics import Recording, build_track
 from opamc_cli.joint.model import Term
-from opamc_cli.joint.spectra import order_peaks
+from opamc_cli.joint.second_order import discrete
+from opamc_cli.joint.spectra import order_lines
 from opamc_cli.joint.track import Joint, averaged, block_mean, coarsen
 
 VOCABULARY = [
@@ -166,7 +167,7 @@ def test_order_peak_is_found_within_a_tenth_of_the_resolution(order):
     signal = np.cos(angle + 0.3 * track.direction) + np.random.default_rng(1).normal(
         size=track.size
     )
-    peak = order_peaks(track, np.where(track.moving, signal, 0.0), 1)[0]
+    peak = order_lines(track, np.where(track.moving, signal, 0.0), 1)[0][0]
     travel = np.ptp(track.machine_angle_rad[track.moving])
     assert abs(peak - order) < 0.1 * 2 * np.pi / travel
 
@@ -175,7 +176,7 @@ def test_white_noise_has_no_order_peak():
     _, track = track_of()
     for seed in range(10):
         noise = np.random.default_rng(seed).normal(size=track.size)
-        assert order_peaks(track, np.where(track.moving, noise, 0.0), 1) == []
+        assert order_lines(track, np.where(track.moving, noise, 0.0), 1) == []
 
 
 @pytest.mark.parametrize(

@@ -121,6 +121,10 @@ class Effect:
         """Smaller forms of the effect: parameters and the columns that they keep."""
         return []
 
+    def simpler(self, parameters: Parameters) -> "Effect | None":
+        """Give the same effect with fewer freedoms, in case that these fit what does not repeat."""
+        return None
+
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Tell whether coefficients have the sign that physics gives this effect."""
         return True

@@ -4,6 +4,7 @@ import numpy as np
 from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric
+from opamc_cli.joint.second_order import discrete
 from opamc_cli.joint.track import Floats, Track
 
 
@@ -61,37 +62,6 @@ class Elasticity(Effect):
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
         return bool(coefficients[0] > 0 and abs(coefficients[1]) < coefficients[0])
-
-
-Quadratic = tuple[float, float, float]
-
-
-def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats, Floats]:
-    """Bilinear transform of a filter of second order.
-
-    Parameters
-    ----------
-    above, below : tuple of 3 floats
-        Coefficients of s^2, s and 1 in numerator and denominator.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    above, below : arrays of shape (3,)
-        Coefficients of 1, 1/z and 1/z^2; the denominator begins with 1. `scipy.signal.bilinear`
-        returns the same by way of polynomial objects, at a hundred times the cost.
-    """
-    k = 2 * rate_hz
-
-    def in_z(s: Quadratic) -> Floats:
-        square, linear, constant = s[0] * k * k, s[1] * k, s[2]
-        return np.array(
-            [square + linear + constant, 2 * (constant - square), square - linear + constant]
-        )
-
-    first = in_z(below)[0]
-    return in_z(above) / first, in_z(below) / first
 
 
 def _highest(track: Track) -> float:

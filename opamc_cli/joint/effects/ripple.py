@@ -1,18 +1,49 @@
 """Torque that repeats with the angle of a rotating part."""
 
 import math
+from itertools import product
 
 import numpy as np
+from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.spectra import order_peaks
+from opamc_cli.joint.second_order import at_rest, discrete
+from opamc_cli.joint.spectra import order_lines, order_resolution
 from opamc_cli.joint.track import Floats, Track
 
-FORMS = ("speed", "direction", "load")
+SWITCHES = ("speed", "direction", "load", "current")
+DAMPING = 0.4
+"""Of the filters in which a drive's answer is expanded."""
+OCTAVES = 5.5
+LOWEST_HZ = 1.0
+HIGHEST_SHARE = 0.4
+"""The filters' range below the highest frequency that a ripple reaches; below the lowest of them a
+velocity loop answers as if nothing moved; and the highest one as a share of the sampling rate."""
+FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
+"""From which power of a line on, in units of white noise's: each of their columns must earn its
+keep. Every other filter, and every fourth, are the smaller forms."""
+SIDE_RESOLUTIONS = 3.0
+"""A resonance of the drive moves the strongest line so far from the order that it comes from."""
+COARSEST = 0.5
+"""Of them. With fewer filters than that per octave there is none."""
 
 
 class Ripple(Effect):
-    """A sine of the motor angle, whose size and phase follow speed, direction and load's sign."""
+    """A sine of the motor angle, as the drive answers it.
+
+    The velocity loop makes of a torque that follows the angle a current whose size and phase follow
+    the speed: along the loop's resonance, with the lag of its filters, and with what the smoothing
+    of the motion takes. Where the ripple is small a straight line in the speed is enough. Where it
+    is large its `answer` is that of a linear system, expanded in filters of second order below the
+    highest frequency that the ripple reaches (`top_hz`), each direction with coefficients of its
+    own. Beside that, a damaged mesh follows the sign of the load, and one that turns unevenly the
+    current itself.
+
+    Parameters
+    ----------
+    densest : float
+        Filters per octave that an answer may have.
+    """
 
     name = "ripple"
     domain = "motor-angle"
@@ -22,53 +53,78 @@ class Ripple(Effect):
     fast = True
     several = True
     flags_choose_columns = True
-    forms = FORMS
+    forms = (*SWITCHES, "answer", "top_hz")
+
+    def __init__(self, densest: float = math.inf) -> None:
+        self.densest = densest
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Strongest order of the whitened residual, with every dependence."""
-        peaks = order_peaks(track, residual, count=2)
-        return [{"order": order, "speed": 1.0, "direction": 1.0, "load": 1.0} for order in peaks]
+        """Strongest orders of the whitened residual, with every dependence."""
+        found: list[Parameters] = []
+        for order, power in order_lines(track, residual, count=2):
+            plain = {"order": order, **dict.fromkeys(SWITCHES, 1.0)}
+            top_hz = _top_hz(track, order)
+            density = next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
+            density = min(density, self.densest)
+            if density and top_hz > LOWEST_HZ and not found:
+                answered = plain | {"answer": density, "top_hz": top_hz}
+                del answered["speed"]
+                near = SIDE_RESOLUTIONS * order_resolution(track)
+                meant = [named for named in named_orders(track, order) if abs(named - order) < near]
+                found += [answered | {"order": one} for one in (order, *meant)]
+            found.append(plain)
+        return found
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anything above joint-angle orders."""
         return {"order": (0.0, 1e6)}
 
     def is_constant(self, parameters: Parameters) -> bool:
-        """Only the sign of the load's current follows the model."""
-        return not parameters["load"]
+        """Only the load's sign and the current follow the model."""
+        return not (parameters.get("load") or parameters.get("current"))
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Pairs of cosine and sine: constant, with speed, with direction, with load's sign."""
+        """Pairs of cosine and sine; those that follow the model come last."""
         angle = parameters["order"] * track.machine_angle_rad
-        cosine, sine = np.cos(angle), np.sin(angle)
-        pairs = [cosine, sine]
-        if parameters["speed"]:
+        waves = [np.cos(angle), np.sin(angle)]
+        pairs = [*waves]
+        if parameters.get("speed"):
             scale = np.abs(track.velocity) / track.speed_scale - 0.5
-            pairs += [scale * cosine, scale * sine]
-        if parameters["direction"]:
-            pairs += [track.direction * cosine, track.direction * sine]
-        if parameters["load"]:
-            side = np.sign(track.model_a)
-            pairs += [side * cosine, side * sine]
-        return stack(*pairs)
+            pairs += [scale * wave for wave in waves]
+        answers = drive_answers(track, waves, parameters) if parameters.get("answer") else []
+        pairs += answers
+        if parameters.get("direction"):
+            pairs += [track.direction * column for column in (*waves, *answers)]
+        return stack(*pairs, *_following_model(waves, track, parameters))
 
     def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
-        """Only the last pair follows the model, and it is the first one times a sign."""
-        if not parameters["load"]:
+        """Only the last pairs follow the model, and they are the first one times it."""
+        changed = _following_model([columns[:, 0], columns[:, 1]], track, parameters)
+        if not changed:
             return columns
-        side = np.sign(track.model_a)[:, None]
-        return np.concatenate([columns[:, :-2], side * columns[:, :2]], axis=1)
+        return np.concatenate([columns[:, : -len(changed)], stack(*changed)], axis=1)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Without the dependences that the data do not ask for."""
-        kept = [form for form in FORMS if parameters[form]]
+        switches = [name for name in SWITCHES if parameters.get(name)]
+        densest = parameters.get("answer", 0.0)
+        halves = {densest, densest / 2, densest / 4}
+        densities = [0.0, *sorted(density for density in halves if density >= COARSEST)]
         smaller = []
-        for chosen in range(2 ** len(kept) - 1):
-            flags = {form: float(chosen >> i & 1) for i, form in enumerate(kept)}
-            pairs = [0, *(i + 1 for i, form in enumerate(kept) if flags[form])]
-            columns = tuple(column for pair in pairs for column in (2 * pair, 2 * pair + 1))
-            smaller.append((parameters | flags, columns))
+        for on in product((False, True), repeat=len(switches)):
+            for density in densities:
+                form = {name: 1.0 for name, kept in zip(switches, on, strict=True) if kept}
+                if density:
+                    form |= {"answer": density, "top_hz": parameters["top_hz"]}
+                form = {"order": parameters["order"], **form}
+                if form != parameters:
+                    smaller.append((form, _kept(parameters, form)))
         return smaller
+
+    def simpler(self, parameters: Parameters) -> Effect | None:
+        """Answer through half as many filters, and at last through none."""
+        density = parameters.get("answer", 0.0)
+        return Ripple(density / 2 if density > COARSEST else 0.0) if density else None
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
@@ -81,6 +137,84 @@ class Ripple(Effect):
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""
         return read_order(parameters["order"], track)
+
+
+def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> list[Floats]:
+    """Put a ripple's waves through filters of second order, evenly spread over the octaves.
+
+    Parameters
+    ----------
+    track : Track
+        At the full rate.
+    waves : list of arrays of shape (n,)
+        Cosine and sine of the ripple's angle.
+    parameters : dict
+        `answer`, the filters per octave, and `top_hz`, the highest one's frequency; if that is
+        missing, the ripple's own where the joint is as fast as it gets.
+
+    Returns
+    -------
+    list of arrays of shape (n,)
+        For every filter, highest first, what a low-pass and a band-pass make of each wave.
+    """
+    found = []
+    top_hz = parameters.get("top_hz") or _top_hz(track, parameters["order"])
+    for k in range(_filters(top_hz, parameters["answer"])):
+        w = 2 * np.pi * top_hz / 2.0 ** (k / parameters["answer"])
+        # The bilinear transform bends frequencies; start from the bent one.
+        w = 2 * track.rate_hz * np.tan(w / (2 * track.rate_hz))
+        below = (1.0, 2 * DAMPING * w, w * w)
+        for above in ((0.0, 0.0, w * w), (0.0, w, 0.0)):
+            zeros, poles = discrete(above, below, track.rate_hz)
+            for wave in waves:
+                filtered = np.empty(track.size)
+                for start, stop in track.bounds:
+                    part = wave[start:stop]
+                    rest = at_rest(zeros, poles) * part[0]
+                    filtered[start:stop] = lfilter(zeros, poles, part, zi=rest)[0]
+                found.append(filtered)
+    return found
+
+
+def _filters(top_hz: float, density: float) -> int:
+    """Count the filters from a highest frequency down, so many per octave; one at least."""
+    octaves = min(math.log2(top_hz / LOWEST_HZ), OCTAVES)
+    return 1 + max(int(density * octaves), 0)
+
+
+def _following_model(waves: list[Floats], track: Track, parameters: Parameters) -> list[Floats]:
+    sizes = {"load": np.sign(track.model_a), "current": track.model_a}
+    return [size * wave for name, size in sizes.items() if parameters.get(name) for wave in waves]
+
+
+def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
+    """Columns of a full form that a smaller one has, in the order of `Ripple.columns`."""
+    densest, density = parameters.get("answer", 0.0), form.get("answer", 0.0)
+    count = _filters(parameters["top_hz"], densest) if densest else 0
+    step = round(densest / density) if density else count + 1
+    answers = [density > 0 and k % step == 0 for k in range(count) for _ in range(4)]
+    parts = {
+        "order": [True, True],
+        "speed": [True, True],
+        "answer": answers,
+        "direction": [True, True, *answers],
+        "load": [True, True],
+        "current": [True, True],
+    }
+    flags = [
+        kept and name in form
+        for name, columns in parts.items()
+        if parameters.get(name)
+        for kept in columns
+    ]
+    return tuple(place for place, kept in enumerate(flags) if kept)
+
+
+def _top_hz(track: Track, order: float) -> float:
+    """Frequency of an order at a speed that a hundredth of the moving samples exceeds."""
+    speed = np.abs(np.gradient(track.machine_angle_rad)) * track.rate_hz
+    fastest = float(np.quantile(speed[track.moving], 0.99))
+    return min(order * fastest / (2 * math.pi), HIGHEST_SHARE * track.rate_hz)
 
 
 def named_orders(track: Track, order: float) -> list[float]:

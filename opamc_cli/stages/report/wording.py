@@ -154,8 +154,10 @@ def _order_first(item: tuple[str, object]) -> tuple[bool, str]:
 
 def _parameter(name: str, value: object) -> str:
     # a ripple's switches: whether its amplitude and phase depend on this
-    if name in ("speed", "direction", "load") and value in (0, 1):
+    if name in ("speed", "direction", "load", "current") and value in (0, 1):
         return f"varies with {name}" if value else ""
+    if name == "answer":
+        return f"the drive's answer, {_plain(value)} filters per octave" if value else ""
     return f"{name} {_plain(value)}"
 
 
