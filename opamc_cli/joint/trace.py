@@ -140,22 +140,19 @@ def _p_value(session: Session, view: View, candidate: Candidate, trials: int, ga
 
 
 def _predicting_best(fitted: Fit, view: View, candidate: Candidate, held: Held) -> Candidate:
-    """Leave groups out of a candidate and of its simpler forms; take the one that gains most.
+    """Leave groups out of a candidate; if it does not predict them, of its simpler forms.
 
     The likelihood is of what was fitted, and whitened: it hardly sees slow regressors that are
     nearly the same, whose coefficients mean nothing elsewhere.
     """
-    best = tried = held_out(fitted, candidate, held)
-    while (effect := tried.term.effect.simpler(tried.term.parameters)) is not None:
+    tested: Candidate | None = held_out(fitted, candidate, held)
+    while tested is not None and tested.gain <= 0:
+        effect = tested.term.effect.simpler(tested.term.parameters)
+        if effect is None:
+            break
         found, _tried = search(fitted.session, view, effect)
-        if found is None:
-            break
-        tried = held_out(fitted, found, held)
-        if tried.gain > best.gain:
-            best = tried
-        elif best.gain > 0:
-            break
-    return best
+        tested = None if found is None else held_out(fitted, found, held)
+    return tested or held_out(fitted, candidate, held)
 
 
 def _simplest_first(found: list[Candidate], library: Library, session: Session) -> None:

@@ -8,7 +8,7 @@ from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.second_order import at_rest, discrete
-from opamc_cli.joint.spectra import order_lines, order_resolution
+from opamc_cli.joint.spectra import LOWEST_ORDER, order_lines, order_resolution
 from opamc_cli.joint.track import Floats, Track
 
 SWITCHES = ("speed", "direction", "load", "current")
@@ -24,6 +24,10 @@ FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 keep. Every other filter, and every fourth, are the smaller forms."""
 SIDE_RESOLUTIONS = 3.0
 """A resonance of the drive moves the strongest line so far from the order that it comes from."""
+LOWEST_ANSWERED = 2.0
+"""Times the lowest order of all: what is slower than that, filtered, looks like friction."""
+MANY_SAMPLES = 90_000
+"""Above, only the coarsest answer is tried: a hundred regressors would take a hundred megabytes."""
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
 
@@ -63,17 +67,22 @@ class Ripple(Effect):
         found: list[Parameters] = []
         for order, power in order_lines(track, residual, count=2):
             plain = {"order": order, **dict.fromkeys(SWITCHES, 1.0)}
-            top_hz = _top_hz(track, order)
-            density = next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
-            density = min(density, self.densest)
-            if density and top_hz > LOWEST_HZ and not found:
-                answered = plain | {"answer": density, "top_hz": top_hz}
+            if not found and (density := self._density(track, order, power)):
+                answered = plain | {"answer": density, "top_hz": _top_hz(track, order)}
                 del answered["speed"]
-                near = SIDE_RESOLUTIONS * order_resolution(track)
-                meant = [named for named in named_orders(track, order) if abs(named - order) < near]
-                found += [answered | {"order": one} for one in (order, *meant)]
+                found += [answered | {"order": one} for one in (order, *_meant(track, order))]
             found.append(plain)
         return found
+
+    def _density(self, track: Track, order: float, power: float) -> float:
+        """Choose how many filters per octave a line may be worth; 0 where it has no answer."""
+        lowest = LOWEST_ANSWERED * LOWEST_ORDER[track.angle_kind]
+        if order < lowest or _top_hz(track, order) <= LOWEST_HZ:
+            return 0.0
+        density = next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
+        if np.count_nonzero(track.moving) > MANY_SAMPLES:
+            density = min(density, COARSEST)
+        return min(density, self.densest)
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anything above joint-angle orders."""
@@ -208,6 +217,13 @@ def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
         for kept in columns
     ]
     return tuple(place for place, kept in enumerate(flags) if kept)
+
+
+def _meant(track: Track, order: float) -> list[float]:
+    """Orders with a meaning from which a resonance may have moved the strongest line."""
+    resolution = order_resolution(track)
+    named = {float(one) for one in named_orders(track, order)}
+    return [one for one in sorted(named) if 0.25 < abs(one - order) / resolution < SIDE_RESOLUTIONS]
 
 
 def _top_hz(track: Track, order: float) -> float:
