@@ -26,8 +26,9 @@ SIDE_RESOLUTIONS = 3.0
 """A resonance of the drive moves the strongest line so far from the order that it comes from."""
 LOWEST_ANSWERED = 2.0
 """Times the lowest order of all: what is slower than that, filtered, looks like friction."""
-MANY_SAMPLES = 90_000
-"""Above, only the coarsest answer is tried: a hundred regressors would take a hundred megabytes."""
+MOST_ANSWERED = 90_000
+"""Above so many moving samples lines are left plain: a hundred regressors of a recording of ten
+minutes would take gigabytes and minutes."""
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
 
@@ -79,9 +80,9 @@ class Ripple(Effect):
         lowest = LOWEST_ANSWERED * LOWEST_ORDER[track.angle_kind]
         if order < lowest or _top_hz(track, order) <= LOWEST_HZ:
             return 0.0
+        if np.count_nonzero(track.moving) > MOST_ANSWERED:
+            return 0.0
         density = next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
-        if np.count_nonzero(track.moving) > MANY_SAMPLES:
-            density = min(density, COARSEST)
         return min(density, self.densest)
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
