@@ -105,6 +105,8 @@ class Round:
         self._views = {}
         if self._traced is not None:
             self._traced = replace(self._traced, views={})
+        for grid in (self.fitted.session.fine, self.fitted.session.coarse):
+            grid.track.forget()
 
     def _view(self, fine: bool) -> View:
         if fine not in self._views:

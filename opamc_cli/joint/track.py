@@ -153,6 +153,22 @@ class Track:
         blocks = [term.columns(source) for term in self.static_terms]
         return np.concatenate([np.zeros((source.size, 0)), *blocks], axis=1)
 
+    @cached_property
+    def static_sums(self) -> tuple[Floats, ...]:
+        """Running sums of the static regressors, recording by recording, from zero."""
+        bounds = (self.full or self).bounds
+        found = []
+        for start, stop in bounds:
+            sums = np.zeros((stop - start + 1, self.static_columns.shape[1]))
+            np.cumsum(self.static_columns[start:stop], axis=0, out=sums[1:])
+            found.append(sums)
+        return tuple(found)
+
+    def forget(self) -> None:
+        """Give back the static regressors; they are computed again where they are needed."""
+        self.__dict__.pop("static_columns", None)
+        self.__dict__.pop("static_sums", None)
+
     def with_model(
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":

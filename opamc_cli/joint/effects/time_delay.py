@@ -54,15 +54,17 @@ class TimeDelay(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
+        sums = track.static_sums
         if parameters.get("filtered"):
             late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
             shifted = block_mean(np.concatenate(late), full.bounds, factor)
         else:
-            pieces = [columns[start:stop] for start, stop in full.bounds]
-            shifted = np.concatenate([late_means(piece, samples, factor) for piece in pieces])
+            shifted = np.concatenate([late_means(piece, samples, factor) for piece in sums])
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        return (shifted - block_mean(columns, full.bounds, factor)) * coefficients
+        own = np.concatenate([late_means(piece, 0.0, factor) for piece in sums])
+        parts: Floats = (shifted - own) * coefficients
+        return parts
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
@@ -88,13 +90,14 @@ class TimeDelay(Effect):
         return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
 
 
-def late_means(columns: Floats, samples: float, factor: int) -> Floats:
+def late_means(sums: Floats, samples: float, factor: int) -> Floats:
     """Means of blocks of columns that come later, the first and the last values held.
 
     Parameters
     ----------
-    columns : array of shape (n, k)
-        Uniformly sampled.
+    sums : array of shape (n + 1, k)
+        Running sums of uniformly sampled columns, from zero: with them a delay costs no more than
+        the blocks are.
     samples : float
         Delay; between samples, what a straight line between them gives.
     factor : int
@@ -103,16 +106,15 @@ def late_means(columns: Floats, samples: float, factor: int) -> Floats:
     Returns
     -------
     array of shape (n // factor, k)
-        From running sums: as quick for blocks of a hundred samples as for one.
     """
-    size = columns.shape[0]
-    reach = int(np.ceil(abs(samples))) + 1
-    held = np.pad(columns, ((reach, reach), (0, 0)), mode="edge")
-    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(held, axis=0)])
-    edges = factor * np.arange(size // factor + 1) + reach - samples
-    whole = np.floor(edges).astype(np.int64)
-    share = (edges - whole)[:, None]
+    size = sums.shape[0] - 1
+    edges = factor * np.arange(size // factor + 1) - samples
+    inside = np.clip(edges, 0.0, size)
+    whole = np.minimum(inside.astype(np.int64), size - 1)
+    share = (inside - whole)[:, None]
     at_edges = (1 - share) * sums[whole] + share * sums[whole + 1]
+    at_edges += np.minimum(edges, 0.0)[:, None] * (sums[1] - sums[0])
+    at_edges += np.maximum(edges - size, 0.0)[:, None] * (sums[-1] - sums[-2])
     means: Floats = np.diff(at_edges, axis=0) / factor
     return means
 
