@@ -154,15 +154,14 @@ class Track:
         return np.concatenate([np.zeros((source.size, 0)), *blocks], axis=1)
 
     @cached_property
-    def static_sums(self) -> tuple[Floats, ...]:
-        """Running sums of the static regressors, recording by recording, from zero."""
-        bounds = (self.full or self).bounds
-        found = []
-        for start, stop in bounds:
+    def static_sums(self) -> Floats:
+        """Running sums of the static regressors, from zero in each recording."""
+        parts = []
+        for start, stop in (self.full or self).bounds:
             sums = np.zeros((stop - start + 1, self.static_columns.shape[1]))
             np.cumsum(self.static_columns[start:stop], axis=0, out=sums[1:])
-            found.append(sums)
-        return tuple(found)
+            parts.append(sums)
+        return np.concatenate(parts)
 
     def forget(self) -> None:
         """Give back the static regressors; they are computed again where they are needed."""

@@ -232,11 +232,17 @@ def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
 @pytest.mark.parametrize("factor", [1, 8])
 def test_means_of_late_blocks_are_those_of_the_interpolated_signal(samples, factor):
     columns = np.random.default_rng(0).normal(size=(203, 3)).cumsum(axis=0)
-    places = np.arange(203.0)
-    late = np.stack([np.interp(places - samples, places, column) for column in columns.T], axis=1)
-    expected = block_mean(late, ((0, 203),), factor)
-    sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
-    np.testing.assert_allclose(late_means(sums, samples, factor), expected, atol=1e-9)
+    bounds = ((0, 80), (80, 203))
+    late, sums = [], []
+    for start, stop in bounds:
+        places = np.arange(stop - start)
+        for column in columns[start:stop].T:
+            late.append(np.interp(places - samples, places, column))
+        sums.append(np.concatenate([np.zeros((1, 3)), np.cumsum(columns[start:stop], axis=0)]))
+    shifted = np.concatenate([np.stack(late[:3], axis=1), np.stack(late[3:], axis=1)])
+    expected = block_mean(shifted, bounds, factor)
+    found = late_means(np.concatenate(sums), bounds, samples, factor)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_wind_up_on_the_coarse_grid_is_the_average_of_that_at_the_full_rate():

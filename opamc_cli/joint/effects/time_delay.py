@@ -54,15 +54,14 @@ class TimeDelay(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
-        sums = track.static_sums
         if parameters.get("filtered"):
             late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
             shifted = block_mean(np.concatenate(late), full.bounds, factor)
         else:
-            shifted = np.concatenate([late_means(piece, samples, factor) for piece in sums])
+            shifted = late_means(track.static_sums, full.bounds, samples, factor)
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        own = np.concatenate([late_means(piece, 0.0, factor) for piece in sums])
+        own = late_means(track.static_sums, full.bounds, 0.0, factor)
         parts: Floats = (shifted - own) * coefficients
         return parts
 
@@ -90,14 +89,18 @@ class TimeDelay(Effect):
         return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
 
 
-def late_means(sums: Floats, samples: float, factor: int) -> Floats:
+def late_means(
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
+) -> Floats:
     """Means of blocks of columns that come later, the first and the last values held.
 
     Parameters
     ----------
-    sums : array of shape (n + 1, k)
-        Running sums of uniformly sampled columns, from zero: with them a delay costs no more than
-        the blocks are.
+    sums : array of shape (n + recordings, k)
+        Running sums of uniformly sampled columns, from zero in each recording: with them a delay
+        costs no more than there are blocks.
+    bounds : tuple of (int, int)
+        Half-open recordings among the n samples.
     samples : float
         Delay; between samples, what a straight line between them gives.
     factor : int
@@ -105,17 +108,24 @@ def late_means(sums: Floats, samples: float, factor: int) -> Floats:
 
     Returns
     -------
-    array of shape (n // factor, k)
+    array of shape (n // factor per recording, k)
     """
-    size = sums.shape[0] - 1
-    edges = factor * np.arange(size // factor + 1) - samples
+    sizes = np.array([stop - start for start, stop in bounds])
+    counts = sizes // factor + 1
+    firsts = np.concatenate([[0], np.cumsum(sizes + 1)[:-1]])
+    places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    edges = factor * places - samples
+    size = np.repeat(sizes, counts)
     inside = np.clip(edges, 0.0, size)
     whole = np.minimum(inside.astype(np.int64), size - 1)
     share = (inside - whole)[:, None]
+    whole += np.repeat(firsts, counts)
     at_edges = (1 - share) * sums[whole] + share * sums[whole + 1]
-    at_edges += np.minimum(edges, 0.0)[:, None] * (sums[1] - sums[0])
-    at_edges += np.maximum(edges - size, 0.0)[:, None] * (sums[-1] - sums[-2])
-    means: Floats = np.diff(at_edges, axis=0) / factor
+    outside = np.flatnonzero((edges < 0) | (edges > size))
+    # Before the beginning and after the end the nearest step goes on.
+    steps = sums[whole[outside] + 1] - sums[whole[outside]]
+    at_edges[outside] += (edges - inside)[outside, None] * steps
+    means: Floats = np.diff(at_edges, axis=0)[np.diff(places) > 0] / factor
     return means
 
 
