@@ -10,7 +10,7 @@ from opamc_cli.joint.track import Bools, Track, excerpt
 MOST_SAMPLES = 250_000
 """Above this many moving samples, evenly spread parts of the open groups stand for all."""
 
-TAKEN_SAMPLES = 150_000
+TAKEN_SAMPLES = 100_000
 """So many of all moving samples are taken (times the share of the open ones)."""
 
 FEWEST_GROUPS = 12
@@ -42,7 +42,7 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     Returns
     -------
     list of (int, int)
-        Half-open pieces with some 150 000 moving samples times the open groups' share; more
+        Half-open pieces with some 100 000 moving samples times the open groups' share; more
         where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)

@@ -163,10 +163,16 @@ class Track:
             parts.append(sums)
         return np.concatenate(parts)
 
+    @cached_property
+    def static_means(self) -> Floats:
+        """Regressors of the static terms on this track's own samples, shape (n, k)."""
+        full = self.full or self
+        return block_mean(self.static_columns, full.bounds, round(full.rate_hz / self.rate_hz))
+
     def forget(self) -> None:
         """Give back the static regressors; they are computed again where they are needed."""
-        self.__dict__.pop("static_columns", None)
-        self.__dict__.pop("static_sums", None)
+        for name in ("static_columns", "static_sums", "static_means"):
+            self.__dict__.pop(name, None)
 
     def with_model(
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"

@@ -61,8 +61,7 @@ class TimeDelay(Effect):
             shifted = late_means(track.static_sums, full.bounds, samples, factor)
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        own = late_means(track.static_sums, full.bounds, 0.0, factor)
-        parts: Floats = (shifted - own) * coefficients
+        parts: Floats = (shifted - track.static_means) * coefficients
         return parts
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
