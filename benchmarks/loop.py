@@ -328,7 +328,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a few seeds only")
     parser.add_argument("--seeds", type=int, default=0, help="seeds per effect; null runs: x 20")
-    parser.add_argument("--first-seed", type=int, default=22000)
+    parser.add_argument("--first-seed", type=int, default=28000)
     parser.add_argument("--mode", choices=("position", "phases"), default="position")
     parser.add_argument("--only", default="", help="effects, separated by commas; or null, removed")
     parser.add_argument("--ratios", default="0.3,0.6")
