@@ -14,8 +14,9 @@ from opamc_cli.stages.parallel import Outcome, map_items
 from opamc_cli.storage.ingest.convert import convert
 from opamc_cli.storage.ingest.dates import utc_text
 from opamc_cli.storage.ingest.map import IngestMap, RateMap, ValueMap, quantity_of, rate_hz
+from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.resample import resample
-from opamc_cli.storage.ingest.source import Array, Block, Selection, Source, open_source
+from opamc_cli.storage.ingest.source import Array, Block, Selection, Source
 from opamc_cli.storage.ingest.stamps import Clock, Seconds, StampAccount, examine
 from opamc_cli.storage.ingest.units import ISO8601, SAMPLES, conversion
 from opamc_cli.storage.lock import output_lock

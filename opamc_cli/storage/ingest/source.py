@@ -1,9 +1,6 @@
 """What a foreign recording offers, whatever its format."""
 
-import struct
-import zlib
 from collections.abc import Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -12,29 +9,13 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.map import IngestMap, Name, format_of
+from opamc_cli.storage.ingest.map import Name
 
 Array = npt.NDArray[Any]
 Block = dict[str, Array]
 
 BLOCK_ROWS = 1 << 16
 """Rows that are in memory at a time: 10 MB for 20 channels."""
-
-LIBRARY_ERRORS = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    EOFError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    TypeError,
-    ValueError,
-    struct.error,
-    zlib.error,
-)
-"""What h5py, scipy and npTDMS raise on damaged files, for want of errors of their own."""
 
 
 @dataclass(frozen=True)
@@ -75,82 +56,6 @@ class Source(Protocol):
     def value(self, source: Name) -> object:
         """Return a single value: a channel's first, or an attribute."""
         ...
-
-
-@contextmanager
-def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
-    """Open a foreign recording.
-
-    Raises
-    ------
-    InputError
-        If it is missing, damaged or not of its format, or a library to read it is not installed.
-    """
-    if path.is_dir():
-        msg = f"{path}: is a folder where a recording is needed; name the files in it"
-        raise InputError(msg)
-    if not path.exists():
-        msg = f"{path}: no such file; check the path"
-        raise InputError(msg)
-    if path.stat().st_size == 0:
-        msg = f"{path}: is empty (0 bytes); record it again"
-        raise InputError(msg)
-    with ExitStack() as stack:
-        with _readable(path):
-            source = stack.enter_context(_opened(path, channels))
-        yield _Guarded(path, source)
-
-
-def _opened(path: Path, channels: IngestMap) -> AbstractContextManager[Source]:
-    # each format's library is imported only where that format is read
-    match format_of(path, channels):
-        case "csv":
-            from opamc_cli.storage.ingest.csv import CsvSource
-
-            return CsvSource(path, channels)
-        case "mat":
-            from opamc_cli.storage.ingest.mat import open_mat
-
-            return open_mat(path)
-        case "hdf5":
-            from opamc_cli.storage.ingest.hdf5 import open_hdf5
-
-            return open_hdf5(path)
-        case _:
-            from opamc_cli.storage.ingest.tdms import open_tdms
-
-            return open_tdms(path)
-
-
-@contextmanager
-def _readable(path: Path) -> Iterator[None]:
-    try:
-        yield
-    except LIBRARY_ERRORS as error:
-        reason = " ".join(str(error).split())[:120] or type(error).__name__
-        msg = f"{path}: cannot be read ({reason}); it is damaged, or format in the map is wrong"
-        raise InputError(msg) from error
-
-
-class _Guarded:
-    """A source whose library's errors name the file."""
-
-    def __init__(self, path: Path, source: Source) -> None:
-        self._path = path
-        self._source = source
-
-    def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
-        blocks = self._source.blocks(selections)
-        while True:
-            with _readable(self._path):
-                block = next(blocks, None)
-            if block is None:
-                return
-            yield block
-
-    def value(self, source: Name) -> object:
-        with _readable(self._path):
-            return self._source.value(source)
 
 
 def missing_channel(path: Path, source: Name, known: list[str]) -> InputError:
