@@ -356,6 +356,8 @@ def pressed_limit(session: Session, view: View, candidate: Candidate) -> str | N
         low, high = limits[name]
         value, near = term.parameters[name], NEAR * (high - low)
         inward = near if value < low + near else -near
+        if name in effect.firm_limits:
+            return f"its {name} lies at the limit {low if inward > 0 else high:.3g}"
         moved = Term(effect, term.parameters | {name: value + inward}, term.keep)
         bend = (columns - view.whitened_rows(session.columns(moved, candidate.fine))) @ (
             candidate.coefficients

@@ -42,6 +42,8 @@ class Effect:
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
     open_limits: tuple[str, ...] = ()
     """Parameters whose limits only bound the search: beyond them the effect is still itself."""
+    firm_limits: tuple[str, ...] = ()
+    """Parameters at whose limits the effect is none, however well it fits there."""
     free_refinement: bool = True
     """True where the number of guesses counts the choice; False where refining the best one
     chooses among many more, and its parameters count as coefficients do."""

@@ -24,6 +24,8 @@ class Elasticity(Effect):
     dense_guesses = True
     from_motion = True
     free_refinement = False
+    # What hardly rings follows every error of the acceleration.
+    firm_limits = ("damping",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz up, three dampings."""
