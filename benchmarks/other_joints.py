@@ -1,6 +1,6 @@
 """The loop on joints of another kind than those of the testbed and of the tests.
 
-    python benchmarks/other_joints.py [--seeds 2] [--first-seed 19900]
+    python benchmarks/other_joints.py [--seeds 2] [--first-seed 29100]
         [--motions trapezoidal,cubic] [--effects none,ripple] [--strengths 2,6] [--verbose]
 
 Every joint (algebraic_joint.py) lacks one effect of the library, or none; it has a position and a
@@ -124,7 +124,7 @@ def row(motion: str, what: str, closings: list[Closing]) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=2, help="per motion, effect and strength")
-    parser.add_argument("--first-seed", type=int, default=19900)
+    parser.add_argument("--first-seed", type=int, default=29100)
     parser.add_argument("--motions", default=",".join(MOTIONS))
     parser.add_argument("--effects", default=",".join([NONE, *EFFECTS]))
     parser.add_argument("--strengths", default="2,6")
