@@ -7,6 +7,7 @@ from pathlib import Path
 from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages import identify, patterns, segment
+from opamc_cli.stages.kept import KeptResults
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,7 @@ def run_chain(
     *,
     reference: Path | None = None,
     jobs: int = 1,
+    kept: KeptResults | None = None,
 ) -> ChainOutcome:
     """Run segment, identify and patterns over runs, each stage from the file before it.
 
@@ -57,15 +59,19 @@ def run_chain(
         Motion table whose reference cycles are taken; None: found in these runs.
     jobs
         Worker processes.
+    kept
+        Where results of the same work may lie.
 
     Raises
     ------
     OpamcError
         If no run can be used.
     """
-    segmented = segment.run(paths, config, out, jobs=jobs)
-    identified = identify.run(segmented.path, config, out, reference=reference, jobs=jobs)
-    counted = patterns.run(identified.path, config, out, jobs=jobs)
+    segmented = segment.run(paths, config, out, jobs=jobs, kept=kept)
+    identified = identify.run(
+        segmented.path, config, out, reference=reference, jobs=jobs, kept=kept
+    )
+    counted = patterns.run(identified.path, config, out, jobs=jobs, kept=kept)
     names = dict.fromkeys(segmented.table.column("run").to_pylist())
     return ChainOutcome(
         segments=segmented.path,

@@ -9,6 +9,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, OpamcError
 from opamc_cli.stages import cause, report, score, verdict
 from opamc_cli.stages.chain import run_chain
+from opamc_cli.stages.kept import KeptResults
 from opamc_cli.stages.latent import LatentModels
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
@@ -52,6 +53,8 @@ def run(
     models: LatentModels | None = None,
     jobs: int = 1,
     progress: Callable[[str], None] = lambda _: None,
+    kept: KeptResults | None = None,
+    figures_of_healthy: bool = True,
 ) -> DiagnoseOutcome:
     """Compare target runs with baseline runs, joint by joint.
 
@@ -69,6 +72,11 @@ def run(
         Worker processes.
     progress
         Called with the name of each step as it begins.
+    kept
+        Where results of the same work on the baseline may lie.
+    figures_of_healthy
+        Whether the report of a diagnosis in which every joint is healthy has figures: they take
+        longer than the diagnosis of a short recording.
 
     Raises
     ------
@@ -80,7 +88,7 @@ def run(
         (out / name).unlink(missing_ok=True)
     _check_before(baseline, target)
     progress("baseline: segment, identify, patterns")
-    normal = run_chain(baseline, config, out / "baseline", jobs=jobs)
+    normal = run_chain(baseline, config, out / "baseline", jobs=jobs, kept=kept)
     progress("target: segment, identify, patterns")
     other = run_chain(target, config, out / "target", reference=normal.motions, jobs=jobs)
     progress("score")
@@ -112,7 +120,9 @@ def run(
                 causes[axis] = found
         decided = verdict.run(*tables, config, out, spectra=spectra, causes=causes)
     progress("report")
-    page = report.run(out, title=config.report.title)
+    healthy = all(entry["state"] == "healthy" for entry in decided.verdict["axes"])
+    figures = figures_of_healthy or not healthy
+    page = report.run(out, title=config.report.title, figures=figures)
     return DiagnoseOutcome(
         verdict=decided.verdict,
         verdict_path=decided.path,

@@ -18,6 +18,7 @@ from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
 from opamc_cli.signal.short_time import short_time_log_power
 from opamc_cli.stages.envelope import current_offset, read_envelope
+from opamc_cli.stages.kept import KeptResults, remembered
 from opamc_cli.stages.parallel import map_items
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
 from opamc_cli.storage.tables import (
@@ -80,6 +81,7 @@ def run(
     *,
     moved_to: Sequence[Path] = (),
     jobs: int = 1,
+    kept: KeptResults | None = None,
 ) -> PatternsOutcome:
     """Count the ordinal patterns of every identified segment's envelope; keep its spectrum.
 
@@ -95,6 +97,8 @@ def run(
         Folders of the runs, if they were moved.
     jobs
         Worker processes.
+    kept
+        Where results of the same work may lie.
 
     Raises
     ------
@@ -109,7 +113,7 @@ def run(
         _Job(part.source, part.axis, part.rows, config.patterns)
         for part in identified_parts(table, sources)
     ]
-    outcome = map_items(_analyse, work, jobs)
+    outcome = map_items(remembered(_analyse, kept), work, jobs)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     patterns, spectra = (

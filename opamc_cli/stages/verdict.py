@@ -172,6 +172,11 @@ def decide(
                 "health_index": _finite(decided.health_index),
                 "p_value": _finite(decided.p_value),
                 "p_adjusted": _finite(decided.p_adjusted),
+                "distance": {
+                    "ratio": _finite(decided.distance_ratio),
+                    "common": _finite(math.exp(decided.common_log_ratio)),
+                    "effect": _finite(decided.effect),
+                },
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
