@@ -31,11 +31,12 @@ from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.signal.analytic import clarke
 from opamc_cli.stages import identify, patterns
-from opamc_cli.stages.cells import cells_by_axis, session_names, spectrum_cells
+from opamc_cli.stages.cells import bundles
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.patterns import aligned_span
-from opamc_cli.stages.score import group_patterns
-from opamc_cli.stats.decision import judge
+from opamc_cli.stages.side import Side, Sides
+from opamc_cli.stages.witnesses import WITNESSES
+from opamc_cli.stats.decision import Bundle, judge
 from opamc_cli.stats.discriminant import fit
 from opamc_cli.stats.divergence import divergences_from_pool
 from opamc_cli.stats.features import compare
@@ -189,7 +190,10 @@ def record_fleet(job) -> dict:
                 robot, program, seed, folder / "target", n_sessions, severity, axes
             )
             recordings["target"][name] = recording
-        tables: dict[str, list[pa.Table]] = {"motions": [], "patterns": [], "spectra": []}
+        tables: dict[str, list[pa.Table]] = {
+            name: []
+            for name in ("motions", "patterns", *(witness.FILE_NAME for witness in WITNESSES))
+        }
         reference = None
         for side in ("baseline", "target"):
             out = folder / f"{side}-out"
@@ -197,19 +201,22 @@ def record_fleet(job) -> dict:
                 f_max_hz = robot.electrical_hz_full_speed * program.speed_percent / 100
                 motions = taught_motions(folder / side, recordings[side], f_max_hz, out)
                 counted = patterns.run(motions, config, out)
-                paths = (motions, counted.path, counted.spectra_path)
+                paths = (motions, counted.path)
             else:
                 done = run_chain([folder / side], config, out, reference=reference)
                 reference = done.motions
-                paths = (done.motions, done.patterns, done.spectra)
-            for name, stage, table in zip(
-                tables, ("identify", "patterns", "patterns"), paths, strict=True
-            ):
+                paths = (done.motions, done.patterns)
+            paths += tuple(paths[1].with_name(witness.FILE_NAME) for witness in WITNESSES)
+            for name, table in zip(tables, paths, strict=True):
+                stage = "identify" if name == "motions" else "patterns"
                 tables[name].append(read_table(table, stage).replace_schema_metadata(None))
     both = recordings["baseline"] | recordings["target"]
     stored = {
-        "patterns": pa.concat_tables(tables["patterns"]).combine_chunks(),
-        "spectra": pa.concat_tables(tables["spectra"]).combine_chunks(),
+        "tables": {
+            name: pa.concat_tables(parts).combine_chunks()
+            for name, parts in tables.items()
+            if name != "motions"
+        },
         "rivals": rival_rows(both, pa.concat_tables(tables["motions"]).to_pylist()),
     }
     CACHE.mkdir(parents=True, exist_ok=True)
@@ -243,13 +250,16 @@ def of_runs(table: pa.Table, runs: list[str], axis: int | None = None) -> pa.Tab
     return table.filter(chosen)
 
 
-def session_cells(stored, axis: int, baseline: list[str], target: str):
-    """Return what `judge` takes of one axis: pattern cells and spectrum cells."""
-    sides = [of_runs(stored["patterns"], runs, axis) for runs in (baseline, [target])]
-    own, other = (group_patterns(side) for side in sides)
-    spectra = [of_runs(stored["spectra"], runs, axis) for runs in (baseline, [target])]
-    cells = cells_by_axis(own, other).get(axis, [])
-    return cells, spectrum_cells(*spectra, axis, session_names(axis, own, other))
+def axis_bundle(stored, axis: int, baseline: list[str], target: str):
+    """Return what `judge` takes of one axis."""
+    sides = []
+    for runs in (baseline, [target]):
+        own = {name: of_runs(table, runs, axis) for name, table in stored["tables"].items()}
+        sources = tuple(
+            RunSource(name, Path(name), "", 0, RunInfo(sampling_rate_hz=RATE_HZ)) for name in runs
+        )
+        sides.append(Side(Path("patterns.parquet"), sources, own.pop("patterns"), own))
+    return bundles(Sides(*sides)).get(axis, Bundle([]))
 
 
 def thesis_features(cells, order: int) -> list[float]:
@@ -297,16 +307,10 @@ def judge_fleet(job) -> list[dict]:
     for severity in SEVERITIES:
         target = run_name(n_sessions, severity)
         for axis in AXES if severity == 0 else [bad]:
-            six[axis] = session_cells(stored, axis, names, run_name(n_sessions, severity))
-            one[axis] = session_cells(stored, axis, names[:1], run_name(n_sessions, severity))
+            six[axis] = axis_bundle(stored, axis, names, run_name(n_sessions, severity))
+            one[axis] = axis_bundle(stored, axis, names[:1], run_name(n_sessions, severity))
             scores[axis] = rival_scores(stored, axis, names, target, seed)
-        judged, single = (
-            judge(
-                {a: c[0] for a, c in cells.items()},
-                spectra_by_axis={a: c[1] for a, c in cells.items()},
-            )
-            for cells in (six, one)
-        )
+        judged, single = (judge(bundles_of_axes) for bundles_of_axes in (six, one))
         for axis in AXES:
             j, j1 = judged[axis], single[axis]
             results.append(
@@ -321,8 +325,8 @@ def judge_fleet(job) -> list[dict]:
                     "state": j.state,
                     "state_one": j1.state,
                     "p_one": j1.p_value,
-                    "thesis4": thesis_features(one[axis][0], 4),
-                    "thesis5": thesis_features(one[axis][0], 5),
+                    "thesis4": thesis_features(one[axis].cells, 4),
+                    "thesis5": thesis_features(one[axis].cells, 5),
                     "scores": {
                         "opamc": -float(np.log10(j.p_value)),
                         "opamc, one baseline session": -float(np.log10(j1.p_value)),

@@ -50,7 +50,8 @@ def patterns(
     output.result(
         {
             "written": str(outcome.path),
-            "spectra": str(outcome.spectra_path),
+            "spectra": str(outcome.path.with_name("spectra.parquet")),
+            "profiles": str(outcome.path.with_name("profiles.parquet")),
             "motions": counted,
         },
         *(
@@ -59,6 +60,5 @@ def patterns(
             for c in counted
         ),
         str(outcome.path),
-        str(outcome.spectra_path),
     )
     raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))

@@ -156,6 +156,11 @@ class PatternsConfig(Section):
     bins: Annotated[int, Field(ge=2, le=256)] = Field(
         16, description="Lowest frequencies of each part that are kept, in periods per part."
     )
+    parts: Annotated[int, Field(ge=0, le=1024)] = Field(
+        32,
+        description="Equal parts of a motion whose mean current is kept, for the decision by its "
+        "course; 0: none.",
+    )
 
 
 class ScoreConfig(Section):
@@ -182,6 +187,11 @@ class ScoreConfig(Section):
     )
     seed: Annotated[int, Field(ge=0)] = Field(
         0, description="Seed of the draw where there are more ways."
+    )
+    day_starts_at: Annotated[float, Field(ge=0, lt=24)] = Field(
+        12.0,
+        description="Hour of the day, UTC, at which one night of recordings ends and the next "
+        "begins; noon, so that a night shift is one session.",
     )
 
 

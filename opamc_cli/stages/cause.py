@@ -2,8 +2,9 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
+
+import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import OpamcError
@@ -12,7 +13,6 @@ from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.track import Joint
 from opamc_cli.stages.axis_recording import read_recording
 from opamc_cli.storage.sources import RunSource
-from opamc_cli.storage.tables import read_table
 
 MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
@@ -62,11 +62,10 @@ def explain(
     return _entry(explain_change(sides[0], sides[1], joint))
 
 
-def first_motions(patterns: Path) -> dict[int, dict[str, int]]:
+def first_motions(patterns: pa.Table) -> dict[int, dict[str, int]]:
     """Return, by axis and run, where the first identified motion of a pattern table starts."""
     found: dict[int, dict[str, int]] = {}
-    columns = read_table(patterns, "patterns").select(["axis", "run", "start"])
-    for row in columns.to_pylist():
+    for row in patterns.select(["axis", "run", "start"]).to_pylist():
         runs = found.setdefault(row["axis"], {})
         runs[row["run"]] = min(row["start"], runs.get(row["run"], row["start"]))
     return found

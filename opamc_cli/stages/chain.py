@@ -16,8 +16,8 @@ class ChainOutcome:
 
     Attributes
     ----------
-    segments, motions, patterns, spectra
-        Paths of the four tables.
+    segments, motions, patterns
+        Paths of the tables; those of the witnesses lie beside the patterns.
     runs_done
         Names of the runs that went through.
     errors
@@ -30,7 +30,6 @@ class ChainOutcome:
     segments: Path
     motions: Path
     patterns: Path
-    spectra: Path
     runs_done: tuple[str, ...]
     errors: tuple[OpamcError, ...]
     notes: tuple[str, ...]
@@ -54,7 +53,7 @@ def run_chain(
     config
         All options.
     out
-        Folder of the four tables.
+        Folder of the tables.
     reference
         Motion table whose reference cycles are taken; None: found in these runs.
     jobs
@@ -77,7 +76,6 @@ def run_chain(
         segments=segmented.path,
         motions=identified.path,
         patterns=counted.path,
-        spectra=counted.spectra_path,
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
         notes=segmented.notes

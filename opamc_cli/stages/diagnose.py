@@ -11,8 +11,9 @@ from opamc_cli.stages import cause, report, score, verdict
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.kept import KeptResults
 from opamc_cli.stages.latent import LatentModels
+from opamc_cli.stages.side import Sides, read_side
 from opamc_cli.storage.runs import Run, find_runs
-from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
+from opamc_cli.storage.sources import RunSource, check_comparable
 
 
 @dataclass(frozen=True)
@@ -92,42 +93,37 @@ def run(
     progress("target: segment, identify, patterns")
     other = run_chain(target, config, out / "target", reference=normal.motions, jobs=jobs)
     progress("score")
-    scored = score.run(normal.patterns, other.patterns, config, out, models=models)
-    tables = (normal.patterns, other.patterns, scored.scores_path, scored.features_path)
-    spectra = (normal.spectra, other.spectra)
-    decided = verdict.run(*tables, config, out, spectra=spectra)
-    differing = [
-        entry["axis"]
-        for entry in decided.verdict["axes"]
-        if entry["state"] in ("changed", "fault")
-        or verdict.is_excused(entry["p_adjusted"], entry["state"], config.score)
-    ]
+    sides = Sides(read_side(normal.patterns), read_side(other.patterns), config.score.day_starts_at)
+    scored = score.compare_sides(sides, config, out, models=models)
+    decided = verdict.decide(sides, config)
+    differing = decided.differing(config.score) if config.joint.explain else []
+    causes: dict[int, dict[str, Any]] = {}
     notes: list[str] = []
-    if differing and config.joint.explain:
+    if differing:
         progress("cause")
-        sides = read_sources(normal.patterns), read_sources(other.patterns)
-        starts = cause.first_motions(normal.patterns), cause.first_motions(other.patterns)
-        causes: dict[int, dict[str, Any]] = {}
+        starts = [cause.first_motions(side.patterns) for side in (sides.baseline, sides.target)]
         for axis in differing:
             first = {**starts[0].get(axis, {}), **starts[1].get(axis, {})}
             try:
-                found = cause.explain(axis, *sides, config.joint, first)
+                found = cause.explain(
+                    axis, sides.baseline.sources, sides.target.sources, config.joint, first
+                )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
             if found is not None:
                 causes[axis] = found
-        decided = verdict.run(*tables, config, out, spectra=spectra, causes=causes)
+    written = verdict.write(decided, scored, config, out, causes=causes)
     progress("report")
-    healthy = all(entry["state"] == "healthy" for entry in decided.verdict["axes"])
+    healthy = all(entry["state"] == "healthy" for entry in written.verdict["axes"])
     figures = figures_of_healthy or not healthy
     page = report.run(out, title=config.report.title, figures=figures)
     return DiagnoseOutcome(
-        verdict=decided.verdict,
-        verdict_path=decided.path,
+        verdict=written.verdict,
+        verdict_path=written.path,
         report_path=page.path,
-        exit_code=decided.exit_code,
+        exit_code=written.exit_code,
         n_runs=len(normal.runs_done) + len(other.runs_done),
         errors=(*normal.errors, *other.errors),
         notes=(*normal.notes, *other.notes, *scored.notes, *notes),

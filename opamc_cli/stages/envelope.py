@@ -102,6 +102,21 @@ def read_envelope(
 ) -> npt.NDArray[np.floating]:
     """Read the current of an axis and return its envelope over start..stop.
 
+    See `read_course` for what is read.
+    """
+    return np.asarray(np.abs(read_course(run, axis, start, stop, wanted, offset)))
+
+
+def read_course(
+    run: Run,
+    axis: int,
+    start: int,
+    stop: int,
+    wanted: EnvelopeKind = "auto",
+    offset: complex = 0j,
+) -> npt.NDArray[np.floating]:
+    """Read the current of an axis whose course over start..stop repeats with the motion.
+
     Parameters
     ----------
     run
@@ -118,7 +133,8 @@ def read_envelope(
     Returns
     -------
     array
-        Shape (stop - start,), A, in the run's own float width.
+        Shape (stop - start,), A, in the run's own float width: the envelope of phase currents,
+        the reported current itself with its sign.
 
     Raises
     ------
@@ -127,7 +143,7 @@ def read_envelope(
     """
     current = read_current(run, axis, start, stop, wanted)
     if not np.iscomplexobj(current):
-        return np.asarray(np.abs(current))
+        return current
     vector = current - current.dtype.type(offset) if offset else current
     return np.asarray(envelope(vector))
 

@@ -1,6 +1,6 @@
 """Stage `patterns`: motions and runs in, ordinal pattern counts out (thesis 4.2).
 
-Beside them it keeps the short-time spectrum of the same envelopes, which the thesis does not.
+Beside them it keeps what the other witnesses look at, which the thesis does not.
 """
 
 from collections.abc import Sequence
@@ -16,22 +16,21 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
-from opamc_cli.signal.short_time import short_time_log_power
-from opamc_cli.stages.envelope import current_offset, read_envelope
+from opamc_cli.stages.envelope import current_offset, read_course
 from opamc_cli.stages.kept import KeptResults, remembered
 from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.witnesses import WITNESSES
+from opamc_cli.stages.witnesses.kept_rows import PLACE
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
 from opamc_cli.storage.tables import (
     MOTIONS,
     PATTERNS,
-    SPECTRA,
     read_table,
     table_input,
     write_table,
 )
 
 FILE_NAME = "patterns.parquet"
-SPECTRA_NAME = "spectra.parquet"
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,8 @@ class PatternsOutcome:
 
     Attributes
     ----------
-    path, spectra_path
-        The tables that were written.
+    path
+        The pattern table; those of the witnesses lie beside it.
     table
         The patterns' rows.
     errors
@@ -49,7 +48,6 @@ class PatternsOutcome:
     """
 
     path: Path
-    spectra_path: Path
     table: pa.Table
     errors: tuple[OpamcError, ...]
 
@@ -83,7 +81,7 @@ def run(
     jobs: int = 1,
     kept: KeptResults | None = None,
 ) -> PatternsOutcome:
-    """Count the ordinal patterns of every identified segment's envelope; keep its spectrum.
+    """Count the ordinal patterns of every identified segment's envelope; feed the witnesses.
 
     Parameters
     ----------
@@ -92,7 +90,7 @@ def run(
     config
         Section `patterns` is used.
     out
-        Folder of the two tables.
+        Folder of the tables.
     moved_to
         Folders of the runs, if they were moved.
     jobs
@@ -116,18 +114,23 @@ def run(
     outcome = map_items(remembered(_analyse, kept), work, jobs)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
-    patterns, spectra = (
-        pa.concat_tables([schema.empty_table(), *tables]).combine_chunks()
-        for schema, tables in (
-            (PATTERNS, [counted for counted, _ in outcome.results]),
-            (SPECTRA, [kept for _, kept in outcome.results]),
-        )
-    )
+    patterns = pa.concat_tables(
+        [PATTERNS.empty_table(), *(result[FILE_NAME] for result in outcome.results)]
+    ).combine_chunks()
+    beside = {
+        witness.FILE_NAME: pa.concat_tables(
+            [
+                witness.SCHEMA.empty_table(),
+                *(result[witness.FILE_NAME] for result in outcome.results),
+            ]
+        ).combine_chunks()
+        for witness in WITNESSES
+    }
     too_long = _windows_too_long(motions, patterns)
     if too_long and not any(patterns.column("n_patterns").to_pylist()):
         raise too_long[0]
     inputs, used = [table_input(motions)], config.canonical("patterns")
-    for name, rows in ((FILE_NAME, patterns), (SPECTRA_NAME, spectra)):
+    for name, rows in {FILE_NAME: patterns, **beside}.items():
         write_table(
             out / name,
             rows,
@@ -136,9 +139,7 @@ def run(
             inputs=inputs,
             extra=sources_record(sources, out),
         )
-    return PatternsOutcome(
-        out / FILE_NAME, out / SPECTRA_NAME, patterns, (*outcome.errors, *too_long)
-    )
+    return PatternsOutcome(out / FILE_NAME, patterns, (*outcome.errors, *too_long))
 
 
 def _windows_too_long(motions: Path, patterns: pa.Table) -> list[OpamcError]:
@@ -219,10 +220,11 @@ def delay(config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int) -> 
     return config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
 
 
-def _analyse(job: _Job) -> tuple[pa.Table, pa.Table]:
-    """Return the patterns and the spectra of the segments of one axis."""
+def _analyse(job: _Job) -> dict[str, pa.Table]:
+    """Return the patterns of the segments of one axis and what each witness keeps of them."""
     config = job.config
-    patterns, spectra = [], []
+    patterns: list[dict[str, Any]] = []
+    kept: dict[str, list[dict[str, Any]]] = {witness.FILE_NAME: [] for witness in WITNESSES}
     with job.source.open() as run:
         offset = 0j
         if config.remove_offset:
@@ -232,17 +234,23 @@ def _analyse(job: _Job) -> tuple[pa.Table, pa.Table]:
             start, stop = aligned_span(row)
             whole = stop <= run.n_samples
             stop = min(stop, run.n_samples)
-            envelope = _finite(read_envelope(run, job.axis, start, stop, config.envelope, offset))
+            current = _finite(read_course(run, job.axis, start, stop, config.envelope, offset))
             place = {**row, "start": start, "stop": stop}
-            patterns += _pattern_rows(place, envelope, run.sampling_rate_hz, config)
-            # cut short, a segment's frames would not be those of the others
-            if config.frames and whole:
-                spectra += _spectrum_rows(place, envelope, run.sampling_rate_hz, config)
+            patterns += _pattern_rows(place, np.abs(current), run.sampling_rate_hz, config)
+            # cut short, a segment's parts would not be those of the others
+            if whole:
+                for witness in WITNESSES:
+                    kept[witness.FILE_NAME] += witness.rows(
+                        place, current, run.sampling_rate_hz, config
+                    )
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
-    return (
-        pa.Table.from_pylist(patterns, schema=PATTERNS),
-        pa.Table.from_pylist(spectra, schema=SPECTRA),
-    )
+    return {
+        FILE_NAME: pa.Table.from_pylist(patterns, schema=PATTERNS),
+        **{
+            witness.FILE_NAME: pa.Table.from_pylist(kept[witness.FILE_NAME], schema=witness.SCHEMA)
+            for witness in WITNESSES
+        },
+    }
 
 
 def _pattern_rows(
@@ -263,7 +271,7 @@ def _pattern_rows(
             counted = int(counts.sum())
             rows.append(
                 {
-                    **{name: row[name] for name in (*_PLACE, "signal", "temperature_c")},
+                    **{name: row[name] for name in (*PLACE, "signal", "temperature_c")},
                     "order": order,
                     "tau": tau,
                     "gamma": None if config.tau else config.gamma,
@@ -274,25 +282,6 @@ def _pattern_rows(
                 }
             )
     return rows
-
-
-def _spectrum_rows(
-    row: dict[str, Any],
-    envelope: npt.NDArray[np.floating],
-    fs_hz: float,
-    config: PatternsConfig,
-) -> list[dict[str, Any]]:
-    """Return the short-time spectrum of one segment; none if it is too short for any."""
-    power = short_time_log_power(envelope, config.frames, config.bins)
-    if not power.size:
-        return []
-    frames, bins = power.shape
-    bin_hz = fs_hz / (2 * envelope.size // (frames + 1))
-    shape = {"frames": frames, "bins": bins, "bin_hz": bin_hz}
-    return [{**{name: row[name] for name in _PLACE}, **shape, "log_power": power.ravel()}]
-
-
-_PLACE = ("run", "axis", "cycle", "motion", "segment", "start", "stop")
 
 
 def _finite(envelope: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:

@@ -2,14 +2,15 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
 
-from opamc_cli.stats.decision import Judgement, effect_by_cell
-from opamc_cli.stats.sessions import Cell
-from opamc_cli.stats.spectra import SpectrumCell, clearest_change
+from opamc_cli.stages.sessions import started
+from opamc_cli.stats.decision import PATTERNS, Bundle, Judgement
+from opamc_cli.stats.profiles import ProfileEvidence, clearest_course
+from opamc_cli.stats.sessions import Cell, effect_by_cell
+from opamc_cli.stats.spectra import SpectrumEvidence, clearest_change
 from opamc_cli.storage.sources import RunSource
 
 INSPECT = (
@@ -41,11 +42,10 @@ CANNOT_TELL = (
 
 def reasons(
     judgement: Judgement,
-    cells: Sequence[Cell],
+    bundle: Bundle,
     motions: Sequence[Mapping[str, Any]],
     sources: Mapping[str, Sequence[RunSource]],
     cause: Mapping[str, Any] | None = None,
-    spectra: Sequence[SpectrumCell] = (),
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -53,7 +53,7 @@ def reasons(
     ----------
     judgement
         The decision.
-    cells
+    bundle
         What it was made from.
     motions
         Entries `motions` of the verdict.
@@ -61,8 +61,6 @@ def reasons(
         Recordings of "baseline" and "target" in which the axis moves.
     cause
         The cause found for the change, if any.
-    spectra
-        Short-time spectra of the same sessions.
 
     Returns
     -------
@@ -70,11 +68,12 @@ def reasons(
         What changed and by how much, how sure that is, against what, what to inspect, and what
         it cannot tell.
     """
+    cells = bundle.cells
     if judgement.state == "insufficient-data":
         return [*_missing(judgement, cells), *_short(cells)]
     unhealthy = judgement.state != "healthy"
     sentences = [
-        *_change(judgement, cells, motions, spectra),
+        *_change(judgement, bundle, motions),
         _certainty(judgement),
         _rest(judgement, sources),
         *_siblings(judgement),
@@ -92,11 +91,9 @@ def reasons(
 
 
 def _change(
-    judgement: Judgement,
-    cells: Sequence[Cell],
-    motions: Sequence[Mapping[str, Any]],
-    spectra: Sequence[SpectrumCell],
+    judgement: Judgement, bundle: Bundle, motions: Sequence[Mapping[str, Any]]
 ) -> list[str]:
+    cells = bundle.cells
     distance = (
         f"the target lies {judgement.distance_ratio:.3g} times as far from the baseline as a "
         "healthy session does"
@@ -121,7 +118,8 @@ def _change(
     return [
         first,
         _pattern_change(judgement, cells, motions),
-        *_size_change(judgement, spectra),
+        *_size_change(judgement, bundle),
+        *_course_change(judgement, bundle),
     ]
 
 
@@ -140,15 +138,18 @@ def _pattern_change(
     )
     return (
         f"Patterns of the current differ most in motion {worst.motion}, where their probabilities "
-        f"changed by {judgement.pattern_effect:.0%} (root mean square): mean divergence {target} "
-        f"against {baseline} of the baseline (order {worst.order}, delay {worst.tau} samples)."
+        f"changed by {judgement.effects[PATTERNS]:.0%} (root mean square): mean divergence "
+        f"{target} against {baseline} of the baseline (order {worst.order}, delay {worst.tau} "
+        "samples)."
     )
 
 
-def _size_change(judgement: Judgement, spectra: Sequence[SpectrumCell]) -> list[str]:
-    sessions = max((len(cell.sessions) for cell in spectra), default=0)
-    change = clearest_change(spectra, sessions - judgement.n_target_sessions)
-    if change is None or not math.isfinite(judgement.size_effect):
+def _size_change(judgement: Judgement, bundle: Bundle) -> list[str]:
+    witness = bundle.witnesses.get("spectrum")
+    if not isinstance(witness, SpectrumEvidence):
+        return []
+    change = clearest_change(witness.cells, witness.n_baseline)
+    if change is None or not math.isfinite(judgement.effects["spectrum"]):
         return []
     how = (
         f"{change.size_ratio:.2g} times as large as before"
@@ -156,9 +157,24 @@ def _size_change(judgement: Judgement, spectra: Sequence[SpectrumCell]) -> list[
         else f"down to {change.size_ratio:.0%} of what they were"
     )
     return [
-        f"Fluctuations of the current changed in size by {judgement.size_effect:.0%} (root mean "
-        f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"Fluctuations of the current changed in size by {judgement.effects['spectrum']:.0%} (root "
+        f"mean square), most clearly in motion {change.motion}, from {change.start:.0%} to "
         f"{change.stop:.0%} of its way, near {change.frequency_hz:.3g} Hz, where they are {how}."
+    ]
+
+
+def _course_change(judgement: Judgement, bundle: Bundle) -> list[str]:
+    witness = bundle.witnesses.get("profile")
+    if not isinstance(witness, ProfileEvidence):
+        return []
+    change = clearest_course(witness.cells, witness.n_baseline)
+    if change is None or not math.isfinite(judgement.effects["profile"]):
+        return []
+    return [
+        f"The course of the current changed by {judgement.effects['profile']:.0%} (root mean "
+        f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"{change.stop:.0%} of its way, by {change.change_a:+.3g} A; its size over the motion is "
+        f"{change.scale:.3g} times the baseline's."
     ]
 
 
@@ -236,30 +252,19 @@ def _short(cells: Sequence[Cell]) -> list[str]:
 
 
 def _age(sources: Mapping[str, Sequence[RunSource]]) -> str:
-    started = {
-        role: sorted(time for source in runs if (time := _time(source)) is not None)
+    times = {
+        role: sorted(t for source in runs if (t := started(source.info.started_at)) is not None)
         for role, runs in sources.items()
     }
-    if not started.get("baseline"):
+    if not times.get("baseline"):
         return " (of unknown age)"
-    first, last = started["baseline"][0], started["baseline"][-1]
+    first, last = times["baseline"][0], times["baseline"][-1]
     span = f"recorded {first:%Y-%m-%d}" + (f" to {last:%Y-%m-%d}" if last != first else "")
-    if started.get("target"):
-        days = (started["target"][0] - last).total_seconds() / 86400
+    if times.get("target"):
+        days = (times["target"][0] - last).total_seconds() / 86400
         side = "before" if days >= 0 else "after"
         span += f", {_count(round(abs(days)), 'day')} {side} the target"
     return f" ({span})"
-
-
-def _time(source: RunSource) -> datetime | None:
-    text = source.info.started_at
-    if not text:
-        return None
-    try:
-        time = datetime.fromisoformat(text)
-    except ValueError:
-        return None
-    return time if time.tzinfo else time.replace(tzinfo=UTC)
 
 
 def _count(n: int, noun: str) -> str:

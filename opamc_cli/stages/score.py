@@ -13,6 +13,8 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.errors import InputError
 from opamc_cli.stages.latent import LatentModels
+from opamc_cli.stages.pattern_rows import Key, PatternRows, common_keys, cycle_counts
+from opamc_cli.stages.side import Sides, read_side
 from opamc_cli.stats.divergence import (
     chance_divergence,
     divergences_from_pool,
@@ -20,8 +22,8 @@ from opamc_cli.stats.divergence import (
 )
 from opamc_cli.stats.features import compare
 from opamc_cli.stats.sessions import inflation_within_sessions
-from opamc_cli.storage.sources import check_comparable, read_sources
-from opamc_cli.storage.tables import PATTERNS, read_table, table_input, write_table
+from opamc_cli.storage.sources import check_comparable
+from opamc_cli.storage.tables import table_input, write_table
 
 SCORES_NAME = "scores.parquet"
 FEATURES_NAME = "features.parquet"
@@ -61,40 +63,6 @@ FEATURES = pa.schema(
         ("base", pa.float64()),
     ]
 )
-
-
-@dataclass(frozen=True)
-class PatternRows:
-    """Identified rows of a pattern table that share axis, motion, order and delay.
-
-    Attributes
-    ----------
-    rows : dict of str to ndarray
-        The table's columns but `counts`.
-    counts : ndarray, shape (S, order!)
-        Pattern counts of each segment.
-    """
-
-    rows: Mapping[str, npt.NDArray[Any]]
-    counts: npt.NDArray[np.float64]
-
-    @property
-    def sessions(self) -> npt.NDArray[Any]:
-        """Name of the recording of each segment."""
-        return self.rows["run"]
-
-    @property
-    def cycles(self) -> npt.NDArray[Any]:
-        """Label of the cycle of each segment, unique over recordings."""
-        return np.array(
-            [f"{run}\n{c}" for run, c in zip(self.sessions, self.rows["cycle"], strict=True)]
-        )
-
-
-Key = tuple[int, int, int, int]
-"""Axis, motion, order, tau."""
-
-KEY_COLUMNS = ("axis", "motion", "order", "tau")
 
 
 @dataclass(frozen=True)
@@ -146,87 +114,39 @@ def run(
         If a table cannot be used, the two cannot be compared, or a discriminant was trained
         under other conditions.
     """
-    parts = {"baseline": read_patterns(baseline), "target": read_patterns(target)}
-    notes = check_comparable(read_sources(baseline), read_sources(target))
-    common = common_keys(parts["baseline"], parts["target"])
+    sides = Sides(read_side(baseline), read_side(target), config.score.day_starts_at)
+    return compare_sides(sides, config, out, models=models)
+
+
+def compare_sides(
+    sides: Sides, config: Config, out: Path, *, models: LatentModels | None = None
+) -> ScoreOutcome:
+    """Compare the target's patterns with the baseline's, both read before; see `run`."""
+    notes = check_comparable(sides.baseline.sources, sides.target.sources)
+    own, other = sides.rows
+    common = common_keys(own, other)
     if not common:
         msg = (
-            f"{target}: has no axis, motion, order and delay in common with {baseline}; make both "
+            f"{sides.target.path}: has no axis, motion, order and delay in common with "
+            f"{sides.baseline.path}; make both "
             "with the same configuration and identify the target by the baseline's reference"
         )
         raise InputError(msg)
     base = config.score.base
-    scores = score_table(parts["baseline"], parts["target"], base)
-    features = feature_table(scores, parts["target"], base, models)
-    inputs = [table_input(baseline), table_input(target)]
+    scores = score_table(own, other, base)
+    features = feature_table(scores, other, base, models)
+    inputs = [table_input(sides.baseline.path), table_input(sides.target.path)]
     used = config.canonical("score")
     for name, table in ((SCORES_NAME, scores), (FEATURES_NAME, features)):
         write_table(out / name, table, stage="score", config=used, inputs=inputs)
-    missing = _missing_notes(parts["baseline"], parts["target"])
-    short = _short_notes(parts["baseline"])
+    notes += (*sides.notes(), *_missing_notes(own, other), *_short_notes(own))
     return ScoreOutcome(
-        out / SCORES_NAME, out / FEATURES_NAME, scores, features, (*notes, *missing, *short)
+        out / SCORES_NAME,
+        out / FEATURES_NAME,
+        scores,
+        features,
+        notes,
     )
-
-
-def read_patterns(path: Path) -> dict[Key, PatternRows]:
-    """Read the identified rows of a pattern table, by axis, motion, order and delay.
-
-    Raises
-    ------
-    InputError
-        If the table cannot be used, or a row's counts do not fit its order.
-    """
-    return group_patterns(read_table(path, "patterns", PATTERNS), str(path))
-
-
-def group_patterns(table: pa.Table, name: str = "patterns") -> dict[Key, PatternRows]:
-    """Group the identified rows of a pattern table by axis, motion, order and delay.
-
-    Parameters
-    ----------
-    table
-        Table of stage `patterns`.
-    name
-        How an error calls it.
-
-    Raises
-    ------
-    InputError
-        If a row's counts do not fit its order.
-    """
-    columns = {
-        column: table[column].to_numpy(zero_copy_only=False)
-        for column in table.column_names
-        if column != "counts"
-    }
-    lists = table["counts"].combine_chunks()
-    first = lists.offsets.to_numpy()
-    cells = lists.values.to_numpy(zero_copy_only=False)
-    length = np.diff(first)
-    used = np.flatnonzero((columns["motion"] >= 0) & (columns["n_patterns"] > 0))
-    keys = np.stack([columns[part][used].astype(np.int64) for part in KEY_COLUMNS], axis=1)
-    found, place = np.unique(keys, axis=0, return_inverse=True)
-    result = {}
-    for number, key in enumerate(found):
-        rows = used[place.ravel() == number]
-        axis, motion, order, tau = (int(part) for part in key)
-        if len(set(length[rows].tolist())) > 1:
-            msg = f"{name}: axis {axis}: counts of order {order} differ in length; make it again"
-            raise InputError(msg)
-        counts = cells[first[rows][:, np.newaxis] + np.arange(length[rows[0]])]
-        result[axis, motion, order, tau] = PatternRows(
-            {column: values[rows] for column, values in columns.items()},
-            counts.astype(np.float64),
-        )
-    return result
-
-
-def common_keys(
-    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows]
-) -> list[Key]:
-    """Return the keys that both sides have, in ascending order."""
-    return sorted(set(baseline) & set(target))
 
 
 def score_table(
@@ -273,26 +193,6 @@ def score_table(
             )
         )
     return pa.concat_tables(tables).combine_chunks()
-
-
-def cycle_counts(
-    part: PatternRows,
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]:
-    """Pool the segments of each cycle.
-
-    Returns
-    -------
-    counts : ndarray, shape (C, K)
-    session : ndarray, shape (C,)
-        Index of each cycle's recording among the sorted names.
-    """
-    labels, place = np.unique(part.cycles, return_inverse=True)
-    counts = np.zeros((len(labels), part.counts.shape[1]))
-    np.add.at(counts, place, part.counts)
-    _, session = np.unique(part.sessions, return_inverse=True)
-    of_cycle = np.zeros(len(labels), dtype=np.int64)
-    of_cycle[place] = session
-    return counts, of_cycle
 
 
 def feature_table(

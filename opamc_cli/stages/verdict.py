@@ -1,4 +1,4 @@
-"""Stage `verdict`: patterns, scores and features in, verdict.json out."""
+"""Stage `verdict`: both sides' tables and their scores in, verdict.json out."""
 
 import json
 import math
@@ -13,20 +13,14 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.cells import cells_by_axis, session_names, spectrum_cells
+from opamc_cli.stages.cells import bundles
+from opamc_cli.stages.pattern_rows import Key, PatternRows
 from opamc_cli.stages.reasons import reasons
-from opamc_cli.stages.score import (
-    ALL_MOTIONS,
-    FEATURES,
-    SCORES,
-    Key,
-    PatternRows,
-    read_patterns,
-)
-from opamc_cli.stats.decision import Judgement, Policy, judge
+from opamc_cli.stages.score import ALL_MOTIONS, ScoreOutcome
+from opamc_cli.stages.sessions import Sessions, started
+from opamc_cli.stages.side import Side, Sides
+from opamc_cli.stats.decision import Bundle, Judgement, Policy, judge
 from opamc_cli.storage.atomic import write_text
-from opamc_cli.storage.sources import RunSource, read_sources
-from opamc_cli.storage.tables import SPECTRA, read_table
 
 FILE_NAME = "verdict.json"
 
@@ -36,7 +30,7 @@ MAIN_SHARE = 0.5
 
 @dataclass(frozen=True)
 class VerdictOutcome:
-    """What `run` did.
+    """What `write` did.
 
     Attributes
     ----------
@@ -53,52 +47,69 @@ class VerdictOutcome:
     exit_code: ExitCode
 
 
-def run(
-    baseline: Path,
-    target: Path,
-    scores: Path,
-    features: Path,
-    config: Config,
-    out: Path,
-    *,
-    spectra: tuple[Path, Path] | None = None,
-    causes: Mapping[int, Mapping[str, Any]] | None = None,
-) -> VerdictOutcome:
-    """Decide about every joint and write the verdict.
+@dataclass(frozen=True)
+class Decided:
+    """The decision about every joint, before its causes are known.
+
+    Attributes
+    ----------
+    sides
+        What was compared.
+    bundles, judgements
+        What is known of each axis, and what was made of it.
+    """
+
+    sides: Sides
+    bundles: Mapping[int, Bundle]
+    judgements: Mapping[int, Judgement]
+
+    def differing(self, config: ScoreConfig) -> list[int]:
+        """Return the axes whose change asks for a cause."""
+        return [
+            axis
+            for axis, judgement in self.judgements.items()
+            if judgement.state in ("changed", "fault") or is_excused(judgement, config)
+        ]
+
+
+def decide(sides: Sides, config: Config) -> Decided:
+    """Decide about every joint.
 
     Parameters
     ----------
-    baseline, target
-        Tables of stage `patterns`.
-    scores, features
-        Tables of stage `score`, made from the same two.
+    sides
+        Tables of baseline and target.
     config
-        Section `score` is used; the verdict carries the hash of the whole.
+        Section `score` is used.
+    """
+    known = bundles(sides)
+    return Decided(sides, known, judge(known, policy_of(config.score)))
+
+
+def write(
+    decided: Decided,
+    scored: ScoreOutcome,
+    config: Config,
+    out: Path,
+    *,
+    causes: Mapping[int, Mapping[str, Any]] | None = None,
+) -> VerdictOutcome:
+    """Write the verdict.
+
+    Parameters
+    ----------
+    decided
+        The decision.
+    scored
+        Divergences and features of the same tables.
+    config
+        The verdict carries the hash of the whole.
     out
         Folder of verdict.json.
-    spectra
-        Spectrum tables of stage `patterns`, of the same runs; None: patterns alone decide.
     causes
         Cause of the change by axis, from closing the loop of the joint's model.
-
-    Raises
-    ------
-    InputError
-        If a table cannot be used.
     """
-    verdict = decide(
-        (read_patterns(baseline), read_patterns(target)),
-        (read_sources(baseline), read_sources(target)),
-        read_table(scores, "score", SCORES),
-        read_table(features, "score", FEATURES),
-        config,
-        causes or {},
-        spectra
-        and (
-            read_table(spectra[0], "patterns", SPECTRA),
-            read_table(spectra[1], "patterns", SPECTRA),
-        ),
-    )
+    verdict = content(decided, scored, config, causes or {})
     path = out / FILE_NAME
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
     return VerdictOutcome(path, verdict, exit_code(verdict))
@@ -112,45 +123,23 @@ def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
     return ExitCode.DONE if "healthy" in states else ExitCode.NOT_ENOUGH_DATA
 
 
-def decide(
-    patterns: tuple[Mapping[Key, PatternRows], Mapping[Key, PatternRows]],
-    sources: tuple[tuple[RunSource, ...], tuple[RunSource, ...]],
-    scores: pa.Table,
-    features: pa.Table,
+def content(
+    decided: Decided,
+    scored: ScoreOutcome,
     config: Config,
     causes: Mapping[int, Mapping[str, Any]],
-    spectra: tuple[pa.Table, pa.Table] | None = None,
 ) -> dict[str, Any]:
-    """Return the content of verdict.json.
-
-    Parameters
-    ----------
-    patterns, sources
-        Of baseline and target.
-    scores, features
-        Tables of stage `score`.
-    config
-        Section `score` is used.
-    causes
-        Cause by axis.
-    spectra
-        Spectrum tables of baseline and target, if there are any.
-    """
-    cells = cells_by_axis(*patterns)
-    by_spectrum = {
-        axis: spectrum_cells(*spectra, axis, session_names(axis, *patterns))
-        for axis in cells
-        if spectra is not None
-    }
-    judgements = judge(cells, policy_of(config.score), by_spectrum)
-    jsd = _divergences(scores)
-    pooled = _pooled_features(features)
+    """Return the content of verdict.json."""
+    jsd = _divergences(scored.scores)
+    pooled = _pooled_features(scored.features)
+    sides = (decided.sides.baseline, decided.sides.target)
     axes = []
-    for axis, judgement in judgements.items():
+    for axis, judgement in decided.judgements.items():
         cause = causes.get(axis)
-        decided = _with_cause(judgement, cause, config.score)
-        if decided.state == "healthy":
+        final = _with_cause(judgement, cause, config.score)
+        if final.state == "healthy":
             cause = None
+        bundle = decided.bundles[axis]
         motions = [
             {
                 "motion": cell.motion,
@@ -159,33 +148,56 @@ def decide(
                 "jsd_baseline": jsd.get(("baseline", axis, cell.motion, cell.order, cell.tau), []),
                 "jsd_target": jsd.get(("target", axis, cell.motion, cell.order, cell.tau), []),
             }
-            for cell in cells[axis]
+            for cell in bundle.cells
         ]
         runs = {
-            role: [source for source in side if source.name in _runs_of(axis, part)]
-            for role, side, part in zip(("baseline", "target"), sources, patterns, strict=True)
+            role: [source for source in side.sources if source.name in _runs_of(axis, rows)]
+            for role, side, rows in zip(
+                ("baseline", "target"), sides, decided.sides.rows, strict=True
+            )
         }
         axes.append(
             {
                 "axis": axis,
-                "state": decided.state,
-                "health_index": _finite(decided.health_index),
-                "p_value": _finite(decided.p_value),
-                "p_adjusted": _finite(decided.p_adjusted),
+                "state": final.state,
+                "health_index": _finite(final.health_index),
+                "p_value": _finite(final.p_value),
+                "p_adjusted": _finite(final.p_adjusted),
+                "witnesses": {name: _finite(p) for name, p in final.witnesses.items()},
                 "distance": {
-                    "ratio": _finite(decided.distance_ratio),
-                    "common": _finite(math.exp(decided.common_log_ratio)),
-                    "effect": _finite(decided.effect),
+                    "ratio": _finite(final.distance_ratio),
+                    "common": _finite(math.exp(final.common_log_ratio)),
+                    "effect": _finite(final.effect),
                 },
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "reasons": reasons(
-                    decided, cells[axis], motions, runs, cause, by_spectrum.get(axis, ())
-                ),
+                "reasons": reasons(final, bundle, motions, runs, cause),
             }
         )
-    return {"axes": axes, "base": config.score.base, "config_hash": config.digest()}
+    return {
+        "axes": axes,
+        **{
+            role: _summary(side, sessions)
+            for role, side, sessions in zip(
+                ("baseline", "target"), sides, decided.sides.sessions, strict=True
+            )
+        },
+        "base": config.score.base,
+        "config_hash": config.digest(),
+    }
+
+
+def _summary(side: Side, sessions: Sessions) -> dict[str, Any]:
+    """Say which runs a side is of, how many sessions they make, and from when to when."""
+    times = sorted(t for s in side.sources if (t := started(s.info.started_at)) is not None)
+    return {
+        "runs": [source.name for source in side.sources],
+        "sessions": len(sessions),
+        "sessions_by": list(sessions.told_by),
+        "from": times[0].isoformat() if times else None,
+        "to": times[-1].isoformat() if times else None,
+    }
 
 
 def policy_of(config: ScoreConfig) -> Policy:
@@ -199,9 +211,9 @@ def policy_of(config: ScoreConfig) -> Policy:
     )
 
 
-def is_excused(p_adjusted: float | None, state: str, config: ScoreConfig) -> bool:
+def is_excused(judgement: Judgement, config: ScoreConfig) -> bool:
     """Tell whether a joint is called healthy although it differs: others may differ as much."""
-    return state == "healthy" and p_adjusted is not None and p_adjusted <= config.false_alarm_rate
+    return judgement.state == "healthy" and judgement.p_adjusted <= config.false_alarm_rate
 
 
 def _with_cause(
@@ -210,7 +222,7 @@ def _with_cause(
     """Call a change of known cause a fault only if that cause harms the joint."""
     if cause is None:
         return judgement
-    if is_excused(judgement.p_adjusted, judgement.state, config):
+    if is_excused(judgement, config):
         matters = judgement.effect >= config.minimum_effect
         return replace(judgement, state="fault") if matters and cause.get("clear") else judgement
     if judgement.state not in ("changed", "fault"):
@@ -225,7 +237,7 @@ def _with_cause(
 
 
 def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
-    return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.sessions}
+    return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.runs}
 
 
 def _divergences(scores: pa.Table) -> dict[tuple[str, int, int, int, int], list[float]]:

@@ -2,26 +2,23 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.stats.divergence import chance_divergence, effect_size, jensen_shannon
+from opamc_cli.stats.divergence import chance_divergence, jensen_shannon
 from opamc_cli.stats.evidence import (
     Evidence,
-    PatternEvidence,
     SessionDistances,
-    SpectrumEvidence,
     pooled_together,
     session_distances,
     weigh_together,
 )
 from opamc_cli.stats.multiplicity import holm
 from opamc_cli.stats.permutation import relabelled_p_value, relabellings
-from opamc_cli.stats.sessions import Cell, pooled_divergence
-from opamc_cli.stats.spectra import SpectrumCell, size_effect
+from opamc_cli.stats.sessions import Cell, PatternEvidence, pooled_divergence
 from opamc_cli.stats.spread import (
     BETWEEN_SESSIONS,
     MAD_TO_SIGMA,
@@ -54,6 +51,34 @@ MAD_EFFICIENCY = 0.37
 
 CYCLES_DIFFER = 0.05
 """Level at which cycles of baseline and target count as different where one session is known."""
+
+
+PATTERNS = "patterns"
+"""Name of the witness that every axis has."""
+
+
+@dataclass(frozen=True)
+class Bundle:
+    """All that is known of one axis.
+
+    Attributes
+    ----------
+    cells : sequence of Cell
+        Its pattern counts, which also say what sessions and cycles there are.
+    witnesses : mapping of str to Evidence
+        What else tells its sessions apart, by name.
+    """
+
+    cells: Sequence[Cell]
+    witnesses: Mapping[str, Evidence] = field(default_factory=dict)
+
+    def evidence(self) -> dict[str, Evidence]:
+        """Return all that the sessions can be told apart by: the patterns first."""
+        kinds: dict[str, Evidence] = {PATTERNS: PatternEvidence(self.cells)}
+        # Two sessions show no spread, and the one that stands in for it is that of divergences.
+        if self.cells and len(self.cells[0].baseline) > 2:
+            kinds |= self.witnesses
+        return kinds
 
 
 @dataclass(frozen=True)
@@ -121,12 +146,10 @@ class Judgement:
         What was taken off, not negative.
     distance_ratio : float
         Target's distance from the baseline over that of a healthy session.
-    pattern_effect : float
-        Relative change of the pattern probabilities beyond the baseline's own (Cohen's w), in
-        the motion and order where it is largest.
-    size_effect : float
-        Relative change of the envelope's fluctuations beyond the baseline's own, over all motions;
-        NaN without spectra of two baseline sessions.
+    effects : mapping of str to float
+        Relative change beyond the baseline's own by each witness; NaN where it knows none.
+    witnesses : mapping of str to float
+        p-value by each witness alone, not corrected for the number of joints.
     method : str
         sessions, relabelled-sessions, one-session or none.
     n_baseline_sessions, n_target_sessions, n_baseline_cycles, n_target_cycles : int
@@ -140,8 +163,8 @@ class Judgement:
     p_alone: float
     common_log_ratio: float
     distance_ratio: float
-    pattern_effect: float
-    size_effect: float
+    effects: Mapping[str, float]
+    witnesses: Mapping[str, float]
     method: Method
     n_baseline_sessions: int
     n_target_sessions: int
@@ -150,25 +173,19 @@ class Judgement:
 
     @property
     def effect(self) -> float:
-        """The larger of the two relative changes; NaN if neither is known."""
-        return float(np.fmax(self.pattern_effect, self.size_effect))
+        """The largest of the relative changes; NaN if none is known."""
+        return float(np.fmax.reduce(list(self.effects.values()), initial=math.nan))
 
 
-def judge(
-    cells_by_axis: Mapping[int, Sequence[Cell]],
-    policy: Policy = Policy(),
-    spectra_by_axis: Mapping[int, Sequence[SpectrumCell]] | None = None,
-) -> dict[int, Judgement]:
+def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int, Judgement]:
     """Decide about every joint of a diagnosis.
 
     Parameters
     ----------
-    cells_by_axis : mapping of int to sequence of Cell
-        Motions and orders of each axis; an axis without any has insufficient data.
+    bundles : mapping of int to Bundle
+        What is known of each axis; one without cells has insufficient data.
     policy : Policy
         Levels and limits.
-    spectra_by_axis : mapping of int to sequence of SpectrumCell, optional
-        Short-time spectra of the same sessions; axes without any are judged by patterns alone.
 
     Returns
     -------
@@ -179,125 +196,130 @@ def judge(
     -----
     A joint is unhealthy if three things hold: the shift is improbable for a healthy joint, after
     correction for the number of joints; it remains so after the shift that the siblings have in
-    common is taken off; and the pattern probabilities change by enough to matter.
+    common is taken off; and it is large enough to matter by one witness at least.
     """
-    axes = sorted(cells_by_axis)
-    methods = {axis: _method(cells_by_axis[axis]) for axis in axes}
+    axes = sorted(bundles)
+    cells = {axis: bundles[axis].cells for axis in axes}
+    methods = {axis: _method(cells[axis]) for axis in axes}
     evidence = {
-        axis: _evidence(cells_by_axis[axis], (spectra_by_axis or {}).get(axis, ()))
+        axis: bundles[axis].evidence()
         for axis in axes
         if methods[axis] in ("sessions", "relabelled-sessions")
     }
-    distances = weigh_together(
-        {
-            axis: [
-                session_distances(kind, len(cells[0].baseline), len(cells[0].target))
-                for kind in kinds
-            ]
-            for axis, kinds in evidence.items()
-            for cells in [cells_by_axis[axis]]
+    each = {
+        axis: {
+            name: session_distances(kind, len(cells[axis][0].baseline), len(cells[axis][0].target))
+            for name, kind in kinds.items()
         }
-    )
-    shifts = _session_shifts(distances)
-    lone = {
-        axis: one_session_log_ratio(cells_by_axis[axis])
-        for axis in axes
-        if methods[axis] == "one-session"
+        for axis, kinds in evidence.items()
     }
-    shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
-    common = {axis: common_log_ratio(shifts, axis) if axis in distances else 0.0 for axis in axes}
-
-    def p_value(axis: int, taken_off: float) -> float:
-        if methods[axis] == "none":
-            return math.nan
-        shift = shifts[axis]
-        tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
-        if methods[axis] == "sessions":
-            one = distances[axis]
-            # Of three sessions the odd one is half of what each other one is compared with: then
-            # pairs place them better, who leave it out.
-            gaps = one.each[-1] - one.each[:-1] if len(one.own) > 2 else one.target[:, 0] - one.own
-            place = shift.log_ratio - gaps
-            above = int((one.each[:-1] >= one.each[-1] - taken_off).sum())
-            return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread, above)
-        cells = cells_by_axis[axis]
-        if methods[axis] == "one-session":
-            # What exchanging cycles cannot tell from chance is no change, however large it looks.
-            # Beyond that the cycles say nothing: they cannot know how much sessions differ.
-            by_cycles = _cycle_p_value(cells, policy)
-            return tail if by_cycles <= CYCLES_DIFFER else max(tail, by_cycles)
-        n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
-        labels = relabellings(n_baseline, n_target, policy.permutations, policy.seed)
-        values = pooled_together(evidence[axis], labels)
-        values[0] *= math.exp(-taken_off)
-        values = values[np.isfinite(values)]
-        relabelled = relabelled_p_value(values, n_baseline + n_target)
-        # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
-        # observed one, the pairs' own tail may go below it, doubled for the second look.
-        return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
-
-    p_values = {axis: p_value(axis, 0.0) for axis in axes}
+    lone = {
+        axis: one_session_log_ratio(cells[axis]) for axis in axes if methods[axis] == "one-session"
+    }
+    together = _Comparison(cells, methods, evidence, weigh_together(each), lone, policy)
+    alone_by_witness = {
+        name: _Comparison(
+            cells,
+            methods,
+            {axis: {name: kinds[name]} for axis, kinds in evidence.items() if name in kinds},
+            {axis: kinds[name] for axis, kinds in each.items() if name in kinds},
+            lone if name == PATTERNS else {},
+            policy,
+        )
+        for name in dict.fromkeys([PATTERNS, *(n for kinds in evidence.values() for n in kinds)])
+    }
+    shifts = together.shifts
+    common = {axis: common_log_ratio(shifts, axis) if axis in evidence else 0.0 for axis in axes}
+    p_values = {axis: together.p_value(axis) for axis in axes}
     p_alone = {
-        axis: max(p_values[axis], p_value(axis, common[axis])) if common[axis] else p_values[axis]
+        axis: max(p_values[axis], together.p_value(axis, common[axis]))
+        if common[axis]
+        else p_values[axis]
         for axis in axes
     }
     adjusted = dict(zip(axes, holm([p_values[axis] for axis in axes]).tolist(), strict=True))
     alone = dict(zip(axes, holm([p_alone[axis] for axis in axes]).tolist(), strict=True))
     judgements = {}
     for axis in axes:
-        cells = cells_by_axis[axis]
         known = methods[axis] != "none"
         shift = shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
-        effect = float(np.nanmax(effect_by_cell(cells))) if known else math.nan
-        size = size_effect(
-            (spectra_by_axis or {}).get(axis, ()), len(cells[0].baseline) if known else 0
-        )
-        judgements[axis] = Judgement(
-            state=_state(adjusted[axis], alone[axis], float(np.fmax(effect, size)), policy),
+        every = {PATTERNS: PatternEvidence(cells[axis]), **bundles[axis].witnesses}
+        effects = {name: kind.effect() if known else math.nan for name, kind in every.items()}
+        judgement = Judgement(
+            state="healthy",
             health_index=_health_index(shift),
             p_value=p_values[axis],
             p_adjusted=adjusted[axis],
             p_alone=alone[axis],
             common_log_ratio=common[axis],
             distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
-            pattern_effect=effect,
-            size_effect=size,
+            effects=effects,
+            witnesses={name: one.p_value(axis) for name, one in alone_by_witness.items()},
             method=methods[axis],
-            n_baseline_sessions=_present(cells, "baseline"),
-            n_target_sessions=_present(cells, "target"),
-            n_baseline_cycles=max((len(cell.cycles) for cell in cells), default=0),
-            n_target_cycles=max((len(cell.target_cycles) for cell in cells), default=0),
+            n_baseline_sessions=_present(cells[axis], "baseline"),
+            n_target_sessions=_present(cells[axis], "target"),
+            n_baseline_cycles=max((len(cell.cycles) for cell in cells[axis]), default=0),
+            n_target_cycles=max((len(cell.target_cycles) for cell in cells[axis]), default=0),
         )
+        judgements[axis] = replace(judgement, state=_state(judgement, policy))
     return judgements
 
 
-def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:
-    """Relative change of the pattern probabilities in each motion and order.
+class _Comparison:
+    """The joints of a diagnosis as some of the witnesses see them."""
 
-    Parameters
-    ----------
-    cells : sequence of Cell
-        Motions and orders of one axis.
+    def __init__(
+        self,
+        cells: Mapping[int, Sequence[Cell]],
+        methods: Mapping[int, Method],
+        evidence: Mapping[int, Mapping[str, Evidence]],
+        distances: Mapping[int, SessionDistances],
+        lone: Mapping[int, float],
+        policy: Policy,
+    ) -> None:
+        self._cells = cells
+        self._methods = methods
+        self._evidence = evidence
+        self._policy = policy
+        # a witness that lacks a session has nothing to say by itself
+        self._distances = {axis: one for axis, one in distances.items() if one.known}
+        self._pooled: dict[int, FloatArray] = {}
+        self.shifts = _session_shifts(self._distances)
+        self.shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
 
-    Returns
-    -------
-    ndarray, shape (len(cells),)
-        Cohen's w of the divergence of the target's sessions, pooled, beyond that of the
-        baseline's own; NaN where either has no counts.
-    """
-    effects = np.full(len(cells), np.nan)
-    for j, cell in enumerate(cells):
-        pool, target = cell.baseline.sum(axis=0), cell.target.sum(axis=0)
-        if pool.sum() == 0 or target.sum() == 0:
-            continue
-        usual = float(
-            chance_divergence(pool, target.sum() / cell.inflation, pool.sum() / cell.inflation)
-        )
-        present = cell.baseline[cell.baseline.sum(axis=1) > 0]
-        if len(present) > 1:
-            usual = max(usual, float(np.mean(jensen_shannon(present, pool - present))))
-        effects[j] = float(effect_size(float(jensen_shannon(target, pool)) - usual))
-    return effects
+    def p_value(self, axis: int, taken_off: float = 0.0) -> float:
+        """Probability of such a shift, after some of it is taken off; NaN if unknown."""
+        if axis not in self.shifts:
+            return math.nan
+        shift = self.shifts[axis]
+        tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
+        cells = self._cells[axis]
+        if self._methods[axis] == "sessions":
+            one = self._distances[axis]
+            # Of three sessions the odd one is half of what each other one is compared with: then
+            # pairs place them better, who leave it out.
+            gaps = one.each[-1] - one.each[:-1] if len(one.own) > 2 else one.target[:, 0] - one.own
+            place = shift.log_ratio - gaps
+            above = int((one.each[:-1] >= one.each[-1] - taken_off).sum())
+            return spliced_p_value(place, shift.log_ratio - taken_off, shift.spread, above)
+        if self._methods[axis] == "one-session":
+            # What exchanging cycles cannot tell from chance is no change, however large it looks.
+            # Beyond that the cycles say nothing: they cannot know how much sessions differ.
+            by_cycles = _cycle_p_value(cells, self._policy)
+            return tail if by_cycles <= CYCLES_DIFFER else max(tail, by_cycles)
+        n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
+        if axis not in self._pooled:
+            labels = relabellings(
+                n_baseline, n_target, self._policy.permutations, self._policy.seed
+            )
+            self._pooled[axis] = pooled_together(list(self._evidence[axis].values()), labels)
+        values = self._pooled[axis].copy()
+        values[0] *= math.exp(-taken_off)
+        values = values[np.isfinite(values)]
+        relabelled = relabelled_p_value(values, n_baseline + n_target)
+        # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
+        # observed one, the pairs' own tail may go below it, doubled for the second look.
+        return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
 
 
 def one_session_log_ratio(cells: Sequence[Cell]) -> float:
@@ -385,14 +407,6 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
-def _evidence(cells: Sequence[Cell], spectra: Sequence[SpectrumCell]) -> list[Evidence]:
-    kinds: list[Evidence] = [PatternEvidence(cells)]
-    # Two sessions show no spread, and the one that stands in for it is that of divergences.
-    if spectra and len(cells[0].baseline) > 2:
-        kinds.append(SpectrumEvidence(spectra))
-    return kinds
-
-
 def _session_shifts(distances: Mapping[int, SessionDistances]) -> dict[int, Shift]:
     variances = {
         axis: float(one.own.var(ddof=1)) if len(one.own) > 2 else math.nan
@@ -459,10 +473,11 @@ def _health_index(shift: Shift) -> float:
     return math.expm1(min(shift.log_ratio - log_mean, 100.0)) / shift.unit
 
 
-def _state(p_adjusted: float, p_alone: float, effect: float, policy: Policy) -> State:
-    if not math.isfinite(p_adjusted):
+def _state(judgement: Judgement, policy: Policy) -> State:
+    if not math.isfinite(judgement.p_adjusted):
         return "insufficient-data"
     level = policy.false_alarm_rate
-    if p_adjusted > level or p_alone > level or effect < policy.minimum_effect:
+    improbable = judgement.p_adjusted <= level and judgement.p_alone <= level
+    if not improbable or judgement.effect < policy.minimum_effect:
         return "healthy"
-    return "fault" if effect >= policy.fault_effect else "changed"
+    return "fault" if judgement.effect >= policy.fault_effect else "changed"

@@ -7,8 +7,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.stats.sessions import Cell, divergence_from_rest, pooled_divergence
-from opamc_cli.stats.spectra import SpectrumCell, pooled_deviation, squared_deviation
 from opamc_cli.stats.spread import MAD_TO_SIGMA
 
 FloatArray = NDArray[np.float64]
@@ -24,65 +22,18 @@ LEAST_SCALE = 0.01
 class Evidence(Protocol):
     """One way of telling sessions apart; sessions are numbered, baseline first."""
 
+    @property
+    def cells(self) -> Sequence[object]:
+        """What it rests on, one for each motion; nothing is known without any."""
+
     def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
         """Return the log distance of each of some sessions from the others."""
 
     def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
         """Return the distance between two groups of sessions, one for each labelling."""
 
-
-@dataclass(frozen=True)
-class PatternEvidence:
-    """Distance by the Jensen-Shannon divergence of ordinal patterns.
-
-    Attributes
-    ----------
-    cells : sequence of Cell
-        All motions and orders of one axis.
-    """
-
-    cells: Sequence[Cell]
-
-    def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
-        """Return the log of the mean divergence, each in units of the rest's own.
-
-        The mean over motions and orders is taken before the logarithm, so that one motion that
-        changes strongly is not outvoted by three that do not.
-        """
-        ratios = np.full((len(units), len(self.cells)), np.nan)
-        for j, cell in enumerate(self.cells):
-            sessions = np.concatenate([cell.baseline, cell.target])
-            divergence, level = divergence_from_rest(
-                sessions[units], sessions[rest], cell.inflation
-            )
-            ratios[:, j] = divergence / level
-        return log_mean(ratios)
-
-    def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
-        """Return the divergence between two pools of sessions."""
-        return pooled_divergence(self.cells, is_target)
-
-
-@dataclass(frozen=True)
-class SpectrumEvidence:
-    """Distance by the short-time spectrum of the envelope.
-
-    Attributes
-    ----------
-    cells : sequence of SpectrumCell
-        All motions of one axis.
-    """
-
-    cells: Sequence[SpectrumCell]
-
-    def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
-        """Return the log of the squared deviation, averaged over frames, bins and motions."""
-        ratios = [squared_deviation(cell, units, rest) for cell in self.cells]
-        return log_mean(np.array(ratios).T)
-
-    def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
-        """Return the squared difference between the groups' means."""
-        return pooled_deviation(self.cells, is_target)
+    def effect(self) -> float:
+        """Return the relative change beyond the baseline's own; NaN if unknown."""
 
 
 @dataclass(frozen=True)
@@ -104,6 +55,11 @@ class SessionDistances:
     own: FloatArray
     target: FloatArray
     each: FloatArray
+
+    @property
+    def known(self) -> bool:
+        """Whether no session lacks its distance."""
+        return all(np.isfinite(part).all() for part in (self.own, self.target, self.each))
 
 
 def session_distances(evidence: Evidence, n_baseline: int, n_target: int) -> SessionDistances:
@@ -140,42 +96,38 @@ def session_distances(evidence: Evidence, n_baseline: int, n_target: int) -> Ses
 
 
 def weigh_together(
-    by_axis: Mapping[int, Sequence[SessionDistances]],
+    by_axis: Mapping[int, Mapping[str, SessionDistances]],
 ) -> dict[int, SessionDistances]:
-    """Combine the distances by several kinds of evidence into one for each axis.
+    """Combine the distances by several witnesses into one for each axis.
 
     Parameters
     ----------
-    by_axis : mapping of int to sequence of SessionDistances
-        One entry per kind of evidence, the same kinds in the same order on every axis.
+    by_axis : mapping of int to mapping of str to SessionDistances
+        By axis and witness; the first witness of an axis stands in where none is complete.
 
     Returns
     -------
     dict of int to SessionDistances
-        Weighted mean of the log distances. A kind weighs the less, the more its distances scatter
-        between sessions, in the middle over all axes; one that lacks a session is left out.
+        Weighted mean of the log distances. A witness weighs the less, the more its distances
+        scatter between sessions, in the middle over all axes; one that lacks a session is left out.
 
     Notes
     -----
     The scatter is that of all sessions, the target among them, by the median absolute deviation:
-    taken from the baseline alone it would favour the kind in which the target is odd, and the
+    taken from the baseline alone it would favour the witness by which the target is odd, and the
     target would rank first too often.
     """
-    kinds = max((len(each) for each in by_axis.values()), default=0)
-    scale = [
-        max(np.median([_robust_scale(each[k].each) for each in by_axis.values()]), LEAST_SCALE)
-        for k in range(kinds)
-    ]
+    scatter: dict[str, list[float]] = {}
+    for kinds in by_axis.values():
+        for name, one in kinds.items():
+            scatter.setdefault(name, []).append(_robust_scale(one.each))
+    scale = {name: max(float(np.median(s)), LEAST_SCALE) for name, s in scatter.items()}
     combined = {}
-    for axis, each in by_axis.items():
-        known = [
-            all(np.isfinite(part).all() for part in (one.own, one.target, one.each)) for one in each
-        ]
-        weight = known / np.array(scale[: len(each)])
-        if not weight.any():
-            weight[0] = 1.0
-        weight /= weight.sum()
-        used = [(w, one) for w, one in zip(weight, each, strict=True) if w]
+    for axis, kinds in by_axis.items():
+        weight = {name: 1 / scale[name] for name, one in kinds.items() if one.known}
+        weight = {name: w for name, w in weight.items() if w} or {next(iter(kinds)): 1.0}
+        total = sum(weight.values())
+        used = [(w / total, kinds[name]) for name, w in weight.items()]
         combined[axis] = SessionDistances(
             np.sum([w * one.own for w, one in used], axis=0),
             np.sum([w * one.target for w, one in used], axis=0),

@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from opamc_cli.stats.divergence import (
     chance_divergence,
     chance_inflation,
+    effect_size,
     jensen_shannon,
 )
+from opamc_cli.stats.evidence import log_mean
 
 FloatArray = NDArray[np.float64]
 
@@ -159,3 +161,69 @@ def pooled_divergence(cells: Sequence[Cell], is_target: NDArray[np.bool_]) -> Fl
     n = known.sum(axis=1)
     total = np.where(known, ratios, 0.0).sum(axis=1)
     return np.asarray(np.divide(total, n, out=np.full(len(n), np.nan), where=n > 0))
+
+
+@dataclass(frozen=True)
+class PatternEvidence:
+    """Distance by the Jensen-Shannon divergence of ordinal patterns.
+
+    Attributes
+    ----------
+    cells : sequence of Cell
+        All motions and orders of one axis.
+    """
+
+    cells: Sequence[Cell]
+
+    def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
+        """Return the log of the mean divergence, each in units of the rest's own.
+
+        The mean over motions and orders is taken before the logarithm, so that one motion that
+        changes strongly is not outvoted by three that do not.
+        """
+        ratios = np.full((len(units), len(self.cells)), np.nan)
+        for j, cell in enumerate(self.cells):
+            sessions = np.concatenate([cell.baseline, cell.target])
+            divergence, level = divergence_from_rest(
+                sessions[units], sessions[rest], cell.inflation
+            )
+            ratios[:, j] = divergence / level
+        return log_mean(ratios)
+
+    def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
+        """Return the divergence between two pools of sessions."""
+        return pooled_divergence(self.cells, is_target)
+
+    def effect(self) -> float:
+        """Return the relative change of the pattern probabilities where it is largest."""
+        effects = effect_by_cell(self.cells)
+        return float(np.nanmax(effects)) if np.isfinite(effects).any() else float("nan")
+
+
+def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:
+    """Relative change of the pattern probabilities in each motion and order.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Motions and orders of one axis.
+
+    Returns
+    -------
+    ndarray, shape (len(cells),)
+        Cohen's w of the divergence of the target's sessions, pooled, beyond that of the
+        baseline's own; NaN where either has no counts.
+    """
+    effects = np.full(len(cells), np.nan)
+    for j, cell in enumerate(cells):
+        pool, target = cell.baseline.sum(axis=0), cell.target.sum(axis=0)
+        if pool.sum() == 0 or target.sum() == 0:
+            continue
+        usual = float(
+            chance_divergence(pool, target.sum() / cell.inflation, pool.sum() / cell.inflation)
+        )
+        present = cell.baseline[cell.baseline.sum(axis=1) > 0]
+        if len(present) > 1:
+            usual = max(usual, float(np.mean(jensen_shannon(present, pool - present))))
+        effects[j] = float(effect_size(float(jensen_shannon(target, pool)) - usual))
+    return effects

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.stats.evidence import log_mean
+
 FloatArray = NDArray[np.float64]
 
 PRIOR_DOF = 4.0
@@ -43,6 +45,38 @@ class SpectrumCell:
     frames: int
     bins: int
     bin_hz: float
+
+
+@dataclass(frozen=True)
+class SpectrumEvidence:
+    """Distance by the short-time spectrum of the envelope.
+
+    Attributes
+    ----------
+    cells : sequence of SpectrumCell
+        All motions of one axis.
+    n_baseline : int
+        Number of baseline sessions.
+    """
+
+    cells: Sequence[SpectrumCell]
+    n_baseline: int
+
+    def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
+        """Return the log of the squared deviation, averaged over frames, bins and motions."""
+        ratios = [
+            deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest)
+            for cell in self.cells
+        ]
+        return log_mean(np.array(ratios).T)
+
+    def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
+        """Return the squared difference between the groups' means."""
+        return pooled_deviation(self.cells, is_target)
+
+    def effect(self) -> float:
+        """Return the relative change of the size of the fluctuations; see `size_effect`."""
+        return size_effect(self.cells, self.n_baseline)
 
 
 @dataclass(frozen=True)
@@ -89,25 +123,36 @@ def variance_within_sessions(
     dof = np.zeros(log_power.shape[1])
     for session in np.unique(session_of_cycle):
         own = log_power[session_of_cycle == session]
-        mean, n = _mean(own)
+        mean, n = mean_of_known(own)
         squares += np.nansum((own - mean) ** 2, axis=0)
         dof += np.maximum(n - 1, 0)
     return np.asarray(np.divide(squares, dof, out=np.full(len(dof), np.nan), where=dof > 0))
 
 
-def squared_deviation(
-    cell: SpectrumCell, units: NDArray[np.int64], rest: NDArray[np.int64]
+def deviation_from_rest(
+    sessions: FloatArray,
+    cycles: FloatArray,
+    within: FloatArray,
+    units: NDArray[np.int64],
+    rest: NDArray[np.int64],
+    least_variance: float = LEAST_VARIANCE,
 ) -> FloatArray:
     """Mean squared deviation of sessions from others, in units of what healthy ones deviate by.
 
     Parameters
     ----------
-    cell : SpectrumCell
-        One motion.
+    sessions : ndarray, shape (B + T, F)
+        Mean of each session's cycles; NaN where nothing is known.
+    cycles : ndarray, shape (B + T,)
+        Cycles that each mean is of.
+    within : ndarray, shape (F,)
+        Variance of a single cycle about its session's mean; NaN if unknown.
     units : ndarray, shape (U,)
         Indices of the sessions to be judged.
     rest : ndarray, shape (R,)
         Indices of the sessions they are compared with; none of `units` is among them.
+    least_variance : float
+        Sessions that agree within it agree.
 
     Returns
     -------
@@ -122,10 +167,10 @@ def squared_deviation(
     less or more is corrected for, and the rest's mean has an error of its own. Few sessions say
     little of one bin, so that its variance is moderated by the motion's mean (Smyth 2004).
     """
-    mean, n = _mean(cell.sessions[rest])
-    squares = np.nansum((cell.sessions[rest] - mean) ** 2, axis=0)
-    within = _moderated(cell.within, 1.0)
-    share = np.mean(1 / cell.cycles[rest][cell.cycles[rest] > 0]) if (n > 0).any() else np.nan
+    mean, n = mean_of_known(sessions[rest])
+    squares = np.nansum((sessions[rest] - mean) ** 2, axis=0)
+    within = _moderated(within, 1.0)
+    share = np.mean(1 / cycles[rest][cycles[rest] > 0]) if (n > 0).any() else np.nan
     dof = np.maximum(n - 1, 0)
     if (dof > 0).any():
         typical = squares.sum() / dof.sum()
@@ -135,12 +180,12 @@ def squared_deviation(
         variance = within * share
     result = np.full(len(units), np.nan)
     for k, unit in enumerate(units):
-        if cell.cycles[unit] == 0:
+        if cycles[unit] == 0:
             continue
-        own = 1 / cell.cycles[unit]
+        own = 1 / cycles[unit]
         expected = np.fmax(variance + np.nan_to_num(within) * (own - share), within * own)
         expected = expected + variance / np.maximum(n, 1)
-        ratio = (cell.sessions[unit] - mean) ** 2 / np.maximum(expected, LEAST_VARIANCE)
+        ratio = (sessions[unit] - mean) ** 2 / np.maximum(expected, least_variance)
         known = np.isfinite(ratio)
         if known.any():
             result[k] = float(ratio[known].mean())
@@ -216,8 +261,8 @@ def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChang
 def _change(cell: SpectrumCell, n_baseline: int) -> tuple[FloatArray, FloatArray]:
     """Change of each bin's log power, and its variance among healthy sessions; NaN if unknown."""
     baseline = cell.sessions[:n_baseline]
-    target, n_target = _mean(cell.sessions[n_baseline:])
-    mean, n = _mean(baseline)
+    target, n_target = mean_of_known(cell.sessions[n_baseline:])
+    mean, n = mean_of_known(baseline)
     squares = np.nansum((baseline - mean) ** 2, axis=0)
     enough = (n > 1) & (n_target > 0)
     per_session = np.divide(squares, n - 1, out=np.full(n.shape, np.nan), where=enough)
@@ -261,7 +306,7 @@ def pooled_deviation(cells: Sequence[SpectrumCell], is_target: NDArray[np.bool_]
     return np.asarray(np.divide(total, n, out=np.full(len(total), np.nan), where=n > 0))
 
 
-def _mean(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Mean of the known values of each column, NaN without any, and their number."""
     known = np.isfinite(rows)
     n = known.sum(axis=0).astype(np.float64)

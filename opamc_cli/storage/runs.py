@@ -52,6 +52,8 @@ class RunInfo:
         Conditions of the recording.
     started_at
         ISO 8601, UTC.
+    session
+        Name of the recording session; runs of one session are not independent.
     source_sha256
         Of the file that the run was made from.
     """
@@ -62,6 +64,7 @@ class RunInfo:
     speed_percent: float | None = None
     payload_kg: float | None = None
     started_at: str | None = None
+    session: str | None = None
     source_sha256: str | None = None
 
     def to_json(self) -> str:
@@ -430,7 +433,7 @@ def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
         if kept.get(key) is not None and not isinstance(kept[key], int | float):
             msg = f"{path}: {key} is {kept[key]!r} in metadata key 'opamc'; it must be a number"
             raise InputError(msg)
-    for key in ("robot", "program", "started_at", "source_sha256"):
+    for key in ("robot", "program", "started_at", "session", "source_sha256"):
         # a program called 7 in one run and "7" in another is the same program
         if kept.get(key) is not None:
             kept[key] = str(kept[key])

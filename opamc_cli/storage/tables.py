@@ -86,22 +86,6 @@ PATTERNS = pa.schema(
     ]
 )
 
-SPECTRA = pa.schema(
-    [
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("segment", pa.int32()),
-        ("start", pa.int64()),
-        ("stop", pa.int64()),
-        ("frames", pa.int32()),
-        ("bins", pa.int32()),
-        ("bin_hz", pa.float64()),
-        ("log_power", pa.list_(pa.float32())),
-    ]
-)
-
 
 @dataclass(frozen=True)
 class Provenance:

@@ -4,8 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opamc_cli.stats import decision
+from opamc_cli.stats.decision import Bundle, Judgement, Policy
 from opamc_cli.stats.sessions import Cell, inflation_within_sessions
-from opamc_cli.stats.spectra import SpectrumCell, variance_within_sessions
+from opamc_cli.stats.spectra import SpectrumCell, SpectrumEvidence, variance_within_sessions
 
 
 @dataclass(frozen=True)
@@ -102,3 +104,23 @@ def spectra(
                 )
             )
     return result
+
+
+def judge(
+    cells_by_axis: dict[int, list[Cell]],
+    policy: Policy | None = None,
+    spectra_by_axis: dict[int, list[SpectrumCell]] | None = None,
+) -> dict[int, Judgement]:
+    """Judge by patterns, and by spectra if there are any."""
+    return decision.judge(
+        {
+            axis: Bundle(
+                own,
+                {"spectrum": SpectrumEvidence(spectra_by_axis[axis], len(own[0].baseline))}
+                if spectra_by_axis
+                else {},
+            )
+            for axis, own in cells_by_axis.items()
+        },
+        policy or Policy(),
+    )

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from opamc_cli.stats.decision import Policy, judge
-from tests.stats.fleet import Fleet, cells
+from opamc_cli.stats.decision import Policy
+from tests.stats.fleet import Fleet, cells, judge
 
 SEEDS = range(40)
 

@@ -6,30 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
-from opamc_cli.stats.decision import judge
-from opamc_cli.stats.evidence import (
-    PatternEvidence,
-    SpectrumEvidence,
-    session_distances,
-    weigh_together,
-)
-from opamc_cli.stats.spectra import size_effect, squared_deviation
-from tests.stats.fleet import Fleet, cells, spectra
+from opamc_cli.stats.evidence import session_distances, weigh_together
+from opamc_cli.stats.sessions import PatternEvidence
+from opamc_cli.stats.spectra import SpectrumEvidence, deviation_from_rest, size_effect
+from tests.stats.fleet import Fleet, cells, judge, spectra
 
 SEEDS = range(40)
 
 
-def distances(plan, seed):
-    patterns, powers = cells(plan, seed), spectra(plan, seed)
-    return weigh_together(
-        {
-            axis: [
-                session_distances(kind, plan.n_baseline, plan.n_target)
-                for kind in (PatternEvidence(patterns[axis]), SpectrumEvidence(powers[axis]))
-            ]
-            for axis in patterns
-        }
-    )
+def squared_deviation(cell, units, rest):
+    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest)
 
 
 def turned(plan, seed, place):
@@ -53,10 +39,10 @@ def test_no_session_is_favoured_for_being_the_target():
         for place in range(5):
             patterns, powers = turned(plan, seed, place)
             by_axis = {
-                axis: [
-                    session_distances(kind, 4, 1)
-                    for kind in (PatternEvidence(patterns[axis]), SpectrumEvidence(powers[axis]))
-                ]
+                axis: {
+                    "patterns": session_distances(PatternEvidence(patterns[axis]), 4, 1),
+                    "spectrum": session_distances(SpectrumEvidence(powers[axis], 4), 4, 1),
+                }
                 for axis in patterns
             }
             ranks += [[int((d.each > d.each[-1]).sum()) for d in weigh_together(by_axis).values()]]
@@ -93,7 +79,9 @@ def test_a_change_of_size_alone_is_found_by_the_spectrum():
     found = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(10)]
     assert sum(j[plan.faulty].state != "healthy" for j in found) >= 7
     assert np.mean([judge(cells(plan, s))[plan.faulty].state == "healthy" for s in range(10)]) > 0.8
-    assert np.median([j[plan.faulty].size_effect for j in found]) == pytest.approx(0.6, rel=0.2)
+    assert np.median([j[plan.faulty].effects["spectrum"] for j in found]) == pytest.approx(
+        0.6, rel=0.2
+    )
 
 
 @pytest.mark.parametrize("n_target_cycles", [1, 8])
@@ -121,7 +109,11 @@ def test_sessions_of_any_number_of_cycles_are_judged_alike(n_target_cycles):
     ratios = []
     for seed in range(60):
         cell = spectra(plan, seed, n_target_cycles)[1][0]
-        ratios.append(squared_deviation(cell, np.array([0, 6]), np.array([1, 2, 3, 4, 5])))
+        ratios.append(
+            deviation_from_rest(
+                cell.sessions, cell.cycles, cell.within, np.array([0, 6]), np.array([1, 2, 3, 4, 5])
+            )
+        )
     own, target = np.mean(ratios, axis=0)
     assert target == pytest.approx(own, rel=0.12)
 
@@ -150,4 +142,6 @@ def test_identical_spectra_are_no_evidence():
     cell = spectra(plan, 0)[1][0]
     cell.sessions[:] = cell.sessions[0]
     assert size_effect([cell], plan.n_baseline) == 0.0
-    assert squared_deviation(cell, np.array([6]), np.arange(6))[0] == pytest.approx(0.0, abs=1e-9)
+    assert deviation_from_rest(
+        cell.sessions, cell.cycles, cell.within, np.array([6]), np.arange(6)
+    )[0] == pytest.approx(0.0, abs=1e-9)

@@ -10,6 +10,8 @@ import pytest
 from opamc_cli.config import load_config
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages import latent, score, verdict
+from opamc_cli.stages.pattern_rows import group_patterns
+from opamc_cli.stages.side import Sides, read_side
 from opamc_cli.stats.divergence import jensen_shannon
 from opamc_cli.storage.sources import read_sources, sources_record
 from opamc_cli.storage.tables import read_table, write_table
@@ -21,16 +23,9 @@ CONFIG = load_config()
 
 def diagnose(folder, plan, seed=0, config=CONFIG, causes=None, **info):
     baseline, target = write_patterns(folder, plan, seed, **info)
-    scored = score.run(baseline, target, config, folder)
-    return verdict.run(
-        baseline,
-        target,
-        scored.scores_path,
-        scored.features_path,
-        config,
-        folder,
-        causes=causes,
-    )
+    sides = Sides(read_side(baseline), read_side(target))
+    scored = score.compare_sides(sides, config, folder)
+    return verdict.write(verdict.decide(sides, config), scored, config, folder, causes=causes)
 
 
 def strings(value):
@@ -250,7 +245,7 @@ def test_a_discriminant_is_learned_kept_and_refused_outside_its_conditions(tmp_p
     lda = {r["axis"]: r["lda"] for r in outcome.features.to_pylist() if r["motion"] == -1}
     assert lda[3] == max(lda.values()) > 0
     assert all(value < 0 for axis, value in lda.items() if axis != 3)
-    fast = score.read_patterns(target)
+    fast = group_patterns(read_side(target).patterns)
     for part in fast.values():
         part.rows["f_max_hz"][:] = 600.0
     with pytest.raises(InputError, match="f_max_hz = 600"):
