@@ -370,7 +370,8 @@ def beam(m: Motion, declared: Sequence[Term], library: list[Term]) -> Chain:
                 ties = {
                     o.terms[-1].name
                     for o in trials
-                    if (d := o.errors - trial.errors).sum()
+                    if o.errors.sum() <= (1 - BEAM_SHARE) * chain.errors.sum()
+                    and (d := o.errors - trial.errors).sum()
                     <= TIE_ERRORS * d.std(ddof=1) * np.sqrt(d.size)
                 }
                 told = (*chain.ties, tuple(sorted(ties - {trial.terms[-1].name})))

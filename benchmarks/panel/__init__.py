@@ -1,0 +1,1 @@
+"""Sources, contestants and tables of benchmarks/panel.py."""
