@@ -7,6 +7,7 @@ import typer
 from opamc_cli.commands import (
     config,
     diagnose,
+    example,
     identify,
     ingest,
     model,
@@ -30,6 +31,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "sweep": sweep.sweep,
     "select": select.select,
     "simulate": simulate.simulate,
+    "example": example.example,
 }
 """Subcommands by name, in the order of the chain."""
 

@@ -1,7 +1,7 @@
 """Configuration from YAML files and `--set key=value`, with errors that name the key."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -47,16 +47,27 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
     return validate(Config, values, str(path) if path else "--set")
 
 
-def read_values(path: Path | None, overrides: Sequence[str] = ()) -> dict[str, Any]:
+def read_values(
+    path: Path | None, overrides: Sequence[str] = (), prepare: Callable[[str], str] = str
+) -> dict[str, Any]:
     """Return the mapping of a YAML file (empty without one), with `key=value` overrides applied.
+
+    Parameters
+    ----------
+    path
+        The file; None: no file.
+    overrides
+        Such as ``patterns.gamma=1``; values are YAML.
+    prepare
+        Applied to the text of the file and of every override before it is read.
 
     Raises
     ------
     ConfigError
         If the file or an override cannot be read.
     """
-    values = read_yaml(path) if path is not None else {}
-    for override in overrides:
+    values = read_yaml(path, prepare) if path is not None else {}
+    for override in map(prepare, overrides):
         key, separator, text = override.partition("=")
         if not separator or not key:
             msg = f"--set {override}: write it as key=value, such as patterns.gamma=1"
@@ -70,8 +81,8 @@ def read_values(path: Path | None, overrides: Sequence[str] = ()) -> dict[str, A
     return values
 
 
-def read_yaml(path: Path) -> dict[str, Any]:
-    """Read a YAML file that must hold a mapping.
+def read_yaml(path: Path, prepare: Callable[[str], str] = str) -> dict[str, Any]:
+    """Read a YAML file that must hold a mapping, `prepare` being applied to its text.
 
     Raises
     ------
@@ -87,7 +98,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
         msg = f"{path}: is not a text file in UTF-8 (byte {error.start}); save it as UTF-8"
         raise ConfigError(msg) from error
     try:
-        values = yaml.load(text, Loader=_UniqueKeyLoader)  # a SafeLoader
+        values = yaml.load(prepare(text), Loader=_UniqueKeyLoader)  # a SafeLoader
     except yaml.YAMLError as error:
         msg = f"{path}: is not valid YAML: {_flat(error)}"
         raise ConfigError(msg) from error

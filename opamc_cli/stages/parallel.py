@@ -5,12 +5,15 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from opamc_cli.errors import OpamcError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+Watch = Callable[[int, int], None]
+"""Called with how many items are done and how many there are."""
 
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
@@ -18,6 +21,10 @@ THREAD_VARIABLES = (
     "MKL_NUM_THREADS",
     "NUMBA_NUM_THREADS",
 )
+
+
+def unwatched(done: int, total: int) -> None:
+    """Tell nobody."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +36,10 @@ class Outcome(Generic[Result]):
 
 
 def map_items(
-    function: Callable[[Item], Result], items: Sequence[Item], jobs: int = 1
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    jobs: int = 1,
+    watch: Watch = unwatched,
 ) -> Outcome[Result]:
     """Apply a function to every item, in worker processes if that is asked for.
 
@@ -45,15 +55,17 @@ def map_items(
         What it is applied to.
     jobs
         Number of workers; 0: one per core; 1: this process.
+    watch
+        Called as items get done.
     """
     workers = min(jobs or os.cpu_count() or 1, len(items))
     if workers <= 1:
-        return _gather([_Immediate(function, item) for item in items])
+        return _gather([_Immediate(function, item) for item in items], watch)
     saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     try:
         with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            return _gather([pool.submit(function, item) for item in items])
+            return _gather([pool.submit(function, item) for item in items], watch)
     finally:
         for name, value in saved.items():
             if value is None:
@@ -75,12 +87,16 @@ class _Immediate(Generic[Item, Result]):
 
 def _gather(
     calls: Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]],
+    watch: Watch,
 ) -> Outcome[Result]:
     results: list[Result] = []
     errors: list[OpamcError] = []
-    for call in calls:
+    pending: Sequence[Future[Result] | _Immediate[Any, Result]] = calls
+    for done, call in enumerate(pending):
+        watch(done, len(calls))
         try:
             results.append(call.result())
         except OpamcError as error:
             errors.append(error)
+    watch(len(calls), len(calls))
     return Outcome(tuple(results), tuple(errors))

@@ -22,6 +22,7 @@ import pyarrow.parquet as pq
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.atomic import atomic_path
+from opamc_cli.storage.paths import expand_patterns
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
@@ -32,6 +33,9 @@ RECENT_GROUPS = 2
 
 RATE_TOLERANCE = 1e-3
 """Largest relative disagreement of `time_s` with the declared sampling rate."""
+
+CURRENT_UNITS = ("A", "Nm")
+"""A torque in Nm may stand for a current; nothing of it is called a current then."""
 
 _AXIS_COLUMN = re.compile(r"axis([1-9][0-9]*)_(a|b|c|current|position|velocity|temperature)")
 
@@ -54,8 +58,10 @@ class RunInfo:
         ISO 8601, UTC.
     session
         Name of the recording session; runs of one session are not independent.
-    source_sha256
-        Of the file that the run was made from.
+    source_sha256, map_sha256
+        Of the file that the run was made from, and of the map that it was read by.
+    current_unit
+        "A", or "Nm" where a joint's torque stands for its motor's current.
     """
 
     sampling_rate_hz: float
@@ -66,10 +72,14 @@ class RunInfo:
     started_at: str | None = None
     session: str | None = None
     source_sha256: str | None = None
+    map_sha256: str | None = None
+    current_unit: str = "A"
 
     def to_json(self) -> str:
-        """Return canonical JSON without the unknown fields."""
+        """Return canonical JSON without the unknown fields and an ordinary unit."""
         known = {key: value for key, value in asdict(self).items() if value is not None}
+        if self.current_unit == "A":
+            del known["current_unit"]
         return json.dumps(known, sort_keys=True)
 
 
@@ -276,7 +286,7 @@ class Run:
 
 
 def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
-    """List the runs named by files and folders, as (name, path), sorted, each once.
+    """List the runs named by files, folders and patterns, as (name, path), sorted, each once.
 
     A folder stands for every `*.parquet` below it that is not a stage table. Names are the
     paths below the folder without their ending; of files given one by one, their stems.
@@ -287,7 +297,7 @@ def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
         If a path does not exist or a folder holds no run.
     """
     found: dict[Path, str] = {}
-    for path in paths:
+    for path in expand_patterns(paths):
         if path.is_dir():
             files = [f for f in sorted(path.rglob("*.parquet")) if _may_be_run(path, f)]
             if not files:
@@ -433,7 +443,10 @@ def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
         if kept.get(key) is not None and not isinstance(kept[key], int | float):
             msg = f"{path}: {key} is {kept[key]!r} in metadata key 'opamc'; it must be a number"
             raise InputError(msg)
-    for key in ("robot", "program", "started_at", "session", "source_sha256"):
+    if kept.get("current_unit", "A") not in CURRENT_UNITS:
+        msg = f"{path}: current_unit is {kept['current_unit']!r}; it must be 'A' or 'Nm'"
+        raise InputError(msg)
+    for key in ("robot", "program", "started_at", "session", "source_sha256", "map_sha256"):
         # a program called 7 in one run and "7" in another is the same program
         if kept.get(key) is not None:
             kept[key] = str(kept[key])

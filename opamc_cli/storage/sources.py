@@ -13,7 +13,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.storage.runs import Run, RunInfo
 from opamc_cli.storage.tables import table_record
 
-REQUIRED_EQUAL = ("sampling_rate_hz", "program")
+REQUIRED_EQUAL = ("sampling_rate_hz", "program", "current_unit")
 """What must agree between recordings before their patterns can be compared."""
 
 WORTH_NOTING = ("robot", "speed_percent", "payload_kg")

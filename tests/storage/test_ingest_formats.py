@@ -240,5 +240,5 @@ def test_a_missing_library_is_named_with_the_way_to_get_it(tmp_path, monkeypatch
 def test_an_unknown_ending_is_refused(tmp_path):
     file = tmp_path / "r.xyz"
     file.write_text("1\n")
-    with pytest.raises(InputError, match="set format to csv, mat, hdf5 or tdms"):
+    with pytest.raises(InputError, match="set format in the map"):
         ingested(tmp_path, file, one_channel("0"))

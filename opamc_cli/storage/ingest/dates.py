@@ -8,8 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.map import Name
-from opamc_cli.storage.ingest.source import Array
+from opamc_cli.storage.ingest.source import Array, Name
 
 
 def has_zone(text: str) -> bool:

@@ -1,43 +1,22 @@
 """The map file: which channel of a foreign recording becomes which column of a run."""
 
-import codecs
-import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from opamc_cli.config.files import read_values, validate
-from opamc_cli.errors import ConfigError, InputError
-from opamc_cli.storage.ingest.units import (
-    ISO8601,
-    QUANTITY_OF_KIND,
-    SAMPLES,
-    conversion,
-    known_units,
-)
-
-FORMAT_OF_ENDING = {
-    ".csv": "csv",
-    ".txt": "csv",
-    ".tsv": "csv",
-    ".dat": "csv",
-    ".mat": "mat",
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".hdf": "hdf5",
-    ".tdms": "tdms",
-}
-CSV_KEYS = frozenset({"separator", "decimal", "header", "encoding", "skip_rows", "units_rows"})
-
-_COLUMN = re.compile(r"axis[1-9][0-9]*_(a|b|c|current|position|velocity|temperature)")
+from opamc_cli.config.shipped import shipped_file
+from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.axes import expand, has_placeholder, protect
+from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
+from opamc_cli.storage.ingest.source import Listed, Name
+from opamc_cli.storage.ingest.units import QUANTITY_OF_KIND, conversion
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Name = int | str
-"""A channel: column number from 0 or name (CSV), "struct.field" (MAT), "group/dataset" (HDF5),
-"group/channel" (TDMS)."""
+Format = Literal["csv", "mat", "hdf5", "tdms", "parquet", "feather", "ros", "mdf"]
 
 
 class _Strict(BaseModel):
@@ -45,14 +24,18 @@ class _Strict(BaseModel):
 
 
 class ColumnMap(_Strict):
-    """One channel of the source: run value = source · scale + offset, in `unit`."""
+    """One channel of the source: run value = source · scale + offset, in `unit`.
+
+    An optional one is left out where the recording has no such channel.
+    """
 
     source: Name
     unit: str
-    index: Annotated[int, Field(ge=0)] | None = None
+    index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
     scale: Annotated[float, Field(allow_inf_nan=False)] = 1.0
     offset: Annotated[float, Field(allow_inf_nan=False)] = 0.0
     unwrap: bool = False
+    optional: bool = False
 
 
 class TimeMap(_Strict):
@@ -86,6 +69,7 @@ class MetadataMap(_Strict):
     speed_percent: float | ValueMap | None = None
     payload_kg: float | ValueMap | None = None
     started_at: datetime | str | ValueMap | None = None
+    session: str | ValueMap | None = None
 
 
 class IngestMap(_Strict):
@@ -107,43 +91,86 @@ class IngestMap(_Strict):
         Lines before the header (or before the data, without one).
     units_rows
         Lines between header and data.
+    axes
+        For how many axes a line with `{n}` stands; None: for as many as the file has.
     columns
-        Run column by name, such as ``axis1_a``.
+        Run column by name, such as ``axis1_a``, or for all axes, ``axis{n}_a``.
     sampling_rate_hz
-        Samples per second. With `time` it is the rate to resample to; without `time` the rows
-        are taken as evenly spaced.
+        Samples per second, by declaration. Without `time` the rows are taken as evenly spaced.
+    resample_hz
+        Rate of the run, whatever the clock says; None: the declared rate, or else the measured.
     time
         Time stamps.
     metadata
         What the run says of itself.
     """
 
-    format: Literal["csv", "mat", "hdf5", "tdms"] | None = None
+    format: Format | None = None
     separator: str = Field(",", min_length=1)
     decimal: Literal[".", ","] = "."
     header: bool = True
     encoding: str = "utf-8"
     skip_rows: Annotated[int, Field(ge=0)] = 0
     units_rows: Annotated[int, Field(ge=0)] = 0
+    axes: Annotated[int, Field(ge=1, le=32)] | None = None
     columns: dict[str, ColumnMap] = Field(min_length=1)
     sampling_rate_hz: Positive | RateMap | None = None
+    resample_hz: Positive | None = None
     time: TimeMap | None = None
     metadata: MetadataMap = MetadataMap()
 
 
 def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
-    """Return a map file, with `key=value` overrides applied.
+    """Return a map file or a shipped map by its name, with `key=value` overrides applied.
 
     Raises
     ------
     ConfigError
         If it cannot be read, or a key, column name, unit or combination is not allowed.
     """
-    channels = validate(IngestMap, read_values(path, overrides), str(path))
-    _check_columns(path, channels)
-    _check_timing(path, channels)
-    _check_text_options(path, channels)
+    from opamc_cli.storage.ingest.check_map import check_map
+
+    file = shipped_file(path, "maps")
+    channels = validate(IngestMap, read_values(file, overrides, protect), str(path))
+    check_map(path, channels)
     return channels
+
+
+def for_axes(
+    channels: IngestMap, listed: Callable[[], Sequence[Listed]] | None = None
+) -> IngestMap:
+    """Return a map with a line for every axis instead of those with `{n}`.
+
+    Parameters
+    ----------
+    channels
+        The map.
+    listed
+        Returns what the recording offers: it tells the number of axes where the map does not,
+        and which optional channels are there. None: as for one axis that has them all.
+    """
+    several = any(has_placeholder(name) for name in channels.columns)
+    if not several and not any(column.optional for column in channels.columns.values()):
+        return channels
+    offered = {each.name: each.width for each in listed()} if listed is not None else {}
+
+    def exists(entry: Mapping[str, Any]) -> bool:
+        source, index = entry["source"], entry.get("index")
+        if listed is None:
+            return True
+        return source in offered and (index is None or index < (offered[source] or 0))
+
+    entries = {
+        name: column.model_dump(exclude_defaults=True) for name, column in channels.columns.items()
+    }
+    if several:
+        entries = expand(entries, channels.axes or (None if listed is not None else 1), exists)
+    columns = {
+        name: ColumnMap.model_validate(entry)
+        for name, entry in entries.items()
+        if exists(entry) or not entry.get("optional")
+    }
+    return channels.model_copy(update={"columns": columns})
 
 
 def format_of(path: Path, channels: IngestMap) -> str:
@@ -154,12 +181,11 @@ def format_of(path: Path, channels: IngestMap) -> str:
     InputError
         If neither tells.
     """
-    suffixes = [suffix.lower() for suffix in path.suffixes if suffix.lower() != ".gz"]
-    found = channels.format or FORMAT_OF_ENDING.get(suffixes[-1] if suffixes else "")
+    found = channels.format or format_by_ending(path)
     if found is None:
         msg = (
-            f"{path}: its ending does not tell the format; "
-            "set format to csv, mat, hdf5 or tdms in the map"
+            f"{path}: its ending does not tell the format; set format in the map; "
+            f"known: {known_endings()}"
         )
         raise InputError(msg)
     return found
@@ -176,55 +202,8 @@ def quantity_of(column: str) -> str:
     return QUANTITY_OF_KIND[column.partition("_")[2]]
 
 
-def _check_columns(path: Path, channels: IngestMap) -> None:
-    for name, column in channels.columns.items():
-        if not _COLUMN.fullmatch(name):
-            msg = (
-                f"{path}: columns.{name} is not a column of a run; known: axisN_a, axisN_b, "
-                "axisN_c, axisN_current, axisN_position, axisN_velocity, axisN_temperature "
-                "with N from 1"
-            )
-            raise ConfigError(msg)
-        quantity = quantity_of(name)
-        if conversion(column.unit, quantity) is None:
-            msg = (
-                f"{path}: columns.{name}.unit is {column.unit!r}; "
-                f"units of a {quantity}: {known_units(quantity)}"
-            )
-            raise ConfigError(msg)
-        if column.unwrap and quantity != "position":
-            msg = f"{path}: columns.{name}.unwrap is for positions, {name} is a {quantity}"
-            raise ConfigError(msg)
-    if not any(quantity_of(name) == "current" for name in channels.columns):
-        msg = (
-            f"{path}: columns names no current; a run needs axis1_a (axis1_b, axis1_c) "
-            "or axis1_current"
-        )
-        raise ConfigError(msg)
-
-
-def _check_timing(path: Path, channels: IngestMap) -> None:
-    time, rate = channels.time, channels.sampling_rate_hz
-    if time is None and rate is None:
-        msg = f"{path}: no sampling_rate_hz and no time column; give one of the two"
-        raise ConfigError(msg)
-    if isinstance(rate, RateMap) and _rate_kind(rate) is None:
-        msg = (
-            f"{path}: sampling_rate_hz.unit is {rate.unit!r}; "
-            "a rate is in Hz or kHz, a period in s, ms, us or ns"
-        )
-        raise ConfigError(msg)
-    if time is None:
-        return
-    if time.unit not in (SAMPLES, ISO8601) and conversion(time.unit, "time") is None:
-        msg = f"{path}: time.unit is {time.unit!r}; units of time: {known_units('time')}"
-        raise ConfigError(msg)
-    if time.unit == SAMPLES and rate is None:
-        msg = f"{path}: time counts samples, so sampling_rate_hz must say how many make a second"
-        raise ConfigError(msg)
-
-
-def _rate_kind(rate: RateMap) -> str | None:
+def rate_kind(rate: RateMap) -> str | None:
+    """Return whether a unit is one of a rate or of a time (a period), None if of neither."""
     for quantity in ("rate", "time"):
         if conversion(rate.unit, quantity) is not None:
             return quantity
@@ -233,33 +212,7 @@ def _rate_kind(rate: RateMap) -> str | None:
 
 def rate_hz(rate: RateMap, value: float) -> float:
     """Return the sampling rate that a rate or period in the source stands for."""
-    quantity = _rate_kind(rate) or "rate"
+    quantity = rate_kind(rate) or "rate"
     known = conversion(rate.unit, quantity)
     scaled = value * (known.factor if known else 1.0)
     return scaled if quantity == "rate" else 1.0 / scaled
-
-
-def _check_text_options(path: Path, channels: IngestMap) -> None:
-    given = sorted(CSV_KEYS & channels.model_fields_set)
-    if channels.format not in (None, "csv") and given:
-        msg = f"{path}: {given[0]} is for csv, the map's format is {channels.format}"
-        raise ConfigError(msg)
-    if channels.separator == channels.decimal:
-        msg = (
-            f"{path}: separator and decimal are both {channels.decimal!r}; "
-            "a file with decimal commas separates by ';' or 'tab'"
-        )
-        raise ConfigError(msg)
-    try:
-        codecs.lookup(channels.encoding)
-    except LookupError as error:
-        msg = f"{path}: encoding is {channels.encoding!r}; use utf-8, latin-1, cp1252 or utf-16"
-        raise ConfigError(msg) from error
-    if channels.format in (None, "csv") and not channels.header:
-        for name, column in channels.columns.items():
-            if isinstance(column.source, str):
-                msg = (
-                    f"{path}: columns.{name}.source is {column.source!r}; without a header line "
-                    "columns are numbered from 0"
-                )
-                raise ConfigError(msg)

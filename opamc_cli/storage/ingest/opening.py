@@ -7,8 +7,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.map import IngestMap, Name, format_of
-from opamc_cli.storage.ingest.source import Block, Selection, Source
+from opamc_cli.storage.ingest.formats import is_ros2_bag
+from opamc_cli.storage.ingest.map import IngestMap, format_of
+from opamc_cli.storage.ingest.source import Block, Listed, Name, Selection, Source
 
 LIBRARY_ERRORS = (
     ArithmeticError,
@@ -24,7 +25,7 @@ LIBRARY_ERRORS = (
     struct.error,
     zlib.error,
 )
-"""What h5py, scipy and npTDMS raise on damaged files, for want of errors of their own."""
+"""What h5py, scipy, npTDMS, rosbags and asammdf raise on damaged files."""
 
 
 @contextmanager
@@ -36,13 +37,13 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
     InputError
         If it is missing, damaged or not of its format, or a library to read it is not installed.
     """
-    if path.is_dir():
+    if path.is_dir() and not is_ros2_bag(path):
         msg = f"{path}: is a folder where a recording is needed; name the files in it"
         raise InputError(msg)
     if not path.exists():
         msg = f"{path}: no such file; check the path"
         raise InputError(msg)
-    if path.stat().st_size == 0:
+    if path.is_file() and path.stat().st_size == 0:
         msg = f"{path}: is empty (0 bytes); record it again"
         raise InputError(msg)
     with ExitStack() as stack:
@@ -55,19 +56,35 @@ def _opened(path: Path, channels: IngestMap) -> AbstractContextManager[Source]:
     # each format's library is imported only where that format is read
     match format_of(path, channels):
         case "csv":
-            from opamc_cli.storage.ingest.csv import CsvSource
+            from opamc_cli.storage.ingest.readers.csv import CsvSource
 
             return CsvSource(path, channels)
         case "mat":
-            from opamc_cli.storage.ingest.mat import open_mat
+            from opamc_cli.storage.ingest.readers.mat import open_mat
 
             return open_mat(path)
         case "hdf5":
-            from opamc_cli.storage.ingest.hdf5 import open_hdf5
+            from opamc_cli.storage.ingest.readers.hdf5 import open_hdf5
 
             return open_hdf5(path)
+        case "parquet":
+            from opamc_cli.storage.ingest.readers.arrow import open_parquet
+
+            return open_parquet(path)
+        case "feather":
+            from opamc_cli.storage.ingest.readers.arrow import open_feather
+
+            return open_feather(path)
+        case "ros":
+            from opamc_cli.storage.ingest.readers.ros import open_ros
+
+            return open_ros(path)
+        case "mdf":
+            from opamc_cli.storage.ingest.readers.mdf import open_mdf
+
+            return open_mdf(path)
         case _:
-            from opamc_cli.storage.ingest.tdms import open_tdms
+            from opamc_cli.storage.ingest.readers.tdms import open_tdms
 
             return open_tdms(path)
 
@@ -88,6 +105,10 @@ class _Guarded:
     def __init__(self, path: Path, source: Source) -> None:
         self._path = path
         self._source = source
+
+    def channels(self) -> list[Listed]:
+        with _readable(self._path):
+            return self._source.channels()
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         blocks = self._source.blocks(selections)

@@ -3,13 +3,17 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.map import Name
+from opamc_cli.storage.ingest.formats import EXTRA_OF_FORMAT
+
+Name = int | str
+"""A channel: column number from 0 or name (CSV), "struct.field" (MAT), "group/dataset" (HDF5),
+"group/channel" (TDMS), "/topic/joint/effort" (ROS); docs/formats.md has them all."""
 
 Array = npt.NDArray[Any]
 Block = dict[str, Array]
@@ -37,8 +41,37 @@ class Selection:
     dates: bool = False
 
 
+@dataclass(frozen=True)
+class Listed:
+    """A channel that a recording offers.
+
+    Attributes
+    ----------
+    name
+        What a map calls it.
+    width
+        Columns of a two-dimensional one, which the map picks by `index`; None: it has one.
+    unit
+        As the file declares it, None where it does not.
+    dates
+        It holds dates and times.
+    labels
+        What each column of a two-dimensional one is, such as the names of joints.
+    """
+
+    name: Name
+    width: int | None = None
+    unit: str | None = None
+    dates: bool = False
+    labels: tuple[str, ...] = ()
+
+
 class Source(Protocol):
     """An open foreign recording."""
+
+    def channels(self) -> list[Listed]:
+        """Return the channels that hold numbers or dates, in the file's order."""
+        ...
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected channels block by block, in the file's order.
@@ -64,10 +97,11 @@ def missing_channel(path: Path, source: Name, known: list[str]) -> InputError:
     return InputError(f"{path}: no channel {source!r}; the file has {shown or 'none'}")
 
 
-def missing_library(path: Path, name: str) -> InputError:
+def missing_library(path: Path, name: str, format_name: str) -> InputError:
     """Return the error for a format whose library is not installed."""
+    extra = EXTRA_OF_FORMAT[format_name]
     return InputError(
-        f"{path}: reading this format needs {name}; install it with pip install 'opamc[ingest]'"
+        f"{path}: reading this format needs {name}; install it with pip install 'opamc[{extra}]'"
     )
 
 
@@ -101,6 +135,20 @@ def samples_of(
         )
         raise InputError(msg)
     return shape[time], time
+
+
+def width_of(shape: tuple[int, ...]) -> int | Literal[False] | None:
+    """Return how many channels a dataset holds: None for a single one, False where it has none.
+
+    Examples
+    --------
+    >>> width_of((5000,)), width_of((1, 5000)), width_of((5000, 6)), width_of((1, 1))
+    (None, None, 6, False)
+    """
+    long = [size for size in shape if size > 1]
+    if not long or len(shape) > 2:
+        return False
+    return None if len(long) == 1 else min(long)
 
 
 def check_lengths(path: Path, lengths: Mapping[Name, int]) -> int:

@@ -6,14 +6,14 @@ they are, since interpolating them could only lose what they hold.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.map import Name
+from opamc_cli.storage.ingest.source import Name
 
 Seconds = npt.NDArray[np.float64]
 
@@ -33,6 +33,9 @@ MAX_DROPPED = 0.05
 MAX_STRETCH = 10
 """Samples per row beyond which a recording is mostly gap."""
 
+SAME_RATE = 1e-9
+"""Relative difference of rates that is none: of the arithmetic, not of the clock."""
+
 _CHUNK = 1 << 20
 
 
@@ -43,11 +46,13 @@ class StampAccount:
     Attributes
     ----------
     even
-        The samples are kept as they are.
+        The samples are evenly spaced.
+    resampled
+        They were put on another grid all the same, or because they are not.
     measured_rate_hz
         What the stamps say.
     jitter_s
-        Largest deviation of a step from the measured period, of steps below 1.5 periods.
+        Largest deviation of a step from the measured period, where no sample is missing.
     n_bridged
         Longer steps that are interpolated across: a sample is missing.
     n_gaps, longest_gap_s
@@ -57,6 +62,7 @@ class StampAccount:
     """
 
     even: bool
+    resampled: bool
     measured_rate_hz: float
     jitter_s: float
     n_bridged: int
@@ -101,6 +107,7 @@ def examine(
     times_s: Seconds,
     declared_rate_hz: float | None,
     max_gap_samples: float,
+    grid_rate_hz: float | None = None,
 ) -> Clock:
     """Find the uniform grid of a recording's time stamps.
 
@@ -111,9 +118,12 @@ def examine(
     times_s
         Stamps, shape (rows,); NaN where unreadable.
     declared_rate_hz
-        Rate of the grid; None: the measured one.
+        Rate of the logger's clock, None where it is not known. Uneven stamps are put on a grid
+        of this rate, or else of the measured one.
     max_gap_samples
         Longest step, in samples, that is interpolated across.
+    grid_rate_hz
+        Rate of the grid whatever the clock's; None: as above.
 
     Raises
     ------
@@ -125,8 +135,26 @@ def examine(
         raise InputError(msg)
     clock = _even_clock(times_s, declared_rate_hz)
     if clock is None:
-        clock = _uneven_clock(path, source, times_s, declared_rate_hz, max_gap_samples)
-    return clock
+        return _uneven_clock(path, source, times_s, declared_rate_hz, max_gap_samples, grid_rate_hz)
+    if grid_rate_hz is None or abs(clock.sampling_rate_hz / grid_rate_hz - 1.0) < SAME_RATE:
+        return clock
+    rate = clock.sampling_rate_hz
+    if abs(rate / grid_rate_hz - 1.0) > RATE_WITHIN:
+        msg = (
+            f"{path}: resample_hz is {grid_rate_hz:g}, the recording has {rate:.6g} Hz, more than "
+            f"{RATE_WITHIN:.0%} apart; a lower rate would alias and a higher one invent: choose "
+            "one in between, or record at it"
+        )
+        raise InputError(msg)
+    span_s = float(times_s[-1] - times_s[0])
+    return Clock(
+        sampling_rate_hz=grid_rate_hz,
+        n_samples=int(span_s * grid_rate_hz + 1e-6) + 1,
+        start_s=clock.start_s,
+        kept=np.ones(len(times_s), dtype=np.bool_),
+        max_gap_s=max_gap_samples / rate,
+        account=replace(clock.account, resampled=True),
+    )
 
 
 def resolution_s(times_s: Seconds) -> float:
@@ -168,7 +196,7 @@ def _even_clock(times_s: Seconds, declared_rate_hz: float | None) -> Clock | Non
         else:
             return None
     jitter = max(float(np.abs(step - period).max()) for step in _steps(times_s))
-    account = StampAccount(True, 1.0 / period, jitter, 0, 0, 0.0, 0, 0, 0)
+    account = StampAccount(True, False, 1.0 / period, jitter, 0, 0, 0.0, 0, 0, 0)
     return Clock(rate, len(times_s), float(times_s[0]), None, 0.0, account)
 
 
@@ -178,6 +206,7 @@ def _uneven_clock(
     times_s: Seconds,
     declared_rate_hz: float | None,
     max_gap_samples: float,
+    grid_rate_hz: float | None,
 ) -> Clock:
     readable = np.isfinite(times_s)
     latest = np.fmax.accumulate(times_s)
@@ -198,16 +227,18 @@ def _uneven_clock(
         )
         raise InputError(msg)
     step = np.diff(times_s[kept])
-    typical = float(np.median(step))
-    measured = 1.0 / float(step[step < 1.5 * typical].mean())
-    rate = declared_rate_hz or float(f"{measured:.6g}")
-    if abs(measured / rate - 1.0) > RATE_WITHIN:
-        msg = (
-            f"{path}: time column {source!r} says {measured:.6g} Hz, the map {rate:g} Hz, "
-            f"more than {RATE_WITHIN:.0%} apart; correct sampling_rate_hz or time.unit"
-        )
-        raise InputError(msg)
-    max_gap_s = max_gap_samples / rate
+    missing = _missing_samples(step)
+    measured = 1.0 / float(step[~missing].mean())
+    rate = grid_rate_hz or declared_rate_hz or float(f"{measured:.6g}")
+    for declared in (declared_rate_hz, grid_rate_hz):
+        if declared is not None and abs(measured / declared - 1.0) > RATE_WITHIN:
+            msg = (
+                f"{path}: time column {source!r} says {measured:.6g} Hz, the map {declared:g} Hz, "
+                f"more than {RATE_WITHIN:.0%} apart; correct sampling_rate_hz, resample_hz or "
+                "time.unit"
+            )
+            raise InputError(msg)
+    max_gap_s = max_gap_samples / min(rate, measured)
     gaps = step[step > max_gap_s]
     start_s, stop_s = (float(times_s[kept][i]) for i in (0, -1))
     n_samples = int((stop_s - start_s) * rate + 1e-6) + 1
@@ -218,12 +249,13 @@ def _uneven_clock(
             f"{float(gaps.max()):.6g} s): split the recording there"
         )
         raise InputError(msg)
-    regular = step[step < 1.5 / measured]
+    regular = step[~missing]
     account = StampAccount(
         even=False,
+        resampled=True,
         measured_rate_hz=measured,
         jitter_s=float(np.abs(regular - 1.0 / measured).max()),
-        n_bridged=int(np.sum((step >= 1.5 / measured) & (step <= max_gap_s))),
+        n_bridged=int(np.sum(missing & (step <= max_gap_s))),
         n_gaps=len(gaps),
         longest_gap_s=float(gaps.max(initial=0.0)),
         n_duplicates=n_duplicates,
@@ -231,6 +263,18 @@ def _uneven_clock(
         n_unreadable=n_unreadable,
     )
     return Clock(rate, n_samples, start_s, kept, max_gap_s, account)
+
+
+def _missing_samples(step: Seconds) -> npt.NDArray[np.bool_]:
+    """Return which steps a sample is missing in.
+
+    A stamp that comes late makes a long step too, but a short one beside it: the three together
+    are then no longer than three.
+    """
+    typical = float(np.median(step))
+    padded = np.concatenate(([typical], step, [typical]))
+    together = padded[:-2] + padded[1:-1] + padded[2:]
+    return np.asarray((step >= 1.5 * typical) & (together >= 3.5 * typical))
 
 
 def _fitted_period(times_s: Seconds) -> float:

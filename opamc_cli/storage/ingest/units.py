@@ -35,6 +35,8 @@ CONVERSIONS: dict[str, dict[str, Conversion]] = {
         "mA": Conversion(1e-3),
         "uA": Conversion(1e-6),
         "kA": Conversion(1e3),
+        "Nm": Conversion(1.0),
+        "mNm": Conversion(1e-3),
     },
     "position": {
         "rad": Conversion(1.0),
@@ -63,7 +65,10 @@ CONVERSIONS: dict[str, dict[str, Conversion]] = {
     },
     "rate": {"Hz": Conversion(1.0), "kHz": Conversion(1e3)},
 }
-"""Conversions to A, rad, rad/s, °C, s and Hz, by quantity and unit."""
+"""Conversions to A (a torque: Nm), rad, rad/s, °C, s and Hz, by quantity and unit."""
+
+TORQUES = frozenset({"Nm", "mNm"})
+"""Units in which a joint's torque stands for its motor's current; it stays a torque."""
 
 SAMPLES = "samples"
 """Unit of a time column that counts samples; the sampling rate turns it into seconds."""
@@ -81,6 +86,8 @@ ALIASES = {
     "°F": "degF",
     "µs": "us",
     "sec": "s",
+    "N·m": "Nm",
+    "N m": "Nm",
 }
 
 
@@ -95,6 +102,11 @@ def conversion(unit: str, quantity: str) -> Conversion | None:
     True
     """
     return CONVERSIONS[quantity].get(ALIASES.get(unit, unit))
+
+
+def is_torque(unit: str) -> bool:
+    """Return whether a unit is one of torque."""
+    return ALIASES.get(unit, unit) in TORQUES
 
 
 def known_units(quantity: str) -> str:

@@ -15,16 +15,18 @@ from scipy.io.matlab import MatReadError
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.dates import parse_dates
-from opamc_cli.storage.ingest.hdf5 import Hdf5Source, open_hdf5
-from opamc_cli.storage.ingest.map import Name
+from opamc_cli.storage.ingest.readers.hdf5 import Hdf5Source, open_hdf5
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Array,
     Block,
+    Listed,
+    Name,
     Selection,
     check_lengths,
     missing_channel,
     samples_of,
+    width_of,
 )
 
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
@@ -57,6 +59,24 @@ class MatSource:
         self.path = path
         self._loaded: dict[str, Any] = {}
         self._variables = [name for name, _, _ in self._call(scipy.io.whosmat)]
+
+    def channels(self) -> list[Listed]:
+        """Return the variables and struct fields that hold numbers."""
+        self._load(set(self._variables))
+        listed: list[Listed] = []
+        names = list(self._variables)
+        while names:
+            name = names.pop(0)
+            values = self._item(name)
+            if values.dtype == object and values.size == 1:
+                fields = getattr(values.flat[0], "_fieldnames", None) or ()
+                names[:0] = [f"{name}.{field}" for field in fields]
+            elif values.dtype.kind in "fiu":
+                width = width_of(values.shape)
+                if width is not False:
+                    listed.append(Listed(name, width))
+        self._loaded.clear()
+        return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected variables block by block."""

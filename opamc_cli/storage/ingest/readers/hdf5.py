@@ -9,16 +9,18 @@ import numpy as np
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.dates import parse_dates
-from opamc_cli.storage.ingest.map import Name
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Array,
     Block,
+    Listed,
+    Name,
     Selection,
     check_lengths,
     missing_channel,
     missing_library,
     samples_of,
+    width_of,
 )
 
 ATTRIBUTE_MARK = "@"
@@ -37,7 +39,7 @@ def open_hdf5(path: Path, struct_separator: str = "/") -> Iterator["Hdf5Source"]
     try:
         import h5py
     except ImportError as error:
-        raise missing_library(path, "h5py") from error
+        raise missing_library(path, "h5py", "hdf5") from error
     try:
         file = h5py.File(path, "r")
     except OSError as error:
@@ -54,6 +56,19 @@ class Hdf5Source:
         self.path = path
         self._file = file
         self._separator = struct_separator
+
+    def channels(self) -> list[Listed]:
+        """Return the datasets and record fields that hold numbers, one or two-dimensional."""
+        listed = []
+        for name in self._known():
+            dataset, field = self._dataset(name)
+            kind = dataset.dtype if field is None else dataset.dtype[field]
+            if kind.kind in "fiu" and not _is_matlab_text(dataset):
+                unit = dataset.attrs.get("unit", dataset.attrs.get("units"))
+                width = width_of(tuple(dataset.shape))
+                if width is not False:
+                    listed.append(Listed(name, width, None if unit is None else _text(unit)))
+        return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected datasets block by block."""

@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates, timestamp_type
-from opamc_cli.storage.ingest.map import IngestMap, Name
-from opamc_cli.storage.ingest.source import Block, Selection, missing_channel
+from opamc_cli.storage.ingest.dates import parse_dates, timestamp_type, utc_text
+from opamc_cli.storage.ingest.map import IngestMap
+from opamc_cli.storage.ingest.source import Block, Listed, Name, Selection, missing_channel
 
 BLOCK_BYTES = 1 << 22
 FIELD_MARK = "\x1f"
@@ -44,7 +44,7 @@ class CsvSource:
         self._pattern = r"[ \t]+" if separator == "whitespace" else re.escape(separator)
         self._rewrites = separator == "whitespace" or len(separator) > 1
         self._delimiter = FIELD_MARK if self._rewrites else separator
-        header, self._first_row = self._read_top()
+        header, self._units, self._first_row = self._read_top()
         self._names = [name.strip() for name in header]
 
     def __enter__(self) -> Self:
@@ -53,6 +53,19 @@ class CsvSource:
 
     def __exit__(self, *_: object) -> None:
         """Nothing is held open between reads."""
+
+    def channels(self) -> list[Listed]:
+        """Return the columns whose first row holds a number, a date or nothing."""
+        listed = []
+        for position, text in enumerate(self._first_row):
+            given = self._names[position] if position < len(self._names) else ""
+            kind = _kind(text.strip(), self._map.decimal)
+            if kind is None or (self._map.header and not given):
+                continue
+            name: Name = given if given and self._names.count(given) == 1 else position
+            unit = self._units[position].strip(" []()") if position < len(self._units) else ""
+            listed.append(Listed(name, unit=unit or None, dates=kind == "date"))
+        return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected columns block by block."""
@@ -98,7 +111,8 @@ class CsvSource:
             raise InputError(msg)
         return found[0]
 
-    def _read_top(self) -> tuple[list[str], list[str]]:
+    def _read_top(self) -> tuple[list[str], list[str], list[str]]:
+        units: list[str] = []
         try:
             with self._text() as text:
                 for _ in range(self._map.skip_rows):
@@ -106,7 +120,7 @@ class CsvSource:
                 rows = (row for row in csv.reader(text, delimiter=self._delimiter) if row)
                 header = next(rows, []) if self._map.header else []
                 for _ in range(self._map.units_rows * self._map.header):
-                    next(rows, None)
+                    units = units or next(rows, [])
                 first = next(rows, None)
         except UnicodeDecodeError as error:
             raise self._wrong_encoding(error) from error
@@ -116,7 +130,7 @@ class CsvSource:
         if first is None:
             msg = f"{self.path}: no data rows after {self._skipped} lines; check skip_rows, header"
             raise InputError(msg)
-        return header, first
+        return header, units, first
 
     def _text(self) -> io.TextIOWrapper:
         encoding = "utf-8-sig" if _is_utf8(self._map.encoding) else self._map.encoding
@@ -206,6 +220,15 @@ class _Rewritten(io.RawIOBase):
         n = min(len(buffer), len(self._ready))
         buffer[:n], self._ready = self._ready[:n], self._ready[n:]
         return n
+
+
+def _kind(text: str, decimal: str) -> str | None:
+    """Return whether a cell holds a number (or nothing) or a date, None where something else."""
+    try:
+        float(text.replace(decimal, ".") or "nan")
+    except ValueError:
+        return "date" if utc_text(text.replace(",", ".")) is not None else None
+    return "number"
 
 
 def _is_utf8(encoding: str) -> bool:

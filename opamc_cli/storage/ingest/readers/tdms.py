@@ -9,10 +9,11 @@ import numpy as np
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.dates import parse_dates
-from opamc_cli.storage.ingest.map import Name
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Block,
+    Listed,
+    Name,
     Selection,
     check_lengths,
     missing_channel,
@@ -32,7 +33,7 @@ def open_tdms(path: Path) -> Iterator["TdmsSource"]:
     try:
         from nptdms import TdmsFile
     except ImportError as error:
-        raise missing_library(path, "npTDMS") from error
+        raise missing_library(path, "npTDMS", "tdms") from error
     with path.open("rb") as handle:
         mark = handle.read(4)
     if mark != b"TDSm":
@@ -48,6 +49,19 @@ class TdmsSource:
     def __init__(self, path: Path, file: Any) -> None:
         self.path = path
         self._file = file
+
+    def channels(self) -> list[Listed]:
+        """Return the channels that hold numbers or time stamps."""
+        listed = []
+        for group in self._file.groups():
+            for channel in group.channels():
+                kind = np.dtype(channel.dtype).kind
+                if kind in "fiuM" and len(channel):
+                    unit = channel.properties.get("unit_string")
+                    listed.append(
+                        Listed(f"{group.name}/{channel.name}", unit=unit, dates=kind == "M")
+                    )
+        return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected channels block by block."""

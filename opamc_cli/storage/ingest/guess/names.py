@@ -1,0 +1,144 @@
+"""What the name of a channel says: which quantity, of which axis, measured or commanded."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from opamc_cli.storage.ingest.axes import has_placeholder
+from opamc_cli.storage.ingest.source import Listed, Name
+
+WORDS = {
+    "temperature": ("temp", "temps", "temperature", "temperatures"),
+    "velocity": ("vel", "velocity", "velocities", "speed", "speeds", "qd", "dq", "omega", "qdot"),
+    "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
+    "current": ("cur", "curr", "current", "currents", "iq", "amp", "amps", "ampere"),
+    "position": ("pos", "position", "positions", "angle", "angles", "q", "phi", "theta", "enc"),
+    "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit"),
+}
+"""Words of a name by quantity, in the order in which they decide."""
+
+NOT_MEASURED = (
+    *("target", "command", "commanded", "cmd", "cmptd", "computed", "desired", "des", "setpoint"),
+    *("ref", "reference", "limit", "error", "sm", "model", "std", "planned", "nominal"),
+)
+"""Words of what a controller wanted, not what was."""
+
+ELSEWHERE = (
+    "mm",
+    "tcp",
+    "tool",
+    "gripper",
+    "base",
+    "cartesian",
+    "flange",
+    "elbow2",
+    "io",
+    "voltage",
+)
+"""Words of what is not a joint's angle, speed or current."""
+
+PHASES = {"a": "a", "b": "b", "c": "c", "u": "a", "v": "b", "w": "c"}
+PHASE_NAME = re.compile(r"(?:^|.*[^a-z])(?:i|ia|cur|current|phase|ph|is)[ _.\-]?([abcuvw])$", re.I)
+"""Such as `I_u`, `phase_b`, `axis1_current_c`, once the axis' number is taken out."""
+
+
+AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
+
+
+@dataclass(frozen=True)
+class Meant:
+    """What a channel seems to be.
+
+    Attributes
+    ----------
+    quantity
+        One of `WORDS`, or phase "a", "b", "c".
+    number
+        The number in its name that counts axes, None where it has none.
+    pattern
+        Its name with ``#`` for that number.
+    source, index
+        What a map calls it.
+    measured
+        It is not a controller's wish.
+    unit
+        As the file declares it.
+    """
+
+    quantity: str
+    number: int | None
+    pattern: str
+    source: Name
+    index: int | None
+    measured: bool
+    unit: str | None
+
+
+def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
+    """Return what the channels of a recording seem to be; those without a meaning are left out.
+
+    Parameters
+    ----------
+    listed
+        The channels.
+    counted
+        Numbers in names count axes; else they are part of a joint's name, as in `wrist_1`.
+    """
+    found: list[Meant] = []
+    for channel in listed:
+        if isinstance(channel.name, int):
+            continue
+        name = str(channel.name)
+        if channel.width is not None:
+            quantity = _quantity(name)
+            if quantity and quantity != "time":
+                found += [
+                    Meant(quantity, k, name, name, k, _is_measured(name), channel.unit)
+                    for k in range(channel.width)
+                ]
+            continue
+        number, pattern = _numbered(name) if counted else (None, name)
+        quantity = "time" if channel.dates else _quantity(pattern)
+        if quantity is None or has_placeholder(name):
+            continue
+        measured = _is_measured(pattern)
+        found.append(Meant(quantity, number, pattern, name, None, measured, channel.unit))
+    if {"a", "b", "c"} <= {each.quantity for each in found}:
+        return found
+    # what ends in `_a` and has no `_b` and `_c` beside it is in ampere
+    return [
+        replace(each, quantity="current") if each.quantity in PHASES else each for each in found
+    ]
+
+
+def _quantity(pattern: str) -> str | None:
+    words = _words(pattern)
+    if any(word in ELSEWHERE for word in words):
+        return None
+    bare = re.sub(r"[#\[\]()]", "", pattern).rstrip(" _.-")
+    phase = PHASE_NAME.match(AXIS_WORD.sub("", bare))
+    if phase:
+        return PHASES[phase[1].lower()]
+    for quantity, known in WORDS.items():
+        if any(word in known for word in words):
+            return quantity
+    return None
+
+
+def _is_measured(pattern: str) -> bool:
+    return not any(word in NOT_MEASURED for word in _words(pattern))
+
+
+def _words(pattern: str) -> list[str]:
+    """Split a name at everything that is no letter, and where small letters turn to capitals."""
+    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", pattern)
+    return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced)]
+
+
+def _numbered(name: str) -> tuple[int | None, str]:
+    """Return the last number of a name and the name without it: `actual_q_3` gives 3."""
+    matches = list(re.finditer(r"[0-9]+", name))
+    if not matches:
+        return None, name
+    last = matches[-1]
+    return int(last[0]), name[: last.start()] + "#" + name[last.end() :]

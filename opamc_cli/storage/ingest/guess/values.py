@@ -1,0 +1,143 @@
+"""What the values of a channel say: degrees or radians, milliampere or ampere, seconds or ticks."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Float = npt.NDArray[np.float64]
+
+LARGEST_RAD = 4 * math.pi
+"""A joint that turns further than two turns either way is counted in degrees."""
+
+LARGEST_A = 60.0
+"""No joint motor of an arm draws more; what is larger is counted in milliampere."""
+
+AGREE_WITHIN = 0.1
+"""Relative difference within which a position's steps agree with a speed."""
+
+ANGLE_UNITS = {
+    ("rad", "rad/s"): 1.0,
+    ("deg", "deg/s"): 1.0,
+    ("deg", "rad/s"): 180 / math.pi,
+    ("rad", "deg/s"): math.pi / 180,
+    ("deg", "rpm"): 6.0,
+    ("rad", "rpm"): math.pi / 30,
+}
+"""Steps of the position per second, over the speed, by units of both."""
+
+RATES_HZ = (5.0, 20_000.0)
+"""Rates at which arms are logged."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A unit and what speaks for it."""
+
+    unit: str
+    why: str
+
+
+def current_unit(largest: float) -> Guess:
+    """Return ampere or milliampere by the largest value."""
+    if largest > LARGEST_A:
+        return Guess("mA", f"largest {largest:.4g}: too many for amperes")
+    return Guess("A", f"largest {largest:.3g}")
+
+
+def angle_units(
+    positions: Mapping[int, Float], speeds: Mapping[int, Float], rate_hz: float | None
+) -> tuple[Guess, Guess]:
+    """Return the units of positions and speeds.
+
+    Parameters
+    ----------
+    positions, speeds
+        Values by axis; speeds may be empty.
+    rate_hz
+        Samples per second, None where it is not known.
+    """
+    largest = max((_largest(values) for values in positions.values()), default=0.0)
+    fastest = max((_largest(values) for values in speeds.values()), default=0.0)
+    by_range = "deg" if largest > LARGEST_RAD else "rad"
+    ratio = _steps_over_speed(positions, speeds)
+    if ratio is not None and rate_hz is not None:
+        ratio *= rate_hz
+        fitting = [
+            units
+            for units, expected in ANGLE_UNITS.items()
+            if abs(ratio / expected - 1) < AGREE_WITHIN
+        ]
+        for units in sorted(fitting, key=lambda units: units[0] != by_range):
+            why = f"largest {largest:.3g}; its steps agree with the speed"
+            return Guess(units[0], why), Guess(units[1], f"largest {fastest:.3g}; as the position")
+    speed = "deg/s" if fastest > LARGEST_RAD else "rad/s"
+    doubt = f" (its steps are {ratio:.3g} of the speed)" if ratio is not None and rate_hz else ""
+    return (
+        Guess(by_range, f"largest {largest:.3g}, by the range alone{doubt}"),
+        Guess(speed, f"largest {fastest:.3g}, by the range alone"),
+    )
+
+
+def rate_from_speed(positions: Mapping[int, Float], speeds: Mapping[int, Float]) -> float | None:
+    """Return the rate at which steps of the position agree with the speed, in the same unit."""
+    ratio = _steps_over_speed(positions, speeds)
+    if ratio is None:
+        return None
+    rate = float(f"{1 / ratio:.2g}")
+    return rate if RATES_HZ[0] <= rate <= RATES_HZ[1] else None
+
+
+def wraps(positions: Mapping[int, Float], unit: str) -> bool:
+    """Return whether a position jumps by a turn."""
+    turn = 360.0 if unit == "deg" else 2 * math.pi
+    steps = [np.abs(np.diff(v[np.isfinite(v)])) for v in positions.values()]
+    return any(bool(((s > 0.75 * turn) & (s < 1.05 * turn)).any()) for s in steps)
+
+
+def time_unit(stamps: Float) -> Guess | None:
+    """Return the unit of time stamps by their steps, None where they are no stamps."""
+    known = stamps[np.isfinite(stamps)]
+    steps = np.diff(known)
+    if len(known) < 3 or float(np.mean(steps > 0)) < 0.9:
+        return None
+    step = float(np.median(steps))
+    if step == 1.0 and bool(np.all(known == np.round(known))):
+        return Guess("samples", "counts rows")
+    for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+        if RATES_HZ[0] <= 1 / (step * factor) <= RATES_HZ[1]:
+            return Guess(unit, f"steps of {step:.6g}")
+    return Guess("s", f"steps of {step:.6g}")
+
+
+def are_phases(a: Float, b: Float, c: Float) -> bool:
+    """Return whether three currents are as large as each other and add up to little.
+
+    Three that know nothing of each other add up to 1.7 times one of them, phases to nothing but
+    what their sensors differ by.
+    """
+    sizes = [float(np.nanstd(x)) for x in (a, b, c)]
+    together = float(np.nanstd(a + b + c))
+    return min(sizes) > 0.5 * max(sizes) > 0 and together < 0.8 * max(sizes)
+
+
+def _largest(values: Float) -> float:
+    known = np.abs(values[np.isfinite(values)])
+    return float(known.max()) if known.size else 0.0
+
+
+def _steps_over_speed(positions: Mapping[int, Float], speeds: Mapping[int, Float]) -> float | None:
+    """Return the step of a position from sample to sample over the speed, least squares."""
+    product = square = 0.0
+    for axis in positions.keys() & speeds.keys():
+        position, speed = positions[axis], speeds[axis]
+        # central differences: a speed that is filtered lags by half a step and no more
+        step = (position[2:] - position[:-2]) / 2
+        middle = speed[1:-1]
+        jump = np.abs(step) > 10 * np.nanmedian(np.abs(step)) + 1e-12
+        known = np.isfinite(step) & np.isfinite(middle) & ~(jump & (np.abs(step) > 1))
+        product += float(np.dot(step[known], middle[known]))
+        square += float(np.dot(middle[known], middle[known]))
+    return product / square if square > 0 and product > 0 else None

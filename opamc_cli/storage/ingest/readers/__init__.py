@@ -1,0 +1,1 @@
+"""One file for each foreign format: how its channels are named and read."""
