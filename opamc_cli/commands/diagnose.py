@@ -23,11 +23,14 @@ def diagnose(
     baseline: Annotated[
         list[Path],
         typer.Option(
-            "--baseline", metavar="RUNS", help="Runs of the healthy state: files, folders."
+            "--baseline",
+            metavar="RUNS",
+            help="Runs of the healthy state: files, folders, quoted patterns; may be repeated.",
         ),
     ],
     target: Annotated[
-        list[Path], typer.Option("--target", metavar="RUNS", help="Runs to be judged.")
+        list[Path],
+        typer.Option("--target", metavar="RUNS", help="Runs to be judged; may be repeated."),
     ],
     model: Annotated[
         Path | None,
@@ -50,7 +53,7 @@ def diagnose(
 
     output = Output(as_json, quiet)
     effective = load_config(config, overrides or ())
-    with output_lock(out):
+    with output_lock(out), output.steps() as progress:
         outcome = stage.run(
             baseline,
             target,
@@ -58,7 +61,7 @@ def diagnose(
             out,
             models=latent.read_models(model) if model else None,
             jobs=jobs,
-            progress=output.progress,
+            progress=progress,
         )
     for note in outcome.notes:
         output.note(note)

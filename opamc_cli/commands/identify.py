@@ -46,7 +46,7 @@ def identify(
     from opamc_cli.storage.lock import output_lock
 
     output = Output(as_json, quiet)
-    with output_lock(out):
+    with output_lock(out), output.steps() as steps:
         outcome = stage.run(
             segments or out / segment.FILE_NAME,
             load_config(config, overrides or ()),
@@ -55,6 +55,7 @@ def identify(
             reference_run=reference_run,
             moved_to=runs or (),
             jobs=jobs,
+            watch=steps("identify"),
         )
     found = [
         {"run": run, "axis": axis, "cycles": cycles, "unidentified": unidentified}

@@ -27,6 +27,7 @@ def ingest(
         Path | None,
         typer.Option(
             "--map",
+            "--config",
             metavar="FILE",
             help="YAML file that says which channel is which column, in which unit; or the name "
             "of a shipped one: ur_rtde, kinova_gen3, kuka_kr, ros_joint_state.",
@@ -60,7 +61,9 @@ def ingest(
     own_map = map_file is None
     if map_file is None:
         map_file = _own_map(files)
-    outcome = stage.run(files, load_map(map_file, overrides or ()), out, jobs)
+    channels = load_map(map_file, overrides or ())
+    with output.steps() as steps:
+        outcome = stage.run(files, channels, out, jobs, steps("ingest"))
     for item in outcome.results:
         for note in _notes(item, own_map):
             output.note(note)

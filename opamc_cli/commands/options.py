@@ -12,13 +12,20 @@ ConfigFile = Annotated[
 Overrides = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Override one option, such as patterns.gamma=1."
+        "--set",
+        metavar="KEY=VALUE",
+        help="Override one option, such as patterns.gamma=1; may be repeated.",
     ),
 ]
 Out = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results are written.")]
 Jobs = Annotated[
     int,
-    typer.Option("--jobs", min=0, help="Worker processes; 0: one per core. Results do not change."),
+    typer.Option(
+        "--jobs",
+        min=0,
+        metavar="N",
+        help="Worker processes; 0: one per core. Results do not change.",
+    ),
 ]
 Json = Annotated[
     bool,
@@ -30,7 +37,11 @@ ExitZero = Annotated[
 ]
 MovedRuns = Annotated[
     list[Path] | None,
-    typer.Option("--runs", metavar="DIR", help="Where the runs are now, if they were moved."),
+    typer.Option(
+        "--runs",
+        metavar="DIR",
+        help="Where the runs are now, if they were moved; may be repeated.",
+    ),
 ]
 
 DEFAULT_OUT = Path("opamc-out")

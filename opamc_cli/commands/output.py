@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 from opamc_cli.errors import ExitCode
 
 if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
     from rich.console import RenderableType
+
+    from opamc_cli.commands.progress import Steps
 
 
 @dataclass(frozen=True)
@@ -37,10 +41,11 @@ class Output:
         """Print why one of several runs could not be used."""
         _write(f"opamc: {text}\n", sys.stderr)
 
-    def progress(self, text: str) -> None:
-        """Print which step begins, to a terminal only: cron mails whatever else it gets."""
-        if sys.stderr.isatty():
-            self.note(f"{text} ...")
+    def steps(self) -> "AbstractContextManager[Steps]":
+        """Show which step is how far, on a terminal only."""
+        from opamc_cli.commands.progress import steps_shown
+
+        return steps_shown(self.quiet)
 
     def result(
         self, values: Mapping[str, Any], *shown: "RenderableType", urgent: bool = False

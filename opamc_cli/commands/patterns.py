@@ -38,13 +38,14 @@ def patterns(
     from opamc_cli.storage.lock import output_lock
 
     output = Output(as_json, quiet)
-    with output_lock(out):
+    with output_lock(out), output.steps() as steps:
         outcome = stage.run(
             motions or out / identify.FILE_NAME,
             load_config(config, overrides or ()),
             out,
             moved_to=runs or (),
             jobs=jobs,
+            watch=steps("patterns"),
         )
     counted = outcome.by_motion()
     output.result(

@@ -14,13 +14,17 @@ def report(
     baseline: Annotated[
         list[Path] | None,
         typer.Option(
-            "--baseline", metavar="RUNS", help="Where the baseline's runs are, if they were moved."
+            "--baseline",
+            metavar="RUNS",
+            help="Where the baseline's runs are, if they were moved; may be repeated.",
         ),
     ] = None,
     target: Annotated[
         list[Path] | None,
         typer.Option(
-            "--target", metavar="RUNS", help="Where the target's runs are, if they were moved."
+            "--target",
+            metavar="RUNS",
+            help="Where the target's runs are, if they were moved; may be repeated.",
         ),
     ] = None,
     config: ConfigFile = None,

@@ -19,7 +19,8 @@ from opamc_cli.commands.output import Output
 
 def segment(
     runs: Annotated[
-        list[Path], typer.Argument(metavar="RUN...", help="Run files and folders of them.")
+        list[Path],
+        typer.Argument(metavar="RUN...", help="Run files, folders of them, quoted patterns."),
     ],
     out: Out = DEFAULT_OUT,
     config: ConfigFile = None,
@@ -35,8 +36,8 @@ def segment(
 
     output = Output(as_json, quiet)
     settings = load_config(config, overrides or ())
-    with output_lock(out):
-        outcome = stage.run(runs, settings, out, jobs=jobs)
+    with output_lock(out), output.steps() as steps:
+        outcome = stage.run(runs, settings, out, jobs=jobs, watch=steps("segment"))
     found = outcome.by_axis()
     for note in outcome.notes:
         output.note(note)

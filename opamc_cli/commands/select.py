@@ -49,7 +49,7 @@ def select(
     from opamc_cli.storage.lock import output_lock
 
     output = Output(as_json, quiet)
-    with output_lock(out):
+    with output_lock(out), output.steps() as steps:
         outcome = stage.run(
             motions or out / identify.FILE_NAME,
             load_config(config, overrides or ()),
@@ -58,6 +58,7 @@ def select(
             gammas=gammas or (0.5, 1.0, 2.0, 4.0),
             moved_to=runs or (),
             jobs=jobs,
+            watch=steps("select"),
         )
     for warning in outcome.warnings:
         output.note(warning)

@@ -56,8 +56,10 @@ def simulate(
         settings.append(f"faults=[{', '.join(_fault(text) for text in fault)}]")
     testbed = load_testbed(config, settings)
     output = Output(as_json, quiet)
-    with output_lock(out):
-        outcome = stage.run(testbed, seed, out, truth_signals=truth_signals, jobs=jobs)
+    with output_lock(out), output.steps() as steps:
+        outcome = stage.run(
+            testbed, seed, out, truth_signals=truth_signals, jobs=jobs, watch=steps("simulate")
+        )
     rate = testbed.recording.sampling_rate_hz
     output.result(
         {

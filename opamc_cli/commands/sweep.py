@@ -20,11 +20,14 @@ from opamc_cli.errors import UsageError
 
 def sweep(
     baseline: Annotated[
-        list[Path], typer.Option("--baseline", metavar="RUNS", help="Runs of the healthy state.")
+        list[Path],
+        typer.Option(
+            "--baseline", metavar="RUNS", help="Runs of the healthy state; may be repeated."
+        ),
     ],
     target: Annotated[
         list[Path] | None,
-        typer.Option("--target", metavar="RUNS", help="Runs to set against them."),
+        typer.Option("--target", metavar="RUNS", help="Runs to set against them; may be repeated."),
     ] = None,
     tau: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Delays, in samples.")] = "1:25",
     order: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Orders, 3..7.")] = "4:5",
@@ -46,13 +49,18 @@ def sweep(
 
     output = Output(as_json, quiet)
     effective = load_config(config, overrides or ())
-    with output_lock(out):
-        normal = run_chain(baseline, effective, out / "baseline", jobs=jobs)
+    with output_lock(out), output.steps() as steps:
+        normal = run_chain(baseline, effective, out / "baseline", jobs=jobs, progress=steps)
         errors, done = list(normal.errors), list(normal.runs_done)
         motions = None
         if target:
             other = run_chain(
-                target, effective, out / "target", reference=normal.motions, jobs=jobs
+                target,
+                effective,
+                out / "target",
+                reference=normal.motions,
+                jobs=jobs,
+                progress=steps,
             )
             motions = other.motions
             errors += other.errors
@@ -65,6 +73,7 @@ def sweep(
             orders=orders,
             target=motions,
             jobs=jobs,
+            watch=steps("sweep"),
         )
         write_figure(outcome.table, out / "sweep.png")
     errors += outcome.errors

@@ -8,6 +8,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages import identify, patterns, segment
 from opamc_cli.stages.kept import KeptResults
+from opamc_cli.stages.parallel import Steps, unshown
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,7 @@ def run_chain(
     reference: Path | None = None,
     jobs: int = 1,
     kept: KeptResults | None = None,
+    progress: Steps = unshown,
 ) -> ChainOutcome:
     """Run segment, identify and patterns over runs, each stage from the file before it.
 
@@ -60,17 +62,27 @@ def run_chain(
         Worker processes.
     kept
         Where results of the same work may lie.
+    progress
+        Called with the name of each stage as it begins.
 
     Raises
     ------
     OpamcError
         If no run can be used.
     """
-    segmented = segment.run(paths, config, out, jobs=jobs, kept=kept)
+    segmented = segment.run(paths, config, out, jobs=jobs, kept=kept, watch=progress("segment"))
     identified = identify.run(
-        segmented.path, config, out, reference=reference, jobs=jobs, kept=kept
+        segmented.path,
+        config,
+        out,
+        reference=reference,
+        jobs=jobs,
+        kept=kept,
+        watch=progress("identify"),
     )
-    counted = patterns.run(identified.path, config, out, jobs=jobs, kept=kept)
+    counted = patterns.run(
+        identified.path, config, out, jobs=jobs, kept=kept, watch=progress("patterns")
+    )
     names = dict.fromkeys(segmented.table.column("run").to_pylist())
     return ChainOutcome(
         segments=segmented.path,

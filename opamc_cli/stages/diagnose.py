@@ -1,6 +1,6 @@
 """All stages in a row: from two sets of runs to a verdict and a report."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from opamc_cli.stages import cause, report, score, verdict
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.kept import KeptResults
 from opamc_cli.stages.latent import LatentModels
+from opamc_cli.stages.parallel import Steps, unshown
 from opamc_cli.stages.side import Sides, read_side
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.sources import RunSource, check_comparable
@@ -53,7 +54,7 @@ def run(
     *,
     models: LatentModels | None = None,
     jobs: int = 1,
-    progress: Callable[[str], None] = lambda _: None,
+    progress: Steps = unshown,
     kept: KeptResults | None = None,
     figures_of_healthy: bool = True,
 ) -> DiagnoseOutcome:
@@ -88,10 +89,22 @@ def run(
     for name in (verdict.FILE_NAME, report.FILE_NAME):
         (out / name).unlink(missing_ok=True)
     _check_before(baseline, target)
-    progress("baseline: segment, identify, patterns")
-    normal = run_chain(baseline, config, out / "baseline", jobs=jobs, kept=kept)
-    progress("target: segment, identify, patterns")
-    other = run_chain(target, config, out / "target", reference=normal.motions, jobs=jobs)
+    normal = run_chain(
+        baseline,
+        config,
+        out / "baseline",
+        jobs=jobs,
+        kept=kept,
+        progress=lambda stage: progress(f"baseline: {stage}"),
+    )
+    other = run_chain(
+        target,
+        config,
+        out / "target",
+        reference=normal.motions,
+        jobs=jobs,
+        progress=lambda stage: progress(f"target: {stage}"),
+    )
     progress("score")
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), config.score.day_starts_at)
     scored = score.compare_sides(sides, config, out, models=models)
@@ -100,9 +113,10 @@ def run(
     causes: dict[int, dict[str, Any]] = {}
     notes: list[str] = []
     if differing:
-        progress("cause")
+        watch = progress("cause")
         starts = [cause.first_motions(side.patterns) for side in (sides.baseline, sides.target)]
-        for axis in differing:
+        for done, axis in enumerate(differing):
+            watch(done, len(differing))
             first = {**starts[0].get(axis, {}), **starts[1].get(axis, {})}
             try:
                 found = cause.explain(

@@ -22,7 +22,7 @@ from opamc_cli.signal.identification import (
 )
 from opamc_cli.stages.envelope import EnvelopeKind, read_envelope
 from opamc_cli.stages.kept import KeptResults, remembered
-from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
 from opamc_cli.storage.tables import MOTIONS, SEGMENTS, read_table, table_input, write_table
 
@@ -101,6 +101,7 @@ def run(
     reference_run: str | None = None,
     moved_to: Sequence[Path] = (),
     jobs: int = 1,
+    watch: Watch = unwatched,
     kept: KeptResults | None = None,
 ) -> IdentifyOutcome:
     """Identify the cycles and motions of a segment table.
@@ -122,6 +123,8 @@ def run(
         Folders of the runs, if they were moved.
     jobs
         Worker processes.
+    watch
+        Called as the work gets done.
     kept
         Where results of the same work may lie.
 
@@ -144,7 +147,7 @@ def run(
     ]
     for source in {part.source for part in parts} | {r.source for r in references.values()}:
         source.verify()
-    outcome = map_items(remembered(_identify_part, kept), work, jobs)
+    outcome = map_items(remembered(_identify_part, kept), work, jobs, watch)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()

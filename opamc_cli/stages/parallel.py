@@ -23,8 +23,18 @@ THREAD_VARIABLES = (
 )
 
 
+Steps = Callable[[str], Watch]
+"""Called with the name of a step as it begins; what it returns, with what is done of it."""
+
+
 def unwatched(done: int, total: int) -> None:
     """Tell nobody."""
+
+
+def unshown(step: str) -> Watch:
+    """Begin a step that nobody watches."""
+    del step
+    return unwatched
 
 
 @dataclass(frozen=True)

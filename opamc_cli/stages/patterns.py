@@ -18,7 +18,7 @@ from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
 from opamc_cli.stages.envelope import current_offset, read_course
 from opamc_cli.stages.kept import KeptResults, remembered
-from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.witnesses import WITNESSES
 from opamc_cli.stages.witnesses.kept_rows import PLACE
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
@@ -79,6 +79,7 @@ def run(
     *,
     moved_to: Sequence[Path] = (),
     jobs: int = 1,
+    watch: Watch = unwatched,
     kept: KeptResults | None = None,
 ) -> PatternsOutcome:
     """Count the ordinal patterns of every identified segment's envelope; feed the witnesses.
@@ -95,6 +96,8 @@ def run(
         Folders of the runs, if they were moved.
     jobs
         Worker processes.
+    watch
+        Called as the work gets done.
     kept
         Where results of the same work may lie.
 
@@ -111,7 +114,7 @@ def run(
         _Job(part.source, part.axis, part.rows, config.patterns)
         for part in identified_parts(table, sources)
     ]
-    outcome = map_items(remembered(_analyse, kept), work, jobs)
+    outcome = map_items(remembered(_analyse, kept), work, jobs, watch)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     patterns = pa.concat_tables(

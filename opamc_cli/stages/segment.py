@@ -12,7 +12,7 @@ from opamc_cli.errors import InputError, OpamcError
 from opamc_cli.stages.carrier_segments import carrier_segments
 from opamc_cli.stages.joint_segments import joint_segments
 from opamc_cli.stages.kept import KeptResults, remembered
-from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.segment_rows import AxisSegments
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.sources import RunSource, sources_record
@@ -78,6 +78,7 @@ def run(
     out: Path,
     *,
     jobs: int = 1,
+    watch: Watch = unwatched,
     kept: KeptResults | None = None,
 ) -> SegmentOutcome:
     """Cut runs into motions, axis by axis.
@@ -92,6 +93,8 @@ def run(
         Folder of the segment table.
     jobs
         Worker processes; the result is the same for any number.
+    watch
+        Called as the work gets done.
     kept
         Where results of the same work may lie.
 
@@ -112,7 +115,7 @@ def run(
                 work += [_Job(name, path, axis, config) for axis in recording.axes]
         except OpamcError as error:
             errors.append(error)
-    outcome = map_items(remembered(_segment_axis, kept), work, jobs)
+    outcome = map_items(remembered(_segment_axis, kept), work, jobs, watch)
     errors += outcome.errors
     notes = [note for result in outcome.results for note in result.notes]
     errors += _runs_without_motion(sources, outcome.results, outcome.errors)

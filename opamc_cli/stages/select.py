@@ -14,7 +14,7 @@ from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal import ordinal_counts, time_delay
 from opamc_cli.stages.envelope import current_offset, read_envelope
-from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.patterns import aligned_span, identified_parts
 from opamc_cli.stats.selection import self_consistency
 from opamc_cli.storage.sources import RunSource, read_sources
@@ -82,6 +82,7 @@ def run(
     gammas: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
     moved_to: Sequence[Path] = (),
     jobs: int = 1,
+    watch: Watch = unwatched,
 ) -> SelectionOutcome:
     """Rate orders and scale factors by how well healthy segments know their own motion.
 
@@ -99,6 +100,8 @@ def run(
         Folders of the runs, if they were moved.
     jobs
         Worker processes.
+    watch
+        Called as the work gets done.
 
     Raises
     ------
@@ -110,7 +113,7 @@ def run(
         _Job(part.source, part.axis, part.rows, tuple(orders), tuple(gammas), config.patterns)
         for part in identified_parts(table, read_sources(motions, moved_to))
     ]
-    outcome = map_items(_count, work, jobs)
+    outcome = map_items(_count, work, jobs, watch)
     rated = _rate([part for parts in outcome.results for part in parts])
     known = [row for row in rated if row["self_consistency"] is not None]
     if not known:

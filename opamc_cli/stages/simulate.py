@@ -13,7 +13,7 @@ import pyarrow as pa
 from opamc_cli.config.models import digest
 from opamc_cli.config.testbed import TestbedConfig
 from opamc_cli.errors import ConfigError
-from opamc_cli.stages.parallel import Outcome, map_items
+from opamc_cli.stages.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.atomic import write_text
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.storage.tables import write_table
@@ -46,6 +46,7 @@ def run(
     *,
     truth_signals: bool = True,
     jobs: int = 1,
+    watch: Watch = unwatched,
 ) -> Outcome[dict[str, Any]]:
     """Record the sessions of a configuration.
 
@@ -61,6 +62,8 @@ def run(
         Whether to write i_q, joint angle and temperature beside each run.
     jobs
         Worker processes; 0: one per core.
+    watch
+        Called as the work gets done.
 
     Returns
     -------
@@ -72,7 +75,7 @@ def run(
         config.recording.first_session + config.recording.sessions,
     )
     orders = [SessionOrder(config, seed, session, out, truth_signals) for session in sessions]
-    outcome = map_items(record_session, orders, jobs)
+    outcome = map_items(record_session, orders, jobs, watch)
     truth = {
         "seed": seed,
         "robot": config.robot.name,

@@ -14,7 +14,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal import ordinal_counts, time_delay
 from opamc_cli.stages.envelope import EnvelopeKind, current_offset, read_envelope
-from opamc_cli.stages.parallel import map_items
+from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.patterns import aligned_span, identified_parts
 from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
 from opamc_cli.stats.features import ks_statistic
@@ -127,6 +127,7 @@ def run(
     orders: Sequence[int],
     target: Path | None = None,
     jobs: int = 1,
+    watch: Watch = unwatched,
 ) -> SweepOutcome:
     """Compute the divergence of every segment for every delay and order.
 
@@ -142,6 +143,8 @@ def run(
         What is swept: samples >= 1, orders 3..7.
     jobs
         Worker processes.
+    watch
+        Called as the work gets done.
 
     Raises
     ------
@@ -154,7 +157,7 @@ def run(
     counted: dict[str, list[_Counted]] = {}
     errors: list[OpamcError] = []
     for role, path in tables.items():
-        outcome = map_items(_count, _work(path, sources[role], config, taus, orders), jobs)
+        outcome = map_items(_count, _work(path, sources[role], config, taus, orders), jobs, watch)
         counted[role] = list(outcome.results)
         errors += outcome.errors
     table = pa.Table.from_pylist(_rows(counted, config), schema=SWEEP)
