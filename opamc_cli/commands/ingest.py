@@ -46,7 +46,7 @@ def ingest(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Turn recordings of other programs into runs, one DIR/<name>.parquet per recording.
+    """Turn recordings of other programs into runs, one DIR/NAME.parquet per recording.
 
     With --set, keys of the map are overridden, such as sampling_rate_hz=2000. What has become a
     run already is skipped.
