@@ -73,9 +73,10 @@ def diagnose(
         },
         verdict_table(outcome.verdict),
         f"report: {outcome.report_path}",
-        urgent=outcome.exit_code is ExitCode.UNHEALTHY,
+        urgent=outcome.exit_code is not ExitCode.DONE,
     )
     failed = output.failures([str(error) for error in outcome.errors], outcome.n_runs)
-    if outcome.exit_code is ExitCode.UNHEALTHY:
-        raise typer.Exit(ExitCode.DONE if exit_zero else ExitCode.UNHEALTHY)
-    raise typer.Exit(failed or outcome.exit_code)
+    if exit_zero and outcome.exit_code is ExitCode.UNHEALTHY:
+        raise typer.Exit(ExitCode.DONE)
+    # what could not be judged weighs more than a run that failed: the verdict is incomplete
+    raise typer.Exit(outcome.exit_code or failed)

@@ -36,13 +36,14 @@ def patterns(
     from opamc_cli.stages import identify
     from opamc_cli.stages import patterns as stage
     from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.result import published, result
 
     output = Output(as_json, quiet)
-    with output_lock(out), output.steps() as steps:
+    with output_lock(out), result(out, *stage.FILES) as staged, output.steps() as steps:
         outcome = stage.run(
             motions or out / identify.FILE_NAME,
             load_config(config, overrides or ()),
-            out,
+            staged,
             moved_to=runs or (),
             jobs=jobs,
             watch=steps("patterns"),
@@ -50,9 +51,9 @@ def patterns(
     counted = outcome.by_motion()
     output.result(
         {
-            "written": str(outcome.path),
-            "spectra": str(outcome.path.with_name("spectra.parquet")),
-            "profiles": str(outcome.path.with_name("profiles.parquet")),
+            "written": str(published(outcome.path)),
+            "spectra": str(published(outcome.path).with_name("spectra.parquet")),
+            "profiles": str(published(outcome.path).with_name("profiles.parquet")),
             "motions": counted,
         },
         *(
@@ -60,6 +61,6 @@ def patterns(
             f"{c['n_patterns']} patterns in {c['segments']} segments"
             for c in counted
         ),
-        str(outcome.path),
+        str(published(outcome.path)),
     )
     raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))

@@ -46,17 +46,18 @@ def score(
     from opamc_cli.stages import latent
     from opamc_cli.stages import score as stage
     from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.result import published, result
 
     if fault_axes and learn is None:
         msg = "--fault-axis labels rows for training; name the model's file with --learn"
         raise UsageError(msg)
     output = Output(as_json, quiet)
-    with output_lock(out):
+    with output_lock(out), result(out, *stage.FILES) as staged:
         outcome = stage.run(
             baseline,
             target,
             load_config(config, overrides or ()),
-            out,
+            staged,
             models=latent.read_models(model) if model else None,
         )
         if learn is not None:
@@ -68,12 +69,12 @@ def score(
     pooled = [row for row in outcome.features.to_pylist() if row["motion"] == stage.ALL_MOTIONS]
     output.result(
         {
-            "written": [str(outcome.scores_path), str(outcome.features_path)],
+            "written": [str(published(outcome.scores_path)), str(published(outcome.features_path))],
             "features": pooled,
         },
         *(_line(row) for row in pooled),
-        str(outcome.scores_path),
-        str(outcome.features_path),
+        str(published(outcome.scores_path)),
+        str(published(outcome.features_path)),
     )
 
 

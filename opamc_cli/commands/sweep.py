@@ -43,21 +43,27 @@ def sweep(
 
     from opamc_cli.config import load_config
     from opamc_cli.stages import sweep as stage
-    from opamc_cli.stages.chain import run_chain
-    from opamc_cli.stages.sweep_figure import write_figure
+    from opamc_cli.stages.chain import FILES, run_chain
+    from opamc_cli.stages.sweep_figure import FIGURE_NAME, write_figure
     from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.result import published, published_text, result
 
     output = Output(as_json, quiet)
     effective = load_config(config, overrides or ())
-    with output_lock(out), output.steps() as steps:
-        normal = run_chain(baseline, effective, out / "baseline", jobs=jobs, progress=steps)
+    chain = [f"{role}/{name}" for role in ("baseline", "target") for name in FILES]
+    with (
+        output_lock(out),
+        result(out, stage.FILE_NAME, FIGURE_NAME, *chain) as staged,
+        output.steps() as steps,
+    ):
+        normal = run_chain(baseline, effective, staged / "baseline", jobs=jobs, progress=steps)
         errors, done = list(normal.errors), list(normal.runs_done)
         motions = None
         if target:
             other = run_chain(
                 target,
                 effective,
-                out / "target",
+                staged / "target",
                 reference=normal.motions,
                 jobs=jobs,
                 progress=steps,
@@ -68,28 +74,28 @@ def sweep(
         outcome = stage.run(
             normal.motions,
             effective,
-            out,
+            staged,
             taus=taus,
             orders=orders,
             target=motions,
             jobs=jobs,
             watch=steps("sweep"),
         )
-        write_figure(outcome.table, out / "sweep.png")
+        write_figure(outcome.table, staged / FIGURE_NAME)
     errors += outcome.errors
     best = outcome.best()
     output.result(
-        {"written": str(outcome.path), "best": best, "base": effective.score.base},
+        {"written": str(published(outcome.path)), "best": best, "base": effective.score.base},
         *(
             f"axis {b['axis']} order {b['order']}: separates best at tau {b['tau']} "
             f"(JSD {b['jsd_baseline']:.3f} against {b['jsd_target']:.3f}, KS {b['ks']:.2f}); "
             f"(4-2) gives {', '.join(map(str, b['tau_opt']))}"
             for b in best
         ),
-        str(outcome.path),
-        str(out / "sweep.png"),
+        str(published(outcome.path)),
+        str(out / FIGURE_NAME),
     )
-    raise typer.Exit(output.failures([str(error) for error in errors], len(done)))
+    raise typer.Exit(output.failures([published_text(str(error)) for error in errors], len(done)))
 
 
 def _span(option: str, text: str, smallest: int, largest: int) -> list[int]:

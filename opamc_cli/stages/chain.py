@@ -1,6 +1,6 @@
 """The first three stages in a row: from runs to ordinal patterns."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,6 +9,9 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.stages import identify, patterns, segment
 from opamc_cli.stages.kept import KeptResults
 from opamc_cli.stages.parallel import Steps, unshown
+
+FILES = (segment.FILE_NAME, identify.FILE_NAME, *patterns.FILES)
+"""What the chain leaves in its folder."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +45,8 @@ def run_chain(
     out: Path,
     *,
     reference: Path | None = None,
+    without: Collection[Path] = (),
+    check: Callable[[segment.SegmentOutcome], Collection[tuple[str, int]]] = lambda _: (),
     jobs: int = 1,
     kept: KeptResults | None = None,
     progress: Steps = unshown,
@@ -58,6 +63,10 @@ def run_chain(
         Folder of the tables.
     reference
         Motion table whose reference cycles are taken; None: found in these runs.
+    without
+        Runs that are left out.
+    check
+        Told the segments, it returns run and axis of those that go no further.
     jobs
         Worker processes.
     kept
@@ -70,12 +79,16 @@ def run_chain(
     OpamcError
         If no run can be used.
     """
-    segmented = segment.run(paths, config, out, jobs=jobs, kept=kept, watch=progress("segment"))
+    segmented = segment.run(
+        paths, config, out, without=without, jobs=jobs, kept=kept, watch=progress("segment")
+    )
+    left_out = check(segmented)
     identified = identify.run(
         segmented.path,
         config,
         out,
         reference=reference,
+        without=left_out,
         jobs=jobs,
         kept=kept,
         watch=progress("identify"),

@@ -1,20 +1,38 @@
 """All stages in a row: from two sets of runs to a verdict and a report."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, OpamcError
-from opamc_cli.stages import cause, report, score, verdict
+from opamc_cli.stages import cause, chain, report, score, verdict
+from opamc_cli.stages.agreement.common import far_together
+from opamc_cli.stages.agreement.compare import Agreement
+from opamc_cli.stages.agreement.duplicates import repeated
+from opamc_cli.stages.agreement.unjudged import refuse_all, with_reasons
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.kept import KeptResults
 from opamc_cli.stages.latent import LatentModels
 from opamc_cli.stages.parallel import Steps, unshown
 from opamc_cli.stages.side import Sides, read_side
+from opamc_cli.stages.verdict_header import header
+from opamc_cli.storage.result import published_text, result
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.sources import RunSource, check_comparable
+
+FILES = (
+    verdict.FILE_NAME,
+    report.FILE_NAME,
+    *score.FILES,
+    *(f"{role}/{name}" for role in ("baseline", "target") for name in chain.FILES),
+)
+"""What a diagnosis leaves in its folder; the verdict vouches for the others."""
+
+LEAST_SHARE = 0.05
+"""Of the change: a cause that explains less is not named, it would lead to the wrong part."""
 
 
 @dataclass(frozen=True)
@@ -85,14 +103,38 @@ def run(
     OpamcError
         If the runs cannot be compared, or no run of one side can be used.
     """
-    # yesterday's verdict must not pass for today's if this diagnosis ends in an error
-    for name in (verdict.FILE_NAME, report.FILE_NAME):
-        (out / name).unlink(missing_ok=True)
+    with result(out, *FILES) as staged:
+        outcome = _diagnose(
+            baseline, target, config, staged, models, jobs, progress, kept, figures_of_healthy
+        )
+    return replace(
+        outcome,
+        verdict_path=out / verdict.FILE_NAME,
+        report_path=out / report.FILE_NAME,
+        errors=tuple(type(error)(published_text(str(error))) for error in outcome.errors),
+    )
+
+
+def _diagnose(
+    baseline: Sequence[Path],
+    target: Sequence[Path],
+    config: Config,
+    out: Path,
+    models: LatentModels | None,
+    jobs: int,
+    progress: Steps,
+    kept: KeptResults | None,
+    figures_of_healthy: bool,
+) -> DiagnoseOutcome:
     _check_before(baseline, target)
+    repeats, left_out = repeated(baseline, target)
+    agreement = Agreement(config.identify)
     normal = run_chain(
         baseline,
         config,
         out / "baseline",
+        without=repeats,
+        check=partial(agreement.check, "baseline"),
         jobs=jobs,
         kept=kept,
         progress=lambda stage: progress(f"baseline: {stage}"),
@@ -102,11 +144,16 @@ def run(
         config,
         out / "target",
         reference=normal.motions,
+        without=repeats,
+        check=partial(agreement.check, "target", motions=normal.motions),
         jobs=jobs,
         progress=lambda stage: progress(f"target: {stage}"),
     )
+    unjudged = agreement.unjudged(normal.motions, other.motions)
     progress("score")
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), config.score.day_starts_at)
+    if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
+        refuse_all(unjudged.axes)
     scored = score.compare_sides(sides, config, out, models=models)
     decided = verdict.decide(sides, config)
     differing = decided.differing(config.score) if config.joint.explain else []
@@ -126,9 +173,17 @@ def run(
                 # a verdict must not be lost because its explanation failed on odd recordings
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
-            if found is not None:
+            if found is not None and found["share"] >= LEAST_SHARE:
                 causes[axis] = found
-    written = verdict.write(decided, scored, config, out, causes=causes)
+    every_note = (*left_out, *normal.notes, *other.notes, *scored.notes, *notes)
+    sources = (*sides.baseline.sources, *sides.target.sources)
+    tables = [name for name in FILES if name.endswith(".parquet")]
+
+    def complete(judged: dict[str, Any]) -> dict[str, Any]:
+        named = with_reasons(judged, {**far_together(judged), **unjudged.axes})
+        return named | header(sources, every_note, out, tables)
+
+    written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
     healthy = all(entry["state"] == "healthy" for entry in written.verdict["axes"])
     figures = figures_of_healthy or not healthy
@@ -139,8 +194,8 @@ def run(
         report_path=page.path,
         exit_code=written.exit_code,
         n_runs=len(normal.runs_done) + len(other.runs_done),
-        errors=(*normal.errors, *other.errors),
-        notes=(*normal.notes, *other.notes, *scored.notes, *notes),
+        errors=(*normal.errors, *other.errors, *unjudged.errors),
+        notes=every_note,
     )
 
 

@@ -1,6 +1,6 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -100,6 +100,7 @@ def run(
     reference: Path | None = None,
     reference_run: str | None = None,
     moved_to: Sequence[Path] = (),
+    without: Collection[tuple[str, int]] = (),
     jobs: int = 1,
     watch: Watch = unwatched,
     kept: KeptResults | None = None,
@@ -121,6 +122,8 @@ def run(
         repetitions.
     moved_to
         Folders of the runs, if they were moved.
+    without
+        Run and axis of segments that are left out.
     jobs
         Worker processes.
     watch
@@ -136,7 +139,7 @@ def run(
     table = read_table(segments, "segment", SEGMENTS)
     sources = {source.name: source for source in read_sources(segments, moved_to)}
     rule = match_rule(config.identify)
-    parts = list(_parts(table, sources))
+    parts = [p for p in _parts(table, sources) if (p.source.name, p.axis) not in without]
     if reference is not None:
         references = _given_references(reference, moved_to)
     else:
@@ -185,10 +188,11 @@ def _parts(table: pa.Table, sources: dict[str, RunSource]) -> Iterator[_Axis]:
     keys = list(zip(names, axes, strict=True))
     for key in dict.fromkeys(keys):
         rows = table.take([i for i, other in enumerate(keys) if other == key])
-        yield _Axis(sources[key[0]], key[1], rows, _features(rows))
+        yield _Axis(sources[key[0]], key[1], rows, segment_features(rows))
 
 
-def _features(rows: pa.Table) -> SegmentFeatures:
+def segment_features(rows: pa.Table) -> SegmentFeatures:
+    """Return what segments of one axis of one run are identified by, in the table's order."""
     start = _column(rows, "start")
     stop = _column(rows, "stop")
     rate = _column(rows, "sampling_rate_hz")

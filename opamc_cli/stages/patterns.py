@@ -31,6 +31,7 @@ from opamc_cli.storage.tables import (
 )
 
 FILE_NAME = "patterns.parquet"
+FILES = (FILE_NAME, *(witness.FILE_NAME for witness in WITNESSES))
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from opamc_cli.storage.tables import table_input, write_table
 
 SCORES_NAME = "scores.parquet"
 FEATURES_NAME = "features.parquet"
+FILES = (SCORES_NAME, FEATURES_NAME)
 ALL_MOTIONS = -1
 
 SCORES = pa.schema(

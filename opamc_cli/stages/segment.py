@@ -1,6 +1,6 @@
 """Stage `segment`: runs in, motions and the largest frequency of their carrier out (3.1, 3.2)."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -77,6 +77,7 @@ def run(
     config: Config,
     out: Path,
     *,
+    without: Collection[Path] = (),
     jobs: int = 1,
     watch: Watch = unwatched,
     kept: KeptResults | None = None,
@@ -91,6 +92,8 @@ def run(
         Sections `segment` and `joint` are used.
     out
         Folder of the segment table.
+    without
+        Runs that are left out.
     jobs
         Worker processes; the result is the same for any number.
     watch
@@ -107,6 +110,8 @@ def run(
     work: list[_Job] = []
     errors: list[OpamcError] = []
     for name, path in find_runs(paths):
+        if path in without:
+            continue
         try:
             with Run(path, name) as recording:
                 _check_rate(recording, config)

@@ -46,6 +46,7 @@ def read_side(patterns: Path) -> Side:
     InputError
         If a table cannot be used.
     """
+    table = read_table(patterns, "patterns", PATTERNS)
     beside = {
         witness.FILE_NAME: patterns.with_name(witness.FILE_NAME)
         for witness in WITNESSES
@@ -55,7 +56,7 @@ def read_side(patterns: Path) -> Side:
     return Side(
         patterns,
         read_sources(patterns),
-        read_table(patterns, "patterns", PATTERNS),
+        table,
         {name: read_table(path, "patterns", schemas[name]) for name, path in beside.items()},
     )
 

@@ -9,6 +9,7 @@ from opamc_cli.stages.report.figure import canvas, style, to_png
 from opamc_cli.stages.report.palette import colour
 from opamc_cli.storage.atomic import atomic_path
 
+FIGURE_NAME = "sweep.png"
 ROLES = ("baseline", "target")
 
 

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -93,6 +93,7 @@ def write(
     out: Path,
     *,
     causes: Mapping[int, Mapping[str, Any]] | None = None,
+    complete: Callable[[dict[str, Any]], dict[str, Any]] = lambda verdict: verdict,
 ) -> VerdictOutcome:
     """Write the verdict.
 
@@ -108,19 +109,21 @@ def write(
         Folder of verdict.json.
     causes
         Cause of the change by axis, from closing the loop of the joint's model.
+    complete
+        Adds what is known of the diagnosis besides: joints that cannot be judged, notes, tables.
     """
-    verdict = content(decided, scored, config, causes or {})
+    verdict = complete(content(decided, scored, config, causes or {}))
     path = out / FILE_NAME
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
     return VerdictOutcome(path, verdict, exit_code(verdict))
 
 
 def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
-    """Return the exit code of a verdict: one unhealthy joint makes it 1, none judged 5."""
-    states = [axis["state"] for axis in verdict["axes"]]
-    if any(state in ("changed", "fault") for state in states):
+    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5."""
+    states = {axis["state"] for axis in verdict["axes"]}
+    if states & {"changed", "fault"}:
         return ExitCode.UNHEALTHY
-    return ExitCode.DONE if "healthy" in states else ExitCode.NOT_ENOUGH_DATA
+    return ExitCode.DONE if states == {"healthy"} else ExitCode.NOT_ENOUGH_DATA
 
 
 def content(

@@ -38,7 +38,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
     UsageError
         If the folder cannot be written or the disk is full.
     """
-    path = Path(path)
+    path = Path(path).resolve()  # the public name of a result is a link into it
     ensure_directory(path.parent)
     try:
         handle, name = tempfile.mkstemp(prefix=f".{path.name}.", suffix=".part", dir=path.parent)
@@ -49,11 +49,11 @@ def atomic_path(path: Path) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        _flush(temporary)
+        flush(temporary)
         # mkstemp makes files private; a report is for everybody the umask lets read it
         temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
-        _flush(path.parent)
+        flush(path.parent)
     except OSError as error:
         msg = f"{path}: cannot be written ({error.strerror or error}); check space and permissions"
         raise UsageError(msg) from error
@@ -73,7 +73,8 @@ def _umask() -> int:
     return mask
 
 
-def _flush(path: Path) -> None:
+def flush(path: Path) -> None:
+    """Have a file or folder on the disk before going on."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

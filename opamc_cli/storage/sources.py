@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from opamc_cli.errors import InputError
+from opamc_cli.storage.result import published
 from opamc_cli.storage.runs import Run, RunInfo
 from opamc_cli.storage.tables import table_record
 
@@ -85,7 +86,7 @@ class RunSource:
 
 def sources_record(sources: Sequence[RunSource], folder: Path) -> dict[str, Any]:
     """Return the JSON that keeps `sources` in the metadata of a table in `folder`."""
-    root = folder.resolve()
+    root = published(folder.resolve())
     return {
         "runs": [
             {
@@ -132,7 +133,7 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
     return tuple(
         RunSource(
             name=entry["name"],
-            path=_locate(table.parent / entry["path"], entry["name"], moved_to),
+            path=_locate(published(table.parent) / entry["path"], entry["name"], moved_to),
             sha256=entry["sha256"],
             n_samples=entry["n_samples"],
             info=RunInfo(**entry["info"]),

@@ -22,6 +22,7 @@ from opamc_cli import __version__
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
 from opamc_cli.storage.atomic import atomic_path
+from opamc_cli.storage.result import published
 from opamc_cli.storage.runs import file_sha256
 
 TABLE_KEY = b"opamc_table"
@@ -291,4 +292,5 @@ def library_versions() -> dict[str, str]:
 
 
 def _relative(path: Path, folder: Path) -> str:
-    return Path(os.path.relpath(path.resolve(), folder.resolve())).as_posix()
+    seen = published(path.resolve()), published(folder.resolve())
+    return Path(os.path.relpath(*seen)).as_posix()

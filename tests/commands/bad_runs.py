@@ -224,9 +224,9 @@ def current_alone(path: Path) -> Path:
     return path
 
 
-def moving_joint(path: Path, change: object = None, n: int = 9000) -> Path:
+def moving_joint(path: Path, change: object = None, n: int = 9000, seed: int = 0) -> Path:
     """Write what a drive reports of a joint that swings, with `change` done to its columns."""
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(seed)
     t_s = np.arange(n) / RATE_HZ
     angle = np.sin(2 * np.pi * t_s / 3)
     speed = np.gradient(angle, 1 / RATE_HZ)

@@ -175,16 +175,33 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
         if not n_rows(scores):
             msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
             raise InputError(msg)
+    roles = {role: _role_tables(folder, role, moved_to.get(role, ())) for role in ROLES}
+    if verdict is not None:
+        _refuse_mixture(out, verdict, folder.files)
     return ReportInputs(
         scores=scores,
         features=features,
         verdict=verdict,
-        roles={role: _role_tables(folder, role, moved_to.get(role, ())) for role in ROLES},
+        roles=roles,
         loop=loop,
         residuals=folder.optional_table("residuals.parquet", RESIDUAL_COLUMNS),
         spectrum=folder.optional_table("order_spectrum.parquet", SPECTRUM_COLUMNS),
         files=tuple(folder.files),
     )
+
+
+def _refuse_mixture(out: Path, verdict: Mapping[str, Any], files: Sequence[SourceFile]) -> None:
+    """Refuse a verdict beside tables that it was not made from."""
+    vouched = verdict.get("tables")
+    if not isinstance(vouched, dict):
+        return  # of an opamc that did not write them down
+    for file in files:
+        if file.name.endswith(".parquet") and vouched.get(file.name, file.sha256) != file.sha256:
+            msg = (
+                f"{out / file.name}: is not the table that {out / 'verdict.json'} was made from; "
+                "diagnose again, or remove verdict.json to report the tables alone"
+            )
+            raise InputError(msg)
 
 
 class _Folder:

@@ -1,0 +1,170 @@
+"""What one axis of one run looks like: its channels, their size, their sanity."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.signal.quality import clipped_share
+from opamc_cli.storage.runs import AxisChannels, Run
+from opamc_cli.storage.sources import RunSource
+
+LOOKS = 8
+"""Stretches of each axis that are looked at, spread over the run."""
+
+LONGEST_LOOK = 1 << 15
+"""Samples of a stretch that are looked at."""
+
+FROZEN_S = 0.25
+"""A phase that keeps one value for so long while another swings is frozen: the slowest carrier
+that counts as motion has two periods in it."""
+
+SWING = 0.5
+"""Of the others' largest swing: less is standstill, where a coarse converter keeps its value."""
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """One axis of one run.
+
+    Attributes
+    ----------
+    run, path, axis
+        Which.
+    signal
+        Columns that the diagnosis uses.
+    moves
+        Whether a motion was found; otherwise the rest is of stretches anywhere in the run.
+    size
+        Root mean square of each kind of channel about its mean, in the channel's unit.
+    imbalance
+        Root mean square of the sum of three phases over that of the phases; None without three.
+    clipped
+        Share of clipped samples by column.
+    frozen
+        Column that keeps one value while another swings, and from when on in seconds, or None.
+    """
+
+    run: str
+    path: Path
+    axis: int
+    signal: tuple[str, ...]
+    moves: bool
+    size: Mapping[str, float]
+    imbalance: float | None
+    clipped: Mapping[str, float]
+    frozen: tuple[str, float] | None
+
+
+def measure(sources: Sequence[RunSource], segments: pa.Table) -> list[Measured]:
+    """Measure every axis of every run, from a few of its motions.
+
+    Raises
+    ------
+    InputError
+        If samples of a run cannot be read.
+    """
+    spans: dict[tuple[str, int], list[tuple[int, int]]] = {}
+    for row in segments.select(["run", "axis", "start", "stop"]).to_pylist():
+        spans.setdefault((row["run"], row["axis"]), []).append((row["start"], row["stop"]))
+    found = []
+    for source in sources:
+        with source.open() as run:
+            found += [_measure(run, axis, spans.get((run.name, axis), [])) for axis in run.axes]
+    return found
+
+
+def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> Measured:
+    channels = run.channels(axis)
+    signal = _signal(channels)
+    motion = [name for name in (channels.position, channels.velocity) if name]
+    names = list(dict.fromkeys([*signal, *motion]))
+    stretches = spans[:: -(-len(spans) // LOOKS) or 1] or [
+        (start, start + LONGEST_LOOK)
+        for start in range(0, run.n_samples, max(run.n_samples // LOOKS, LONGEST_LOOK))
+    ]
+    looks = [
+        {
+            name: values.astype(np.float64)
+            for name, values in run.read(names, start, min(stop, start + LONGEST_LOOK)).items()
+        }
+        for start, stop in stretches
+    ]
+    currents = [name for name in signal if name not in motion]
+    kinds = {"current": currents, "position": channels.position, "velocity": channels.velocity}
+    return Measured(
+        run.name,
+        run.path,
+        axis,
+        signal,
+        bool(spans),
+        {
+            kind: _rms([_centred(look[name]) for look in looks for name in named])
+            for kind, own in kinds.items()
+            if (named := [own] if isinstance(own, str) else own)
+        },
+        _imbalance(looks, currents) if len(currents) == 3 else None,
+        {name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents},
+        _frozen(run, currents),
+    )
+
+
+def _signal(channels: AxisChannels) -> tuple[str, ...]:
+    """Columns that a diagnosis uses: the phases, or the reported current and what moves it."""
+    if channels.phases:
+        # two phases are used as one
+        return channels.phases if len(channels.phases) == 3 else channels.phases[:1]
+    motion = channels.position or channels.velocity
+    return tuple(name for name in (channels.current, motion) if name)
+
+
+def _imbalance(looks: Sequence[Mapping[str, Floats]], names: Sequence[str]) -> float | None:
+    own = [[_centred(look[name]) for name in names] for look in looks]
+    size = _rms([phase for phases in own for phase in phases])
+    return _rms([np.sum(phases, axis=0) for phases in own]) / size if size > 0 else None
+
+
+def _frozen(run: Run, names: Sequence[str]) -> tuple[str, float] | None:
+    """Look for a stretch in which one phase keeps its value while another swings."""
+    if len(names) < 2:
+        return None  # nothing tells a frozen current from a joint that rests
+    least = max(int(FROZEN_S * run.sampling_rate_hz), 2)
+    swing = 0.0
+    found: list[tuple[str, int, float]] = []
+    for start, block in run.blocks(names):
+        values = {name: block[name] for name in names}
+        swing = max(swing, *(_swing(each) for each in values.values()))
+        for name, each in values.items():
+            for first, last in _constant(each, least):
+                others = [_swing(v[first:last]) for n, v in values.items() if n != name]
+                found.append((name, start + first, max(others)))
+    frozen = [(at, name) for name, at, others in found if others > SWING * swing]
+    return (min(frozen)[1], min(frozen)[0] / run.sampling_rate_hz) if frozen else None
+
+
+def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, int]]:
+    """Return the half-open stretches of at least `least` equal samples."""
+    edges = np.concatenate(([0], np.flatnonzero(np.diff(values) != 0) + 1, [values.size]))
+    return [
+        (int(edges[i]), int(edges[i + 1])) for i in np.flatnonzero(np.diff(edges) >= least).tolist()
+    ]
+
+
+def _swing(values: npt.NDArray[np.floating]) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if known.size else 0.0
+
+
+def _centred(values: Floats) -> Floats:
+    known = values[np.isfinite(values)]
+    return values - known.mean() if known.size else values
+
+
+def _rms(parts: Sequence[Floats]) -> float:
+    squares = np.concatenate([part[np.isfinite(part)] ** 2 for part in parts])
+    return float(np.sqrt(squares.mean())) if squares.size else 0.0

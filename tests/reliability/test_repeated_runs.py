@@ -1,0 +1,56 @@
+"""A recording that is given twice hides a fault: it is left out in words, or refused."""
+
+import json
+import shutil
+
+import pyarrow.parquet as pq
+import pytest
+
+from opamc_cli.errors import ExitCode
+
+
+def copied(source, to):
+    shutil.copyfile(source, to)
+
+
+def linked(source, to):
+    to.symlink_to(source)
+
+
+def written_again(source, to):
+    table = pq.read_table(source)
+    metadata = {b"opamc": table.schema.metadata[b"opamc"].replace(b"R1", b"R2")}
+    pq.write_table(table.replace_schema_metadata(metadata), to, compression="zstd")
+
+
+@pytest.mark.parametrize("how", [copied, linked, written_again], ids=lambda how: how.__name__)
+def test_tonights_run_is_no_baseline_of_itself(opamc, baseline, tonight, tmp_path, how):
+    folder = shutil.copytree(baseline, tmp_path / "baseline")
+    how(tonight, folder / "again.parquet")
+    ended = opamc(
+        *("diagnose", "--baseline", folder, "--target", tonight, "--out", tmp_path / "out"),
+        *("--set", "joint.explain=false"),
+    )
+    assert ended.code == ExitCode.DONE
+    assert "again.parquet is the same recording as the target's" in ended.err
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["baseline"]["sessions"] == 3
+    assert any("again.parquet" in note for note in verdict["notes"])
+
+
+def test_a_run_twice_in_the_baseline_counts_once(opamc, baseline, tonight, tmp_path):
+    folder = shutil.copytree(baseline, tmp_path / "baseline")
+    copied(folder / "night-0.parquet", folder / "night-7.parquet")
+    ended = opamc(
+        *("diagnose", "--baseline", folder, "--target", tonight, "--out", tmp_path / "out"),
+        *("--set", "joint.explain=false"),
+    )
+    assert "night-7.parquet is the same recording as the baseline's" in ended.err
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["baseline"]["runs"] == ["night-0", "night-1", "night-2"]
+
+
+def test_a_run_against_itself_is_refused(opamc, tonight, tmp_path):
+    ended = opamc("diagnose", "--baseline", tonight, "--target", tonight, "--out", tmp_path / "out")
+    assert ended.code == ExitCode.BAD_INPUT
+    assert "a baseline needs other recordings" in ended.sentences[0]

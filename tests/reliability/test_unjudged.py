@@ -1,0 +1,127 @@
+"""An axis of the baseline that cannot be judged is said to be one, with the true reason."""
+
+import json
+
+import numpy as np
+import pytest
+from recordings import RATE_HZ, record
+
+from opamc_cli.errors import ExitCode
+
+
+def gone(columns):
+    for name in "abc":
+        columns.pop(f"axis2_{name}")
+
+
+def dead(columns):
+    for name in "abc":
+        noise = np.random.default_rng(0).normal(size=len(columns["axis2_a"]))
+        columns[f"axis2_{name}"] = (0.01 * noise).astype(np.float32)
+
+
+def exchanged(columns):
+    columns["axis2_a"], columns["axis2_b"] = columns["axis2_b"], columns["axis2_a"]
+
+
+def one_phase(columns):
+    columns.pop("axis2_b")
+    columns.pop("axis2_c")
+
+
+def milliampere(columns):
+    for name in "abc":
+        columns[f"axis2_{name}"] *= np.float32(1000)
+
+
+def frozen(columns):
+    half = len(columns["axis2_b"]) // 2
+    columns["axis2_b"][half:] = columns["axis2_b"][half]
+
+
+def inverted(columns):
+    columns["axis2_c"] *= -1
+
+
+def clipped(columns):
+    for name in "abc":
+        columns[f"axis2_{name}"] = np.clip(columns[f"axis2_{name}"], -2.5, 2.5)
+
+
+def other_program(columns):
+    for name in "abc":
+        columns[f"axis2_{name}"] = np.roll(columns[f"axis1_{name}"], int(0.1 * RATE_HZ))
+
+
+REASONS = {
+    gone: "The target: it has no current of axis 2.",
+    dead: "its sensor is dead",
+    exchanged: "are two of its phases exchanged?",
+    one_phase: "axis 2 is recorded as axis2_a, the baseline has axis2_a, axis2_b, axis2_c",
+    milliampere: "another unit (mA for A)?",
+    frozen: "axis2_b keeps one value from",
+    inverted: "do not add up to zero",
+    clipped: "is clipped in",
+    other_program: "fit no motion of the baseline's cycle",
+}
+
+
+def diagnose(opamc, baseline, target, out, *more):
+    quickly = ("--set", "joint.explain=false")
+    return opamc(
+        "diagnose", "--baseline", baseline, "--target", target, "--out", out, *quickly, *more
+    )
+
+
+@pytest.mark.parametrize("wrong", REASONS, ids=lambda wrong: wrong.__name__)
+def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp_path, wrong):
+    target = record(tmp_path / "tonight.parquet", 9, wrong)
+    ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "xis 2 not judged" in ended.out
+    first, second = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert first["state"] == "healthy"
+    assert second["state"] == "insufficient-data"
+    assert second["health_index"] is None
+    assert REASONS[wrong] in " ".join(second["reasons"])
+
+
+@pytest.mark.parametrize("wrong", [milliampere, frozen, one_phase], ids=lambda w: w.__name__)
+def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
+    opamc, baseline, tonight, tmp_path, wrong
+):
+    odd = record(tmp_path / "odd.parquet", 5, wrong)
+    ended = diagnose(opamc, baseline, tonight, tmp_path / "out", "--baseline", odd, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    (sentence,) = ended.sentences
+    assert sentence.startswith(f"opamc: {odd}: ")
+    states = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert [axis["state"] for axis in states] == ["healthy", "healthy"]
+
+
+def test_a_target_of_which_nothing_can_be_judged(opamc, baseline, tmp_path):
+    def every_axis(columns):
+        for name in columns:
+            columns[name] *= np.float32(1000)
+
+    target = record(tmp_path / "tonight.parquet", 9, every_axis)
+    ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "another unit (mA for A)?" in ended.sentences[0]
+
+
+def test_a_baseline_in_another_unit_does_not_make_all_healthy(opamc, tonight, tmp_path):
+    def every_axis(columns):
+        for name in columns:
+            columns[name] *= np.float32(1000)
+
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, every_axis)
+    ended = diagnose(opamc, tmp_path / "baseline", tonight, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "another unit" in ended.sentences[0]
+
+
+def test_healthy_joints_are_judged_without_a_word(opamc, baseline, tonight, tmp_path):
+    ended = diagnose(opamc, baseline, tonight, tmp_path / "out", "--quiet")
+    assert (ended.code, ended.out, ended.err) == (ExitCode.DONE, "", "")
