@@ -1,9 +1,15 @@
 """`opamc config`: show the effective configuration, check a file."""
 
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
 import typer
 
 from opamc_cli.commands.options import ConfigFile, Json, Overrides
 from opamc_cli.commands.output import Output
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 app = typer.Typer(help="Show or check the configuration.", no_args_is_help=True)
 
@@ -22,11 +28,48 @@ def show(config: ConfigFile = None, overrides: Overrides = None, as_json: Json =
 
 
 @app.command()
-def check(config: ConfigFile = None, overrides: Overrides = None, as_json: Json = False) -> None:
-    """Check a configuration; exit 2 with the first key that is wrong."""
+def check(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="FILE",
+            help="Options of the stages, a testbed, a map or a joint's model: told by its keys.",
+        ),
+    ] = None,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    as_json: Json = False,
+) -> None:
+    """Check a file or options; exit 2 with the first key that is wrong."""
     from opamc_cli.config import load_config
+    from opamc_cli.config.files import read_values
+    from opamc_cli.config.kinds import USES, kind_of
+    from opamc_cli.errors import UsageError
+    from opamc_cli.storage.ingest.axes import protect
 
-    effective = load_config(config, overrides or ())
-    Output(as_json=as_json).result(
-        {"valid": True, "config_hash": effective.digest()}, f"valid, hash {effective.digest()}"
-    )
+    if file is not None and config is not None:
+        msg = f"check {file} or {config}, one at a time"
+        raise UsageError(msg)
+    kind = "configuration"
+    if file is not None:
+        kind = kind_of(read_values(file, overrides or (), protect)) or "configuration"
+    if file is None or kind == "configuration":
+        effective = load_config(file or config, overrides or ())
+        values = {"valid": True, "kind": kind, "config_hash": effective.digest()}
+        Output(as_json).result(values, f"valid, hash {effective.digest()}")
+        return
+    _checked(kind, file, overrides or [])
+    Output(as_json).result({"valid": True, "kind": kind}, f"valid: {USES[kind]}")
+
+
+def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
+    """Return a document that is not the options of the stages, or say what is wrong with it."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.config.testbed import load_testbed
+    from opamc_cli.storage.ingest.map import load_map
+
+    if kind == "testbed":
+        return load_testbed(file, overrides)
+    if kind == "map":
+        return load_map(file, overrides)
+    return load_joint_model(file, overrides)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from opamc_cli.commands.options import DEFAULT_OUT, Json, Out, Quiet
+from opamc_cli.commands.options import DEFAULT_OUT, Json, Out, Overrides, Quiet
 from opamc_cli.commands.output import Output
 from opamc_cli.errors import ConfigError
 
@@ -21,8 +21,17 @@ app = typer.Typer(
 
 Runs = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run files or folders.")]
 ModelFile = Annotated[
-    Path, typer.Option("--model", metavar="FILE", help="What is declared: see configs/model.yaml.")
+    Path,
+    typer.Option(
+        "--model",
+        "--config",
+        metavar="FILE",
+        help="What is declared; default: the shipped `model`, see configs/model.yaml.",
+    ),
 ]
+DECLARED = Path("model")
+"""Inertia, gravity and friction, gear unknown."""
+
 Axis = Annotated[
     list[int] | None,
     typer.Option("--axis", min=1, help="Axis, counted from 1; may be repeated. Default: all."),
@@ -32,7 +41,8 @@ Axis = Annotated[
 @app.command()
 def fit(
     runs: Runs,
-    model: ModelFile,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
     axis: Axis = None,
     out: Out = DEFAULT_OUT,
     as_json: Json = False,
@@ -45,9 +55,9 @@ def fit(
     from opamc_cli.storage.runs import find_runs
 
     output = Output(as_json, quiet)
-    declared = load_joint_model(model)
-    with output_lock(out), _naming(model):
-        outcome = stage.fit(declared, find_runs(runs), axis or (), out)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.fit(declared, find_runs(runs), axis or (), out, watch=steps("fit"))
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
         *(shown for result in outcome.results for shown in _fit_tables(result)),
@@ -61,7 +71,8 @@ def fit(
 @app.command()
 def trace(
     runs: Runs,
-    model: ModelFile,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
     axis: Axis = None,
     out: Out = DEFAULT_OUT,
     as_json: Json = False,
@@ -74,9 +85,9 @@ def trace(
     from opamc_cli.storage.runs import find_runs
 
     output = Output(as_json, quiet)
-    declared = load_joint_model(model)
-    with output_lock(out), _naming(model):
-        outcome = stage.trace(declared, find_runs(runs), axis or (), out)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.trace(declared, find_runs(runs), axis or (), out, watch=steps("trace"))
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
         *(shown for result in outcome.results for shown in _trace_tables(result)),
@@ -90,7 +101,8 @@ def trace(
 @app.command()
 def close(
     runs: Runs,
-    model: ModelFile,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
     axis: Axis = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
     out: Out = DEFAULT_OUT,
@@ -104,9 +116,11 @@ def close(
     from opamc_cli.storage.runs import find_runs
 
     output = Output(as_json, quiet)
-    declared = load_joint_model(model)
-    with output_lock(out), _naming(model):
-        outcome = stage.close(declared, find_runs(runs), axis or (), out, seed)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.close(
+            declared, find_runs(runs), axis or (), out, seed, watch=steps("close")
+        )
     output.result(
         {"axes": list(outcome.results)},
         *(shown for result in outcome.results for shown in _loop_tables(result)),

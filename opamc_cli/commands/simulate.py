@@ -12,7 +12,11 @@ from opamc_cli.commands.output import Output
 def simulate(
     config: Annotated[
         Path,
-        typer.Option("--config", metavar="FILE", help="The testbed, such as configs/testbed.yaml."),
+        typer.Option(
+            "--config",
+            metavar="FILE",
+            help="The testbed: a file, or `testbed`, `samples`, `closing`.",
+        ),
     ],
     seed: Annotated[int, typer.Option(min=0, help="Seed of everything random.")] = 0,
     fault: Annotated[

@@ -1,5 +1,6 @@
 """`opamc sweep`: which delay and order separate two sets of runs."""
 
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -100,13 +101,16 @@ def sweep(
 
 def _span(option: str, text: str, smallest: int, largest: int) -> list[int]:
     """Read FIRST:LAST, both included, or one number."""
+    wanted = f"{option} {text}: write it as FIRST:LAST within {smallest}..{largest}, such as"
     first, separator, last = text.partition(":")
     try:
         start, stop = int(first), int(last if separator else first)
     except ValueError as error:
-        msg = f"{option} {text}: write it as FIRST:LAST, such as {smallest}:{largest}"
+        parts = [int(part) for part in re.findall("[0-9]+", text)[:2]]
+        meant = sorted(parts) if len(parts) == 2 else [smallest, min(largest, 25)]
+        msg = f"{wanted} {option} {meant[0]}:{meant[-1]}"
         raise UsageError(msg) from error
     if not smallest <= start <= stop <= largest:
-        msg = f"{option} {text}: must rise within {smallest}..{largest}"
+        msg = f"{option} {text}: must rise within {smallest}..{largest}, as FIRST:LAST"
         raise UsageError(msg)
     return list(range(start, stop + 1))

@@ -1,14 +1,16 @@
 """Configuration from YAML files and `--set key=value`, with errors that name the key."""
 
 import difflib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
+from opamc_cli.config.kinds import KEYS, USES, kind_of
 from opamc_cli.config.models import Config
+from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
@@ -43,7 +45,7 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
     ConfigError
         If the file cannot be read, or a key or value is not allowed.
     """
-    values = read_values(path, overrides)
+    values = read_values(shipped_file(path, "configs") if path else None, overrides)
     return validate(Config, values, str(path) if path else "--set")
 
 
@@ -75,7 +77,11 @@ def read_values(
         try:
             value = yaml.safe_load(text)
         except yaml.YAMLError as error:
-            msg = f"--set {override}: the value is not YAML ({_flat(error)})"
+            missing = _unclosed(text)
+            if missing:
+                msg = f"--set {override}: a bracket is open; write {key}={text}{missing}"
+            else:
+                msg = f"--set {override}: the value is not YAML ({_flat(error)})"
             raise ConfigError(msg) from error
         _set(values, key.split("."), value, override)
     return values
@@ -100,7 +106,9 @@ def read_yaml(path: Path, prepare: Callable[[str], str] = str) -> dict[str, Any]
     try:
         values = yaml.load(prepare(text), Loader=_UniqueKeyLoader)  # a SafeLoader
     except yaml.YAMLError as error:
-        msg = f"{path}: is not valid YAML: {_flat(error)}"
+        # what stands for all axes in a map is a mapping to YAML
+        what = f"is {USES['map']}" if "axis{n" in text else f"is not valid YAML: {_flat(error)}"
+        msg = f"{path}: {what}"
         raise ConfigError(msg) from error
     if values is None:
         return {}
@@ -127,6 +135,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
         key = ".".join(place)
         if first["type"] == "extra_forbidden":
             known = _known_keys(model, first["loc"][:-1])
+            if len(place) == 1:
+                refuse_other_kind(source, values, known)
             close = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.5)
             hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
             msg = f"{source}: unknown key {key!r}; {hint}"
@@ -136,9 +146,51 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
             msg = f"{source}: {key} is missing; add it"
         else:
             value = first["input"]
-            wanted = _lower_first(first["msg"]).replace("a valid tuple", "a list, in brackets")
+            wanted = _lower_first(first["msg"])
+            if "valid tuple" in wanted:
+                wanted = f"it takes a list, such as {key}={_example(model, first['loc'])}"
             msg = f"{source}: {key} is {value!r}; {wanted}"
         raise ConfigError(msg) from error
+
+
+def refuse_other_kind(source: str, values: Mapping[str, Any], known: Iterable[str]) -> None:
+    """Refuse a document of another kind than that whose keys are `known`.
+
+    Raises
+    ------
+    ConfigError
+        Saying what the document is for.
+    """
+    other = kind_of(values)
+    own = set(values) & set(known)
+    if other is not None and len(set(values) & set(KEYS[other])) > len(own):
+        msg = f"{source}: is {USES[other]}; its keys are {', '.join(map(str, values))}"
+        raise ConfigError(msg)
+
+
+def _unclosed(text: str) -> str:
+    """Return the brackets that a value lacks at its end."""
+    pairs = {"[": "]", "{": "}"}
+    open_ones: list[str] = []
+    for character in text:
+        if character in pairs:
+            open_ones.append(pairs[character])
+        elif open_ones and character == open_ones[-1]:
+            open_ones.pop()
+    return "".join(reversed(open_ones))
+
+
+def _example(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
+    """Return the default of a key that takes a list, as it is written after ``--set``."""
+    current: Any = model
+    default: Any = None
+    for part in place:
+        field = getattr(current, "model_fields", {}).get(part)
+        if field is None:
+            break
+        current, default = field.annotation, field.default
+    items = default if isinstance(default, tuple) and default else ("…",)
+    return f"[{','.join(map(str, items))}]"
 
 
 def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:

@@ -1,12 +1,14 @@
 """The model of a joint as its user declares it: `model.yaml`."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
 
-from opamc_cli.config.files import read_yaml, validate
+from opamc_cli.config.files import read_values, validate
 from opamc_cli.config.models import JointConfig, Section
+from opamc_cli.config.shipped import shipped_file
 
 
 class DeclaredEffect(Section):
@@ -44,17 +46,25 @@ class JointModelConfig(Section):
         )
 
 
-def load_joint_model(path: Path) -> JointModelConfig:
-    """Return the model that a YAML file declares.
+def load_joint_model(path: Path, overrides: Sequence[str] = ()) -> JointModelConfig:
+    """Return the model that a YAML file, or a shipped one by its name, declares.
+
+    Parameters
+    ----------
+    path
+        The file.
+    overrides
+        Such as ``joint.gear_ratio=100``.
 
     Raises
     ------
     ConfigError
         If the file cannot be read, or a key or value is not allowed.
     """
-    values: dict[str, Any] = read_yaml(path)
+    file = shipped_file(path, "configs")
+    values: dict[str, Any] = read_values(file, overrides)
     model = validate(JointModelConfig, values, str(path))
-    folder = path.parent
+    folder = file.parent
     return model.model_copy(
         update={"library": tuple((folder / file).resolve() for file in model.library)}
     )

@@ -9,8 +9,9 @@ from typing import Annotated, Any, Literal, get_args, get_type_hints
 
 from pydantic import Field
 
-from opamc_cli.config.files import read_values, read_yaml, validate
+from opamc_cli.config.files import read_values, read_yaml, refuse_other_kind, validate
 from opamc_cli.config.models import Positive, Section
+from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
 from opamc_cli.testbed.effects import complete
 from opamc_cli.testbed.parameters import Effect, Robot
@@ -58,7 +59,9 @@ def load_testbed(path: Path, overrides: Sequence[str] = ()) -> TestbedConfig:
     ConfigError
         If a file cannot be read, or a key or value is not allowed.
     """
-    values = _on_its_base(path, read_values(path, overrides), depth=0)
+    file = shipped_file(path, "configs")
+    values = _on_its_base(file, read_values(file, overrides), depth=0)
+    refuse_other_kind(str(path), values, TestbedConfig.model_fields)
     robot = values.get("robot")
     if isinstance(robot, dict):
         values["robot"] = robot = dict(robot)

@@ -31,6 +31,7 @@ from opamc_cli.stages.model_tables import (
     spectrum_table,
     structure_entry,
 )
+from opamc_cli.stages.parallel import Watch, unwatched
 from opamc_cli.storage.atomic import atomic_path, ensure_directory
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.tables import write_table
@@ -53,7 +54,12 @@ class Outcome:
 
 
 def fit(
-    model: JointModelConfig, paths: Sequence[tuple[str, Path]], axes: Sequence[int], out: Path
+    model: JointModelConfig,
+    paths: Sequence[tuple[str, Path]],
+    axes: Sequence[int],
+    out: Path,
+    *,
+    watch: Watch = unwatched,
 ) -> Outcome:
     """Fit a declared model on each axis; writes fit.parquet.
 
@@ -67,6 +73,8 @@ def fit(
         Axes; empty for all.
     out : Path
         Output folder.
+    watch : callable
+        Called as axes get done.
     """
     rows: list[dict[str, Any]] = []
 
@@ -76,13 +84,18 @@ def fit(
         rows.extend(fit_rows(laid.axis, result, known))
         return fit_summary(laid, result, known)
 
-    results, errors, inputs = _each_axis(model, paths, axes, one)
+    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
     written = [_write(out / FIT_NAME, rows, FIT, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
 
 def trace(
-    model: JointModelConfig, paths: Sequence[tuple[str, Path]], axes: Sequence[int], out: Path
+    model: JointModelConfig,
+    paths: Sequence[tuple[str, Path]],
+    axes: Sequence[int],
+    out: Path,
+    *,
+    watch: Watch = unwatched,
 ) -> Outcome:
     """Trace the residual of a declared model on each axis; writes candidates.parquet."""
     rows: list[dict[str, Any]] = []
@@ -113,7 +126,7 @@ def trace(
             "untestable": [{"effect": u.effect, "why": u.why} for u in traced.untestable],
         }
 
-    results, errors, inputs = _each_axis(model, paths, axes, one)
+    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
     written = [_write(out / CANDIDATES_NAME, rows, CANDIDATES, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
@@ -124,6 +137,8 @@ def close(
     axes: Sequence[int],
     out: Path,
     seed: int = 0,
+    *,
+    watch: Watch = unwatched,
 ) -> Outcome:
     """Close the loop on each axis; writes loop.json, the extended model and the tables.
 
@@ -139,6 +154,8 @@ def close(
         Output folder.
     seed : int
         For the decoys.
+    watch : callable
+        Called as axes get done.
     """
     candidates: list[dict[str, Any]] = []
     fits: list[dict[str, Any]] = []
@@ -159,7 +176,7 @@ def close(
         extended[laid.axis] = extended_model(model, loop.after)
         return loop_entry(laid, loop)
 
-    results, errors, inputs = _each_axis(model, paths, axes, one)
+    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
     if not results:
         return Outcome((), (), tuple(errors))
     ensure_directory(out)
@@ -188,6 +205,7 @@ def _each_axis(
     paths: Sequence[tuple[str, Path]],
     axes: Sequence[int],
     one: Any,
+    watch: Watch,
 ) -> tuple[list[dict[str, Any]], list[OpamcError], list[tuple[Path, str]]]:
     runs: list[Run] = []
     results: list[dict[str, Any]] = []
@@ -204,7 +222,8 @@ def _each_axis(
         if not wanted:
             msg = f"{runs[0].path}: the runs have no axis in common; name one with --axis"
             raise InputError(msg)
-        for axis in wanted:
+        for done, axis in enumerate(wanted):
+            watch(done, len(wanted))
             try:
                 results.append(one(lay(model, runs, axis)))
             except ConfigError:

@@ -23,7 +23,7 @@ from opamc_cli.stats.divergence import (
 from opamc_cli.stats.features import compare
 from opamc_cli.stats.sessions import inflation_within_sessions
 from opamc_cli.storage.sources import check_comparable
-from opamc_cli.storage.tables import table_input, write_table
+from opamc_cli.storage.tables import table_input, table_provenance, write_table
 
 SCORES_NAME = "scores.parquet"
 FEATURES_NAME = "features.parquet"
@@ -126,6 +126,7 @@ def compare_sides(
     notes = check_comparable(sides.baseline.sources, sides.target.sources)
     own, other = sides.rows
     common = common_keys(own, other)
+    _refuse_unequal_options(sides, may_differ=("orders",) if common else ())
     if not common:
         msg = (
             f"{sides.target.path}: has no axis, motion, order and delay in common with "
@@ -148,6 +149,24 @@ def compare_sides(
         features,
         notes,
     )
+
+
+def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
+    """Refuse tables that were made with other options, naming the first option and both values.
+
+    Of unequal orders those in common can be compared; an envelope, an offset or frames of another
+    kind make other numbers of the same current.
+    """
+    own, other = (table_provenance(side.path).config for side in (sides.baseline, sides.target))
+    for section in sorted(own.keys() & other.keys()):
+        for key in sorted(own[section].keys() | other[section].keys()):
+            values = own[section].get(key), other[section].get(key)
+            if values[0] != values[1] and key not in may_differ:
+                msg = (
+                    f"{sides.target.path}: was made with {section}.{key} {values[1]!r} where "
+                    f"{sides.baseline.path} has {values[0]!r}; make both with the same options"
+                )
+                raise InputError(msg)
 
 
 def score_table(

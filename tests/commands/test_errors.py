@@ -100,13 +100,44 @@ def test_config_files(opamc, tmp_path, text, parts):
     [
         ("patterns.gamma", "write it as key=value"),
         ("patterns.gama=1", "did you mean 'gamma'"),
-        ("patterns.gamma=[", "the value is not YAML"),
+        ("patterns.gamma={:", "write patterns.gamma={:}"),
+        ("patterns.gamma=]", "the value is not YAML"),
+        ("patterns.orders=[4,5", "a bracket is open; write patterns.orders=[4,5]"),
+        ("patterns.orders=9", "it takes a list, such as patterns.orders=[4,5]"),
+        ("patterns.orders=4-5", "it takes a list, such as patterns.orders=[4,5]"),
         ("patterns.gamma.x=1", "patterns.gamma"),
         ("=1", "write it as key=value"),
     ],
 )
 def test_config_overrides(opamc, override, part):
     check_refusal(opamc("config", "check", "--set", override), ExitCode.USAGE, part)
+
+
+SHIPPED = {
+    "default.yaml": "configuration",
+    "samples.yaml": "testbed",
+    "model.yaml": "model",
+    "maps/ur_rtde.yaml": "map",
+}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_documents_are_told_by_their_keys(opamc, name):
+    file = ROOT / "configs" / name
+    ended = opamc("config", "check", file, "--json")
+    assert ended.code == ExitCode.DONE, ended
+    assert json.loads(ended.out)["kind"] == SHIPPED[name]
+    uses = {
+        "configuration": ["config", "check", "--config"],
+        "testbed": ["simulate", "--config"],
+        "model": ["model", "fit", "none.parquet", "--model"],
+        "map": ["ingest", "none.csv", "--map"],
+    }
+    for kind, arguments in uses.items():
+        if kind != SHIPPED[name]:
+            reader = {"configuration": "--config", "testbed": "simulate", "map": "ingest"}
+            part = reader.get(SHIPPED[name], "opamc model")
+            check_refusal(opamc(*arguments, file), ExitCode.USAGE, str(file), part)
 
 
 @pytest.mark.parametrize("make", [bad_runs.missing, bad_runs.folder])
@@ -459,6 +490,21 @@ def test_missing_positions_are_bridged(opamc, tmp_path):
     assert counts[0] == counts[1]
 
 
+def test_tables_of_unequal_options(opamc, tmp_path, pair):
+    sides = []
+    for side, run, option in zip(
+        ("b", "t"), pair, ("patterns.frames=16", "patterns.frames=8"), strict=True
+    ):
+        out = tmp_path / side
+        reference = ["--reference", tmp_path / "b" / "motions.parquet"] if side == "t" else []
+        assert opamc("segment", run, "--out", out).code == 0
+        assert opamc("identify", "--out", out, *reference).code == 0
+        assert opamc("patterns", "--out", out, "--set", option).code == 0
+        sides += [f"--{'baseline' if side == 'b' else 'target'}", out / "patterns.parquet"]
+    ended = opamc("score", *sides, "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.BAD_INPUT, "patterns.frames 8 where", "has 16")
+
+
 def test_a_table_of_one_stage_is_not_another(opamc, tmp_path, pair):
     out = tmp_path / "out"
     assert opamc("segment", pair[0], "--out", out).code == 0
@@ -492,6 +538,7 @@ def test_runs_that_changed_or_went_after_their_segments_were_found(opamc, tmp_pa
         (["--tau", "5:2"], "--tau 5:2: must rise"),
         (["--tau", "0:2"], "--tau 0:2: must rise within 1.."),
         (["--tau", "all"], "--tau all: write it as FIRST:LAST"),
+        (["--tau", "8-1"], "such as --tau 1:8"),
         (["--order", "2:4"], "--order 2:4: must rise within 3..7"),
         (["--order", "5:9"], "--order 5:9: must rise within 3..7"),
     ],
