@@ -8,7 +8,7 @@ def clipped_share(x: NDArray[np.floating]) -> float:
     """Share of the samples that sit at the channel's largest or smallest value, if it is clipped.
 
     A clipped channel reaches its extreme value far more often than the next value inside; a
-    quantised crest does not.
+    quantised crest does not. A current that rests at exactly zero is at no limit.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def clipped_share(x: NDArray[np.floating]) -> float:
     for extreme in (known.max(), known.min()):
         n_extreme = int(np.count_nonzero(known == extreme))
         inside = known[known != extreme]
-        if n_extreme < max(10, known.size // 1000) or not inside.size:
+        if extreme == 0 or n_extreme < max(10, known.size // 1000) or not inside.size:
             continue
         nearest = inside[np.argmin(np.abs(inside - extreme))]
         if n_extreme > 5 * np.count_nonzero(known == nearest):

@@ -12,6 +12,13 @@ ON_SHARE = 0.05  # of the largest speed
 OFF_SHARE = 0.02
 PROBE = 1 << 20
 
+LEAST_WINDOW = 5
+"""Samples of the local parabola in a slow log: three follow the angle's noise, of a motion of 40
+samples five blur nothing."""
+
+FEWEST_SAMPLES = 10
+"""Of a motion: at the slowest log's 10 Hz a second."""
+
 
 @dataclass(frozen=True)
 class JointMotion:
@@ -66,7 +73,8 @@ def velocity_from_position(
         return np.full(angle.size, np.nan)
     # one missing angle would spoil every angle behind it when turns are undone
     angle = np.interp(np.arange(angle.size), known, np.unwrap(angle[known]))
-    window = min(max(3, round(window_s * fs_hz) | 1), angle.size - 1 + angle.size % 2)
+    wanted = max(LEAST_WINDOW, round(window_s * fs_hz) | 1)
+    window = min(wanted, angle.size - 1 + angle.size % 2)
     if window < 3:
         return np.zeros(angle.size)
     velocity: NDArray[np.float64] = savgol_filter(angle, window, 2, deriv=1, delta=1 / fs_hz)
@@ -92,8 +100,8 @@ def find_joint_motions(
     fs_hz : float
         Sampling rate, Hz.
     min_motion_s, min_still_s : float
-        Shorter motions are dropped, shorter standstills between motions of the same direction
-        bridged, s.
+        Shorter motions, and those of fewer than `FEWEST_SAMPLES`, are dropped; shorter
+        standstills between motions of the same direction bridged, s.
     min_speed_rad_s : float
         A joint that never reaches this speed stands still: what is left is its controller's
         quiver, rad/s.
@@ -126,7 +134,7 @@ def find_joint_motions(
     return [
         JointMotion(a, b, sign, float(np.quantile(np.abs(velocity[a:b]), 0.99)))
         for a, b, sign in joined
-        if b - a >= min_motion_s * fs_hz
+        if b - a >= max(min_motion_s * fs_hz, FEWEST_SAMPLES)
     ]
 
 
@@ -155,3 +163,73 @@ def motor_frequency(speed_rad_s: float, gear_ratio: float | None, pole_pairs: in
         Hz.
     """
     return speed_rad_s / (2 * np.pi) * (gear_ratio or 1.0) * (pole_pairs or 1)
+
+
+def fluctuation_frequency(current: NDArray[np.floating], fs_hz: float) -> float:
+    """Frequency of a current's own fluctuations, where no carrier tells how fast they are.
+
+    Parameters
+    ----------
+    current : array, shape (n,)
+        Envelope of one motion; NaN is bridged by a straight line.
+    fs_hz : float
+        Sampling rate, Hz.
+
+    Returns
+    -------
+    float
+        Hz, at most a quarter of the sampling rate: the first zero of the autocorrelation, its
+        straight line taken off before, is a quarter of the period.
+    """
+    x = np.asarray(current, dtype=np.float64)
+    known = np.flatnonzero(np.isfinite(x))
+    if known.size < FEWEST_SAMPLES:
+        return fs_hz / 4
+    place = np.arange(x.size)
+    x = np.interp(place, known, x[known])
+    x = x - np.polynomial.Polynomial.fit(place, x, 1)(place)
+    size = 1 << (2 * x.size - 1).bit_length()
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(x, size)) ** 2, size)[: x.size // 2]
+    below = np.flatnonzero(correlation <= 0)
+    quarter = int(below[0]) if below.size else x.size // 2
+    return fs_hz / (4 * max(quarter, 1))
+
+
+def signed_by_speed(
+    current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]
+) -> NDArray[np.float64] | None:
+    """Give a current that was logged without its sign that of the speed.
+
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Reported current.
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity.
+
+    Returns
+    -------
+    array, shape (n,), A, or None
+        None where the current has its sign: it changes, or the joint does not reverse, or what
+        is drawn at rest lies between what either direction draws, as a load's does.
+
+    Notes
+    -----
+    Friction draws current either way, so that its modulus is larger in both directions than at
+    rest; a constant load that outweighs friction adds to one direction what it takes off the
+    other. While it brakes the joint may draw current against its speed: there the sign is wrong.
+    """
+    x = np.asarray(current, dtype=np.float64)
+    v = np.asarray(velocity_rad_s, dtype=np.float64)
+    known = np.isfinite(x) & np.isfinite(v)
+    if not known.any() or (x[known].min() < 0 < x[known].max()):
+        return None
+    fastest = float(np.quantile(np.abs(v[known]), 0.99))
+    forth, back = known & (v > 0.3 * fastest), known & (v < -0.3 * fastest)
+    rest = known & (np.abs(v) < OFF_SHARE * fastest)
+    if min(np.count_nonzero(part) for part in (forth, back, rest)) < FEWEST_SAMPLES:
+        return None
+    at_rest = float(np.median(np.abs(x[rest])))
+    if at_rest >= min(float(np.median(np.abs(x[part]))) for part in (forth, back)):
+        return None
+    return np.abs(x) * np.sign(v)

@@ -104,6 +104,7 @@ def run_chain(
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
         notes=segmented.notes
+        + counted.notes
         + tuple(
             f"{name} axis {axis}: {unidentified} segments fit no motion of the reference cycle"
             for (name, axis), (_, unidentified) in identified.cycles().items()

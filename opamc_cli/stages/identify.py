@@ -1,7 +1,7 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from opamc_cli.signal.identification import (
     find_reference,
     identify,
 )
+from opamc_cli.signal.reported import fluctuation_frequency
 from opamc_cli.stages.envelope import EnvelopeKind, read_envelope
 from opamc_cli.stages.kept import KeptResults, remembered
 from opamc_cli.stages.parallel import Watch, map_items, unwatched
@@ -30,6 +31,13 @@ FILE_NAME = "motions.parquet"
 
 MIN_CORRELATION = 0.5
 """Below this the correlation peak says nothing of time, and the segment's own start is kept."""
+
+REPEATS = 0.75
+"""Share of a recording's motions that a cycle has to find again to be one: noise may hide some."""
+
+SAME_DURATION = 0.1
+"""Relative difference of the durations of motions at the edges of recordings that begin and end
+with the program; where they cut it anywhere, a motion is as often half as whole."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +83,17 @@ class _Axis:
 
 @dataclass(frozen=True)
 class _Reference:
-    """The reference cycle of one axis: where its segments are and what they are like."""
+    """The reference cycle of one axis: where its segments are and what they are like.
+
+    `carrier_hz` is what delays are taken from, and `edges` tells whether recordings begin and end
+    with the cycle, so that a motion at their edge is whole.
+    """
 
     source: RunSource
     features: SegmentFeatures
     spans: tuple[tuple[int, int], ...]
+    carrier_hz: npt.NDArray[np.float64]
+    edges: bool
 
 
 @dataclass(frozen=True)
@@ -143,7 +157,12 @@ def run(
     if reference is not None:
         references = _given_references(reference, moved_to)
     else:
-        references = _own_references(segments, parts, rule, config.identify, reference_run)
+        references = {
+            axis: _with_carrier(found, axis, config)
+            for axis, found in _own_references(
+                segments, parts, rule, config.identify, reference_run
+            ).items()
+        }
     work = [
         _Job(part, references.get(part.axis), config.identify, config.patterns.envelope)
         for part in parts
@@ -228,24 +247,70 @@ def _own_references(
         names = ", ".join(sorted({p.source.name for p in parts}))
         msg = f"{path}: has no run {reference_run!r} to take the reference from; it has {names}"
         raise InputError(msg)
+    executions = {
+        axis: _executions([part for part in parts if part.axis == axis], rule)
+        for axis in {part.axis for part in parts}
+    }
     best: dict[int, tuple[int, _Reference]] = {}
     for part in parts:
         if reference_run not in (None, part.source.name):
             continue
-        whole = _whole(part)
-        if whole.size == 0:
+        edges = executions[part.axis]
+        usable = np.arange(part.rows.num_rows) if edges else _whole(part)
+        if usable.size == 0:
             continue
-        features = part.features.take(whole)
+        features = part.features.take(usable)
         if part.rows.column("kind")[0].as_py() == "window":
             start, stop = 0, 1
         else:
             start, stop = find_reference(features, rule, config.segments_per_cycle)
         cycle = features.part(start, stop)
-        count = int(identify(cycle, features, rule).cycle.max(initial=-1)) + 1
+        found = identify(cycle, features, rule).cycle
+        count = int(found.max(initial=-1)) + 1
+        repeats = count > 1 and np.mean(found >= 0) >= REPEATS
+        if edges and not repeats and config.segments_per_cycle is None:
+            start, stop, cycle, count = 0, len(features), features, 1
         if part.axis not in best or count > best[part.axis][0]:
-            spans = tuple(_span(part.rows, i) for i in whole[start:stop].tolist())
-            best[part.axis] = (count, _Reference(part.source, cycle, spans))
+            spans = tuple(_span(part.rows, i) for i in usable[start:stop].tolist())
+            best[part.axis] = (
+                count,
+                _Reference(part.source, cycle, spans, cycle.f_max_hz, edges),
+            )
     return {axis: reference for axis, (_, reference) in best.items()}
+
+
+def _executions(parts: Sequence[_Axis], rule: MatchRule) -> bool:
+    """Tell whether every recording holds the same motions from its beginning to its end.
+
+    Then each is one execution of the program or several whole ones, and what touches its edge has
+    not been cut by it.
+    """
+    if len(parts) < 2 or parts[0].rows.column("kind")[0].as_py() == "window":
+        return False
+    first = parts[0].features
+    at_edge = _column(parts[0].rows, "edge").astype(bool)
+    for part in parts[1:]:
+        own = part.features
+        if len(own) != len(first) or (identify(first, own, rule).cycle < 0).any():
+            return False
+        ratio = own.duration_s[at_edge] / first.duration_s[at_edge]
+        if (np.abs(ratio - 1) > SAME_DURATION).any():
+            return False
+    return True
+
+
+def _with_carrier(reference: _Reference, axis: int, config: Config) -> _Reference:
+    """Let the current's own fluctuations tell the delay where nothing else does."""
+    with reference.source.open() as run:
+        if run.channels(axis).phases or config.joint.gear_ratio is not None:
+            return reference
+        wanted = config.patterns.envelope
+        found = [
+            fluctuation_frequency(read_envelope(run, axis, *span, wanted), run.sampling_rate_hz)
+            for span in reference.spans
+        ]
+    # one delay for all motions: of short ones the fluctuations are known badly
+    return replace(reference, carrier_hz=np.full(len(found), float(np.median(found))))
 
 
 def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Reference]:
@@ -264,6 +329,8 @@ def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Refere
             part.source,
             part.features,
             tuple(_span(part.rows, i) for i in range(part.rows.num_rows)),
+            _column(part.rows, "reference_f_max_hz"),
+            bool(_column(part.rows, "edge").any()),
         )
         for part in _parts(rows, sources)
     }
@@ -283,14 +350,15 @@ def _identify_part(job: _Job) -> pa.Table:
     f_max_hz = np.full(n, np.nan)
     samples = np.zeros(n, dtype=np.int64)
     is_reference = np.zeros(n, dtype=bool)
-    whole = _whole(part)
+    # motions at the recording's edge are whole if those of the reference are
+    whole = np.arange(n) if reference is not None and reference.edges else _whole(part)
     if reference is not None and whole.size:
         found = identify(reference.features, part.features.take(whole), match_rule(job.config))
         cycle[whole], motion[whole] = found.cycle, found.motion
         similarity[whole] = found.similarity
         for i in np.flatnonzero(motion >= 0).tolist():
             span = reference.spans[motion[i]]
-            f_max_hz[i] = reference.features.f_max_hz[motion[i]]
+            f_max_hz[i] = reference.carrier_hz[motion[i]]
             samples[i] = span[1] - span[0]
             own = _span(part.rows, i)
             is_reference[i] = part.source == reference.source and own == span

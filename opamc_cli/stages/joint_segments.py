@@ -17,11 +17,8 @@ from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows, mean
 from opamc_cli.storage.runs import AxisChannels, Run
 
 USUAL_GEAR_RATIO = 100.0
-"""Stands in for an unknown ratio, to choose the pattern's time delay by and for nothing else.
-
-Strain wave gears of robot arms have 50 to 160; the delay is right to within that factor, where the
-joint's own revolutions would make it a hundred times too long.
-"""
+"""Stands in for an unknown ratio in f_d,max, which motions are then compared by: strain wave gears
+of robot arms have 50 to 160. Delays are chosen by the current itself, see stage `identify`."""
 
 STILL_SHARE = 0.05
 """A recording that stands still for less than this share never stands still."""
@@ -80,11 +77,6 @@ def joint_segments(
     if share > 0:
         notes.append(
             f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
-        )
-    if motions and joint.gear_ratio is None:
-        notes.append(
-            f"{run.path}: axis {channels.axis} reports current without a carrier and "
-            f"joint.gear_ratio is not set; {USUAL_GEAR_RATIO:g} is assumed for f_d,max"
         )
     segments = _segments(run, current, motions, config, joint)
     return AxisSegments(

@@ -14,7 +14,7 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
-from opamc_cli.errors import NotEnoughDataError, OpamcError
+from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal import n_windows, ordinal_counts, time_delay
 from opamc_cli.stages.envelope import current_offset, read_course
 from opamc_cli.stages.kept import KeptResults, remembered
@@ -46,11 +46,14 @@ class PatternsOutcome:
         The patterns' rows.
     errors
         One for each axis of a run that could not be read.
+    notes
+        Which delays are not those of (4-2), and why.
     """
 
     path: Path
     table: pa.Table
     errors: tuple[OpamcError, ...]
+    notes: tuple[str, ...]
 
     def by_motion(self) -> list[dict[str, Any]]:
         """Return delay, patterns and segments by axis, motion and order."""
@@ -106,8 +109,6 @@ def run(
     ------
     InputError
         If a table or run cannot be used.
-    NotEnoughDataError
-        If every segment is shorter than a pattern.
     """
     table = read_table(motions, "identify", MOTIONS)
     sources = read_sources(motions, moved_to)
@@ -130,9 +131,6 @@ def run(
         ).combine_chunks()
         for witness in WITNESSES
     }
-    too_long = _windows_too_long(motions, patterns)
-    if too_long and not any(patterns.column("n_patterns").to_pylist()):
-        raise too_long[0]
     inputs, used = [table_input(motions)], config.canonical("patterns")
     for name, rows in {FILE_NAME: patterns, **beside}.items():
         write_table(
@@ -143,29 +141,42 @@ def run(
             inputs=inputs,
             extra=sources_record(sources, out),
         )
-    return PatternsOutcome(out / FILE_NAME, patterns, (*outcome.errors, *too_long))
+    notes = _delays_in_words(table, patterns, config)
+    return PatternsOutcome(out / FILE_NAME, patterns, outcome.errors, tuple(notes))
 
 
-def _windows_too_long(motions: Path, patterns: pa.Table) -> list[OpamcError]:
-    """Return an error for each axis whose segments are all shorter than the pattern window."""
-    by_axis: dict[int, list[dict[str, Any]]] = {}
-    for row in patterns.drop_columns(["counts"]).to_pylist():
-        by_axis.setdefault(row["axis"], []).append(row)
-    errors: list[OpamcError] = []
-    for axis, rows in sorted(by_axis.items()):
-        if any(row["n_patterns"] or row["n_masked"] for row in rows):
-            continue
-        row = min(rows, key=lambda row: (row["order"] - 1) * row["tau"])
-        longest = max(row["stop"] - row["start"] for row in rows)
-        why = f" at f_d,max = {row['f_max_hz']:.3g} Hz" if row["gamma"] is not None else ""
-        msg = (
-            f"{motions}: axis {axis}: patterns of order {row['order']} at a delay of {row['tau']} "
-            f"samples{why} span {(row['order'] - 1) * row['tau'] + 1} samples, the longest segment "
-            f"has {longest}; set patterns.tau, or joint.gear_ratio and joint.pole_pairs where "
-            "currents are reported"
+def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> list[str]:
+    """Say which delays were not those of (4-2), by axis."""
+    length = {
+        (row["axis"], row["motion"]): row["reference_samples"]
+        for row in motions.select(["axis", "motion", "reference_samples"]).to_pylist()
+    }
+    columns = ["axis", "motion", "order", "tau", "f_max_hz", "signal"]
+    found = patterns.select(columns).group_by(columns).aggregate([]).to_pylist()
+    notes = []
+    for axis in sorted({row["axis"] for row in found}):
+        own = [row for row in found if row["axis"] == axis]
+        used = ", ".join(
+            f"{lengths[0]} to {lengths[-1]}" if len(lengths) > 1 else f"{lengths[0]}"
+            for lengths in [sorted({row["tau"] for row in own})]
         )
-        errors.append(NotEnoughDataError(msg))
-    return errors
+        if own[0]["signal"] == "reported" and not (config.patterns.tau or config.joint.gear_ratio):
+            notes.append(
+                f"axis {axis}: no carrier and no joint.gear_ratio tell the patterns' delay; it is "
+                f"chosen from the baseline's own current ({used} samples)"
+            )
+        shortened = [
+            row
+            for row in own
+            if row["tau"] * (row["order"] - 1) * 2 + 2 * row["order"] > length[axis, row["motion"]]
+        ]
+        if shortened:
+            motions_of = sorted({row["motion"] for row in shortened})
+            notes.append(
+                f"axis {axis}: motion {', '.join(map(str, motions_of))} is short for its patterns, "
+                f"whose delay was limited to {used} samples so that half of it is left to count"
+            )
+    return notes
 
 
 @dataclass(frozen=True)
@@ -219,9 +230,35 @@ def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
     return start, start + row["reference_samples"]
 
 
-def delay(config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int) -> int:
-    """Return the time delay of a motion: the fixed one, or that of (4-2)."""
-    return config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
+LARGEST_SHARE = 0.5
+"""Of a motion that a pattern's window may span: longer ones leave hardly any to count."""
+
+
+def delay(
+    config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int, samples: int
+) -> int | None:
+    """Return the time delay of a motion.
+
+    Parameters
+    ----------
+    config
+        A fixed delay, or γ of (4-2).
+    fs_hz, f_max_hz
+        Sampling rate, and frequency of the motion's carrier or of its current's fluctuations.
+    order
+        Of the patterns.
+    samples
+        Of the motion, as its reference has them.
+
+    Returns
+    -------
+    int or None
+        In samples; shortened until the window spans no more than `LARGEST_SHARE` of the motion,
+        None if even neighbouring samples do not fit.
+    """
+    wanted = config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
+    longest = int(LARGEST_SHARE * samples) // (order - 1)
+    return min(wanted, longest) if longest else None
 
 
 def _analyse(job: _Job) -> dict[str, pa.Table]:
@@ -264,10 +301,11 @@ def _pattern_rows(
     config: PatternsConfig,
 ) -> list[dict[str, Any]]:
     """Count the patterns of one segment, for every order."""
-    delays = {
-        order: delay(config, fs_hz, row["reference_f_max_hz"], order)
-        for order in sorted(set(config.orders))
-    }
+    delays = {}
+    for order in sorted(set(config.orders)):
+        tau = delay(config, fs_hz, row["reference_f_max_hz"], order, row["reference_samples"])
+        if tau is not None:
+            delays[order] = tau
     rows = []
     for tau in sorted(set(delays.values())):
         orders = [order for order, other in delays.items() if other == tau]

@@ -23,6 +23,9 @@ FILE_NAME = "segments.parquet"
 SAMPLES_PER_SHORTEST = 10
 """Samples that the shortest motion, or the period of the slowest carrier, has to have."""
 
+SLOWEST_LOG_HZ = 10.0
+"""Of a reported current: slower, and a motion of ten samples takes longer than robots move."""
+
 
 @dataclass(frozen=True)
 class SegmentOutcome:
@@ -153,12 +156,16 @@ def _segment_axis(job: _Job) -> AxisSegments:
 
 def _check_rate(recording: Run, config: Config) -> None:
     segment = config.segment
-    least_hz = SAMPLES_PER_SHORTEST * max(1 / segment.min_motion_s, segment.f_min_hz)
+    phases = any(recording.channels(axis).phases for axis in recording.axes)
+    if phases:
+        least_hz = SAMPLES_PER_SHORTEST * max(1 / segment.min_motion_s, segment.f_min_hz)
+        why = "the motions and their carrier", ", and 2.5 times the fastest carrier"
+    else:
+        least_hz, why = SLOWEST_LOG_HZ, ("a reported current", "")
     if recording.sampling_rate_hz < least_hz:
         msg = (
             f"{recording.path}: sampling_rate_hz is {recording.sampling_rate_hz:g}, too low for "
-            f"the motions and their carrier: at least {least_hz:g} Hz is needed, and 2.5 times "
-            "the fastest carrier; record faster"
+            f"{why[0]}: at least {least_hz:g} Hz is needed{why[1]}; record faster"
         )
         raise InputError(msg)
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
-from opamc_cli.stages.witnesses import spectrum
+from opamc_cli.stages.witnesses import profile, spectrum
 from opamc_cli.stages.witnesses.kept_rows import Names
 from opamc_cli.stats.evidence import Evidence
 
@@ -41,4 +41,4 @@ class Witness(Protocol):
         """Return the evidence that its tables hold about an axis."""
 
 
-WITNESSES: tuple[Witness, ...] = (spectrum,)
+WITNESSES: tuple[Witness, ...] = (spectrum, profile)

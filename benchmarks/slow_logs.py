@@ -1,0 +1,153 @@
+"""Reported current of slow logs: whether every axis is judged, and how well.
+
+Virtual robots run their program once a recording, from edge to edge, without standing still
+between its motions; the drive reports torque current and position. Three healthy recordings are
+held against three of the same robot, healthy or with one damaged joint.
+
+    python benchmarks/slow_logs.py --quick
+    python benchmarks/slow_logs.py --seeds 40:52
+"""
+
+import argparse
+import tempfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import rankdata
+
+from opamc_cli.config import load_config
+from opamc_cli.config.testbed import load_testbed
+from opamc_cli.errors import OpamcError
+from opamc_cli.stages import score, verdict
+from opamc_cli.stages.chain import run_chain
+from opamc_cli.stages.side import Sides, read_side
+from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.testbed.robot import simulate
+
+ROOT = Path(__file__).resolve().parents[1]
+FINE_HZ = 500.0
+RATES_HZ = (25.0, 100.0, 125.0)
+SPEEDS_PERCENT = (5.0, 20.0, 100.0)
+SEVERITIES = (0.0, 0.5, 1.0)
+AXES = (1, 2, 3, 4, 5, 6)
+SESSIONS = 3
+
+
+def record(seed: int, speed_percent: float) -> dict[tuple[float, int], dict]:
+    """Return the channels at `FINE_HZ` by severity and session; sessions count over both sides."""
+    config = load_testbed(ROOT / "configs" / "testbed.yaml")
+    spread = replace(config.robot.spread, temperature_c=5.0, sensor_gain=0.01)
+    robot = replace(config.robot, spread=spread)
+    program = replace(
+        config.program,
+        order="together",
+        cycles=1,
+        lead_s=0.0,
+        dwell_s=0.0,
+        dwell_jitter_s=0.0,
+        speed_percent=speed_percent,
+    )
+    faulty = AXES[seed % len(AXES)]
+    found = {}
+    for session in range(2 * SESSIONS):
+        for severity in SEVERITIES if session >= SESSIONS else (0.0,):
+            recording = simulate(
+                robot,
+                program,
+                seed=seed,
+                session=session,
+                axes=[faulty] if severity else AXES,
+                faults={faulty: replace(robot.damage, severity=severity)} if severity else {},
+                sampling_rate_hz=FINE_HZ,
+            )
+            found[severity, session] = {
+                axis: (signals.reported_a, signals.position_rad)
+                for axis, signals in recording.axes.items()
+            }
+    return found
+
+
+def judged(channels: dict, rate_hz: float, folder: Path) -> dict:
+    """Return the verdict's axes by severity, and how many recordings failed."""
+    step = round(FINE_HZ / rate_hz)
+    for (severity, session), axes in channels.items():
+        side = "baseline" if session < SESSIONS else f"target-{severity:g}"
+        columns = {}
+        for axis, (current, position) in axes.items():
+            columns[f"axis{axis}_current"] = np.ascontiguousarray(current[::step])
+            columns[f"axis{axis}_position"] = np.ascontiguousarray(position[::step])
+        info = RunInfo(sampling_rate_hz=rate_hz, session=str(session))
+        save_run(folder / side / f"{session}.parquet", info, columns)
+    config = load_config(None, ["joint.explain=false"])
+    baseline = run_chain([folder / "baseline"], config, folder / "out" / "baseline")
+    found = {}
+    for severity in SEVERITIES:
+        name = f"target-{severity:g}"
+        out = folder / "out" / name
+        target = run_chain([folder / name], config, out, reference=baseline.motions)
+        sides = Sides(read_side(baseline.patterns), read_side(target.patterns))
+        scored = score.compare_sides(sides, config, out)
+        written = verdict.write(verdict.decide(sides, config), scored, config, out)
+        errors = (*baseline.errors, *target.errors)
+        found[severity] = ({a["axis"]: a for a in written.verdict["axes"]}, errors)
+    return found
+
+
+def auc(healthy: list[float], faulty: list[float]) -> float:
+    """Probability that a faulty joint's p is below a healthy one's."""
+    ranks = rankdata([*healthy, *faulty])[len(healthy) :]
+    n = len(faulty)
+    return 1 - (float(ranks.sum()) - n * (n + 1) / 2) / (n * len(healthy))
+
+
+def main() -> None:
+    """Print one row per speed and rate."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", default="0:8")
+    parser.add_argument("--quick", action="store_true")
+    arguments = parser.parse_args()
+    first, last = (int(part) for part in arguments.seeds.split(":"))
+    seeds = range(first, first + 1 if arguments.quick else last)
+    print("speed %,rate Hz,axes,not judged,failed,false alarms,AUC 0.5,AUC 1,found 0.5,found 1")
+    for speed in SPEEDS_PERCENT:
+        rows: dict[float, list] = {rate: [] for rate in RATES_HZ}
+        for seed in seeds:
+            channels = record(seed, speed)
+            for rate in RATES_HZ:
+                with tempfile.TemporaryDirectory() as folder:
+                    try:
+                        rows[rate].append((seed, judged(channels, rate, Path(folder))))
+                    except OpamcError as error:
+                        print(f"seed {seed}, {speed:g} %, {rate:g} Hz: {error}")
+        for rate, results in rows.items():
+            print(row(speed, rate, results, len(seeds)))
+
+
+def row(speed: float, rate: float, results: list, n_seeds: int) -> str:
+    """Summarise one speed and rate."""
+    healthy, n_unjudged, n_failed, alarms = [], 0, n_seeds - len(results), 0
+    faulty: dict[float, list[float]] = {severity: [] for severity in SEVERITIES[1:]}
+    found: dict[float, int] = dict.fromkeys(SEVERITIES[1:], 0)
+    for seed, by_severity in results:
+        bad = AXES[seed % len(AXES)]
+        axes, errors = by_severity[0.0]
+        n_failed += len(errors)
+        for axis in AXES:
+            p = axes.get(axis, {}).get("p_value")
+            n_unjudged += p is None
+            if p is not None:
+                healthy.append(p)
+            alarms += axes.get(axis, {}).get("state") in ("changed", "fault")
+        for severity in SEVERITIES[1:]:
+            axis = by_severity[severity][0].get(bad, {})
+            faulty[severity].append(1.0 if axis.get("p_value") is None else axis["p_value"])
+            found[severity] += axis.get("state") in ("changed", "fault")
+    scores = ",".join(f"{auc(healthy, faulty[s]):.3f}" for s in faulty) if healthy else ","
+    shares = ",".join(f"{found[s]}/{len(results)}" for s in found)
+    n_axes = len(AXES) * n_seeds
+    return f"{speed:g},{rate:g},{n_axes},{n_unjudged},{n_failed},{alarms},{scores},{shares}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,57 @@
+"""The course of a current, and what a slow reported current says of itself."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.signal.course import mean_course
+from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.reported import fluctuation_frequency, signed_by_speed
+
+
+@pytest.mark.parametrize(("n", "parts"), [(64, 8), (65, 8), (7, 8), (100, 33)])
+def test_every_sample_counts_once_in_equal_parts(n, parts):
+    x = np.random.default_rng(n).normal(size=n)
+    m = min(parts, n // 2)
+    edges = [-(-k * n // m) for k in range(m + 1)]
+    slow = [x[a:b].mean() for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    np.testing.assert_allclose(mean_course(x, parts), slow)
+
+
+def test_unknown_samples_are_passed_over_and_a_part_without_any_is_unknown():
+    x = np.arange(8.0)
+    x[[0, 4, 5]] = np.nan
+    np.testing.assert_array_equal(mean_course(x, 4), [1.0, 2.5, np.nan, 6.5])
+    assert not mean_course(x[:1], 4).size
+
+
+@pytest.mark.parametrize("frequency_hz", [0.8, 2.0, 5.0])
+def test_fluctuations_tell_their_frequency(frequency_hz):
+    time = np.arange(400) / 50
+    x = 3 + 0.2 * time + np.sin(2 * np.pi * frequency_hz * time)
+    assert fluctuation_frequency(x, 50.0) == pytest.approx(frequency_hz, rel=0.3)
+
+
+def speed_and_friction(load):
+    v = np.concatenate([np.zeros(50), np.ones(100), np.zeros(50), -np.ones(100), np.zeros(50)])
+    return v, 0.8 * np.sign(v) + 0.1 * v + load
+
+
+def test_an_unsigned_current_gets_its_sign_from_the_speed():
+    v, current = speed_and_friction(0.0)
+    np.testing.assert_allclose(signed_by_speed(np.abs(current), v), current)
+    v, current = speed_and_friction(0.3)
+    found = signed_by_speed(np.abs(current), v)
+    np.testing.assert_allclose(found[v != 0], current[v != 0])
+
+
+@pytest.mark.parametrize("load", [0.0, 3.0, -3.0])
+def test_a_current_that_has_its_sign_keeps_it(load):
+    v, current = speed_and_friction(load)
+    assert signed_by_speed(current, v) is None
+
+
+def test_a_current_that_rests_at_zero_is_not_clipped():
+    rng = np.random.default_rng(0)
+    x = np.concatenate([np.zeros(500), np.abs(rng.normal(1, 0.2, 500))])
+    assert clipped_share(x) == 0.0
+    assert clipped_share(np.minimum(x, 1.0)) > 0.1
