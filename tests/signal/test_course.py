@@ -1,5 +1,7 @@
 """The course of a current, and what a slow reported current says of itself."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ def test_every_sample_counts_once_in_equal_parts(n, parts):
     x = np.random.default_rng(n).normal(size=n)
     m = min(parts, n // 2)
     edges = [-(-k * n // m) for k in range(m + 1)]
-    slow = [x[a:b].mean() for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    slow = [x[a:b].mean() for a, b in pairwise(edges)]
     np.testing.assert_allclose(mean_course(x, parts), slow)
 
 
