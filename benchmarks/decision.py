@@ -343,7 +343,9 @@ def feature_table(stored, axis: int, run: str, motions: list[int]) -> NDArray[np
     Cycles in which a motion was not found are left out.
     """
     rows = {(c, m): f for c, m, f in stored["rivals"][run, axis]["features"]}
-    table = of_runs(stored["tables"]["patterns"], [run], axis).select(["cycle", "motion", "order", "counts"])
+    table = of_runs(stored["tables"]["patterns"], [run], axis).select(
+        ["cycle", "motion", "order", "counts"]
+    )
     entropies: dict[tuple[int, int], list[float]] = {}
     for row in table.to_pylist():
         entropy = rivals.permutation_entropy(np.array(row["counts"], dtype=np.float64))
