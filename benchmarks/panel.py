@@ -4,10 +4,10 @@
         [--without-source NAME] [--contestants loop,plain,beam] [--sizes 0.6,1.5] [--effects none]
         [--strokes cyclic] [--sensing position] [--without RULE] [--jobs 1] [--limit 120]
         [--out benchmarks/out/panel.json] [--compare benchmarks/panel/departure.json]
-    python benchmarks/panel.py --show benchmarks/out/panel.json
+    python benchmarks/panel.py --show benchmarks/out/panel.json [--keep FILE] [--write]
 
 A row is a recording and what was hidden in it; every contestant closes it in a child of its own.
-Each seals its own third or quarter of the motion, so both errors are given. Sources: measured,
+Each seals other parts of the motion, so both errors are given. Sources: measured,
 testbed, smooth (the tests' simulator), algebraic, two-mass. Sizes, rates and strokes take turns
 over effects and seeds; five seeds hold every effect at every size. One seed has some 140 rows.
 `--compare` lays an earlier result of the same seeds beside this one as a further contestant.
@@ -19,6 +19,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 # One contestant has one core, or times could not be compared.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -34,6 +35,9 @@ SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "algebraic": formulas.algebraic_cases,
     "two-mass": two_mass_cases.cases,
 }
+
+
+BEGIN, END = "<!-- panel: begin -->", "<!-- panel: end -->"
 
 
 def listed(text: str) -> tuple[str, ...]:
@@ -71,6 +75,33 @@ def compared(rows: list[run.Row], file: Path) -> list[str]:
     return [f"loop ({file.stem})"]
 
 
+def keep(file: Path, rows: list[run.Row], names: list[str]) -> None:
+    """Write a row per line, without parameters, numbers to four digits."""
+
+    def short(value: Any) -> Any:
+        if isinstance(value, float):
+            return float(f"{value:.4g}")
+        if isinstance(value, dict):
+            return {key: short(part) for key, part in value.items() if key != "parameters"}
+        return [short(part) for part in value] if isinstance(value, list) else value
+
+    lines = ",\n".join(json.dumps(short(row), ensure_ascii=False) for row in rows)
+    start = json.dumps({"contestants": names})[:-1]
+    file.write_text(f'{start}, "rows": [\n{lines}\n]}}\n', encoding="utf-8")
+
+
+def document(rows: list[run.Row], names: list[str]) -> None:
+    """Put measured joints row by row, and the rest in sums, into docs/validation.md."""
+    path = Path(__file__).parents[1] / "docs" / "validation.md"
+    before, rest = path.read_text(encoding="utf-8").split(BEGIN)
+    measured_rows = [table.line(row, names) for row in rows if row["hidden"] is None]
+    section = [table.head(names), *measured_rows, "", table.total(rows, names), "",
+               table.summary(rows, names), "", table.by_size(rows, names)]  # fmt: skip
+    path.write_text(
+        before + "\n".join([BEGIN, "", *section, "", END]) + rest.split(END)[1], encoding="utf-8"
+    )
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -90,6 +121,8 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path(__file__).parent / "out" / "panel.json")
     parser.add_argument("--compare", type=Path, help="an earlier JSON of the same seeds")
     parser.add_argument("--show", type=Path, help="print the tables of a JSON, run nothing")
+    parser.add_argument("--keep", type=Path, help="write the rows shortened, to stay as a JSON")
+    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
     parser.add_argument("--list", action="store_true", help="print the cases, run nothing")
     arguments = parser.parse_args()
     names = list(listed(arguments.contestants))
@@ -114,7 +147,12 @@ def main() -> None:
     if arguments.show or arguments.compare:
         print(table.head(names), *(table.line(row, names) for row in rows), sep="\n")
     print(f"\n{table.summary(rows, names)}\n\n{table.by_size(rows, names)}\n")
+    print(table.total(rows, names))
     print(f"{len(rows)} rows, {time.time() - began:.0f} s")
+    if arguments.keep:
+        keep(arguments.keep, rows, names)
+    if arguments.write:
+        document(rows, names)
 
 
 def write(arguments: argparse.Namespace, rows: list[run.Row], names: list[str]) -> None:
