@@ -95,7 +95,8 @@ def total(rows: Sequence[Row], names: Sequence[str]) -> str:
     if not served:
         return ""
     sums = ", ".join(
-        f"{name} {sum(column):.3f}" for name, column in zip(names, zip(*served), strict=True)
+        f"{name} {sum(column):.3f}"
+        for name, column in zip(names, zip(*served, strict=True), strict=True)
     )
     return f"Sealed errors summed over {len(served)} of {len(errors)} measured rows, A: {sums}."
 
