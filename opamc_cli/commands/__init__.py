@@ -6,6 +6,7 @@ import typer
 
 from opamc_cli.commands import (
     config,
+    decide,
     diagnose,
     example,
     identify,
@@ -28,6 +29,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "score": score.score,
     "report": report.report,
     "diagnose": diagnose.diagnose,
+    "decide": decide.decide,
     "sweep": sweep.sweep,
     "select": select.select,
     "simulate": simulate.simulate,

@@ -73,3 +73,19 @@ def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
     if kind == "map":
         return load_map(file, overrides)
     return load_joint_model(file, overrides)
+
+
+@app.command()
+def schema(
+    document: Annotated[str, typer.Argument(metavar="verdict|loop", help="Which document.")],
+) -> None:
+    """Print the JSON schema of verdict.json or loop.json."""
+    from importlib import resources
+
+    from opamc_cli.errors import UsageError
+
+    name = f"{document.removesuffix('.json')}.schema.json"
+    if name not in ("verdict.schema.json", "loop.schema.json"):
+        msg = f"schema {document}: write verdict or loop"
+        raise UsageError(msg)
+    typer.echo(resources.files("opamc_cli.schemas").joinpath(name).read_text("utf-8"), nl=False)

@@ -8,7 +8,7 @@ from typing import Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, OpamcError
-from opamc_cli.stages import cause, chain, report, score, verdict
+from opamc_cli.stages import cause, chain, findings, report, score, verdict
 from opamc_cli.stages.agreement.common import far_together
 from opamc_cli.stages.agreement.compare import Agreement
 from opamc_cli.stages.agreement.duplicates import repeated
@@ -27,6 +27,7 @@ FILES = (
     verdict.FILE_NAME,
     report.FILE_NAME,
     *score.FILES,
+    findings.FILE_NAME,
     *(f"{role}/{name}" for role in ("baseline", "target") for name in chain.FILES),
 )
 """What a diagnosis leaves in its folder; the verdict vouches for the others."""
@@ -183,6 +184,7 @@ def _diagnose(
         named = with_reasons(judged, {**far_together(judged), **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
+    findings.write_findings(out, findings.Findings(causes, unjudged.axes))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
     healthy = all(entry["state"] == "healthy" for entry in written.verdict["axes"])

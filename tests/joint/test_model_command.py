@@ -1,8 +1,10 @@
 """`opamc model` on run files, and what it says where it cannot."""
 
 import json
+from importlib import resources
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -57,7 +59,11 @@ def close(folder, *more, model=None):
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):
     assert close(folder, "--axis", "1") == 0
     shown = capsys.readouterr().out
-    loop = json.loads((folder / "out" / "loop.json").read_text())["axes"][0]
+    written = json.loads((folder / "out" / "loop.json").read_text())
+    text = resources.files("opamc_cli.schemas").joinpath("loop.schema.json").read_text("utf-8")
+    jsonschema.Draft202012Validator.check_schema(json.loads(text))
+    jsonschema.validate(written, json.loads(text))
+    loop = written["axes"][0]
     assert loop["axis"] == 1
     assert loop["declared"] == ["inertia", "gravity", "coulomb", "viscous"]
     assert loop["verdict"] == "closed"

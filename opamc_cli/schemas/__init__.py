@@ -1,0 +1,1 @@
+"""JSON schemas of what programs read: verdict.json and loop.json."""
