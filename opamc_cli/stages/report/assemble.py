@@ -27,7 +27,7 @@ from opamc_cli.stages.report.focus import by_severity, choose_focus
 from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs, read_inputs
 from opamc_cli.stages.report.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.provenance import provenance
-from opamc_cli.stages.report.views import axis_view, compared, headline, loop_view
+from opamc_cli.stages.report.views import axis_view, compared, heading, headline, loop_view
 from opamc_cli.storage.atomic import write_text
 
 FILE_NAME = "report.html"
@@ -134,7 +134,9 @@ def render(inputs: ReportInputs, title: str, figures: bool = True) -> tuple[str,
         title=title,
         styles=custom_properties() + "\n" + _resource("report.css"),
         headline=headline(inputs),
-        rows=[views[axis] for axis in sorted(views)],
+        heading=heading(inputs, title),
+        known=[str(note) for note in (inputs.verdict or {}).get("notes", ())],
+        rows=list(views.values()),
         attention=[v for axis, v in views.items() if inputs.state(axis) not in (None, "healthy")],
         compared=compared(inputs) if views else [],
         evidence=evidence,

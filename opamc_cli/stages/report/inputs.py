@@ -135,6 +135,18 @@ class ReportInputs:
         named = {int(entry["axis"]) for entry in (self.verdict or {}).get("axes", ())}
         return sorted(named | set(self.axes))
 
+    @property
+    def unit(self) -> str:
+        """Unit of the current: "A", or "Nm" where a torque stands for it."""
+        units = {s.info.current_unit for tables in self.roles.values() for s in tables.sources}
+        units |= {str(entry.get("unit", "A")) for entry in (self.loop or {}).get("axes", ())}
+        return "Nm" if units == {"Nm"} else "A"
+
+    @property
+    def quantity(self) -> str:
+        """What the current is called: "current (A)" or "torque (Nm)"."""
+        return "torque (Nm)" if self.unit == "Nm" else "current (A)"
+
     def axis_verdict(self, axis: int) -> Mapping[str, Any] | None:
         """Return what the verdict says of an axis, if anything."""
         for entry in (self.verdict or {}).get("axes", ()):

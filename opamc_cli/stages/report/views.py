@@ -29,13 +29,30 @@ def headline(inputs: ReportInputs) -> str:
     return "No verdict yet"
 
 
+def heading(inputs: ReportInputs, title: str) -> str:
+    """Return what stands above the headline: title, robot and the target's days."""
+    verdict = inputs.verdict or {}
+    robots = {s.info.robot for role in ROLES for s in inputs.roles[role].sources if s.info.robot}
+    robot = verdict.get("robot") or (robots.pop() if len(robots) == 1 else None)
+    days = wording.day_span(verdict.get("target") or {})
+    return " · ".join(part for part in (title, robot, days) if part)
+
+
 def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
     """Return what the page says of one axis."""
     entry = inputs.axis_verdict(axis) or {}
     features = dict(pooled_features(inputs, axis, focus.order[axis]) or {})
     features.update({k: v for k, v in (entry.get("features") or {}).items() if v is not None})
+    elsewhere = wording.said_elsewhere(entry)
+    reasons = [str(reason) for reason in entry.get("reasons", ())]
     return {
         "axis": axis,
+        "inspect": wording.inspection(entry),
+        "likely": wording.likely_cause(entry),
+        "chance": wording.chance_phrase(entry, len((inputs.verdict or {}).get("axes", ()))),
+        "distance": wording.distance_phrase(entry),
+        "why": [reason for reason in reasons if reason not in elsewhere],
+        "more": [str(why) for why in (entry.get("cause") or {}).get("why", ())],
         "state": entry.get("state", "not judged"),
         "health_index": entry.get("health_index"),
         "p_value": entry.get("p_value"),
@@ -43,7 +60,7 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
         "features": features,
         "cause": wording.cause_phrase(entry.get("cause")),
         "effect": wording.effect_phrase(entry["cause"]) if entry.get("cause") else "–",
-        "reasons": [str(reason) for reason in entry.get("reasons", ())],
+        "reasons": reasons,
         "advice": wording.advice(entry),
         "since": _since(find_onset(inputs, axis, focus.order[axis])),
     }
@@ -86,6 +103,7 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
     """
     return {
         "axis": int(entry["axis"]),
+        "unit": entry.get("unit", "A"),
         "summary": wording.loop_phrase(entry.get("verdict")),
         "declared": ", ".join(map(str, entry.get("declared", ()))),
         "sealed": ", ".join(map(str, entry.get("sealed", ()))),

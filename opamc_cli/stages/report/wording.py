@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
+from opamc_cli.stages.reasons import CHECK_FIRST, FOUND, INSPECT
+
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
 
 
@@ -28,6 +30,18 @@ def by_state(verdict: Mapping[str, Any]) -> dict[str, list[int]]:
         for state in STATE_ORDER
         if (found := [int(a["axis"]) for a in axes if a.get("state") == state])
     }
+
+
+def day_span(side: Mapping[str, Any]) -> str | None:
+    """Return the days of a side's recordings, None where they are not known.
+
+    Parameters
+    ----------
+    side
+        The verdict's `baseline` or `target`.
+    """
+    days = [str(side[key])[:10] for key in ("from", "to") if side.get(key)]
+    return " to ".join(dict.fromkeys(days)) or None
 
 
 def headline(verdict: Mapping[str, Any]) -> str:
@@ -71,6 +85,116 @@ def p_phrase(value: object) -> str:
     """Return what follows the letter p in a sentence."""
     text = p_value(value)
     return {"–": "unknown"}.get(text, text if text.startswith("<") else f"= {text}")
+
+
+def chance_phrase(entry: Mapping[str, Any], n_axes: int) -> str:
+    """Return how likely chance alone would do it, "less than 1 in 10 000" at the least.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    n_axes
+        Joints that were judged beside each other.
+    """
+    p = entry.get("p_adjusted", entry.get("p_value"))
+    if not isinstance(p, int | float) or not math.isfinite(p):
+        return "by chance: not known"
+    if p < 1e-4:
+        likely = "less than 1 in 10\u00a0000"
+    elif p < 0.1:
+        odds = float(f"{1 / p:.2g}")
+        likely = f"about 1 in {odds:,.0f}".replace(",", "\u00a0")
+    else:
+        likely = f"{p:.0%}"
+    return f"by chance: {likely}" + (", all joints considered" if n_axes > 1 else "")
+
+
+def distance_phrase(entry: Mapping[str, Any]) -> str | None:
+    """Return how far a joint is from its baseline, None where that is not known.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
+    ratio = (entry.get("distance") or {}).get("ratio")
+    if not isinstance(ratio, int | float) or not math.isfinite(ratio):
+        return None
+    times = f"{ratio:.0f}" if ratio >= 10 else f"{ratio:.2g}"
+    return f"differs {times} times as much as healthy recordings differ among themselves"
+
+
+def share_phrase(cause: Mapping[str, Any]) -> str | None:
+    """Return what a cause leaves unexplained."""
+    share = cause.get("explained", cause.get("share"))
+    if not isinstance(share, int | float) or isinstance(share, bool):
+        return None
+    left = max(1 - share, 0.0)
+    return f"explains {share:.0%} of the change; {left:.0%} remains unexplained"
+
+
+def inspection(entry: Mapping[str, Any]) -> str | None:
+    """Return what to look at first.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
+    state, cause = entry.get("state"), entry.get("cause")
+    if state not in ("changed", "fault"):
+        return None
+    if not cause:
+        return INSPECT
+    meaning, told, action = _meaning(cause)
+    first = action[:1].upper() + action[1:] if told else f"Look for {meaning}"
+    if cause.get("harmless") or cause.get("origin", "joint") != "joint":
+        return f"{first}; do that before opening the gear."
+    return (
+        f"{first}; after that the rest of the strain wave gear, brake, motor connector and "
+        "current sensor."
+    )
+
+
+def likely_cause(entry: Mapping[str, Any]) -> list[str]:
+    """Return what probably changed, how much of it that explains, and what it may be instead.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
+    cause = entry.get("cause")
+    if not cause:
+        return []
+    named = f"{_meaning(cause)[0]}, by {effect_phrase(cause)}"
+    told = [share_phrase(cause) or ""]
+    ties = [str(tie) for tie in cause.get("ties", ())]
+    if ties:
+        told.append(f"the recordings cannot tell it from {', '.join(ties)}")
+    return [named[:1].upper() + named[1:], *(each for each in told if each)]
+
+
+def _meaning(cause: Mapping[str, Any]) -> tuple[str, bool, str]:
+    """Return what a cause means, whether its reading says what to do, and that."""
+    text = str(cause.get("interpretation") or cause.get("effect"))
+    meaning, mark, action = text.rpartition(": ")
+    return (meaning, True, action) if mark else (text, False, "")
+
+
+def said_elsewhere(entry: Mapping[str, Any]) -> set[str]:
+    """Return the reasons of a joint that its card says under another heading.
+
+    Parameters
+    ----------
+    entry
+        One object of the verdict's `axes`.
+    """
+    cause = entry.get("cause") or {}
+    meaning = cause.get("interpretation") or cause.get("effect")
+    fixed = {FOUND.format(meaning), CHECK_FIRST.format(meaning), INSPECT}
+    return fixed | {str(why) for why in cause.get("why", ())}
 
 
 def moment(iso: str) -> str:
@@ -218,14 +342,15 @@ def remains(entry: Mapping[str, Any]) -> str:
     entry
         One object of loop.json's `axes`.
     """
+    unit = entry.get("unit", "A")
     after = (entry.get("after") or {}).get("rmse_a")
     floor = entry.get("floor_a")
     share = entry.get("explained_share")
     parts = []
     if isinstance(after, int | float):
-        parts.append(f"the sealed error is {number(after)} A")
+        parts.append(f"the sealed error is {number(after)} {unit}")
     if isinstance(floor, int | float):
-        parts.append(f"{number(floor)} A of it does not repeat and cannot be modelled")
+        parts.append(f"{number(floor)} {unit} of it does not repeat and cannot be modelled")
     if isinstance(share, int | float):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
     domains = [

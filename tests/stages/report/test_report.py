@@ -130,11 +130,13 @@ def test_the_verdict_comes_first_and_says_where_why_and_what_to_do(page: str) ->
     words = _Page(page).words()
     expected = [
         "Axis 3 at fault; the other 2 axes healthy",
-        "How sure p < 0.0001",
+        "Inspect first Look for flexspline tooth damage",
+        "Likely cause Flexspline tooth damage",
+        "explains 83% of the change; 17% remains unexplained",
+        "How sure By chance: less than 1 in 10 000, all joints considered",
         "Since when 24 of 24 target segments",
         "the first in run fault-0 (begun 2026-03-10 06:00 UTC), cycle 0",
         "order 5: mean divergence 0.31",
-        "explains 83 % of the change",
         "Divergence of every segment",
         "What the model of axis 3 lacked",
         "Provenance",

@@ -46,7 +46,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         panels[1].set_title("Close-up of the shaded part, where they differ most")
         _window_bar(panels[1], start, window_s)
         for panel in panels:
-            panel.set_ylabel("envelope (A)")
+            panel.set_ylabel(f"envelope ({inputs.unit})")
             panel.margins(x=0.0)
         panels[1].set_xlabel("time from the start of the reference segment (s)")
         drawing.legend(loc="outside upper right", ncols=2)

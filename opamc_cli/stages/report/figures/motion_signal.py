@@ -106,7 +106,7 @@ def _draw_phases(
     tfs = temporal_fine_structure(vector, min(config.noise_floor * noise_level(vector), loudest_a))
     frames = motion_frames(tfs, band, rate, step, config.engine)
     _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
-    panels[0].set_ylabel("current (A)")
+    panels[0].set_ylabel(inputs.quantity)
     _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")
     for threshold in (config.threshold_on, config.threshold_off):
         panels[1].axhline(threshold, color=colour("muted"), linewidth=0.7, dashes=(4, 3))
@@ -137,7 +137,7 @@ def _draw_reported(
         raise NothingToDrawError(msg)
     read = run.read([channels.current, motion], start, stop)
     _trace(panels[0], read[channels.current], start / rate, 1.0 / rate, "muted")
-    panels[0].set_ylabel("current (A)")
+    panels[0].set_ylabel(inputs.quantity)
     _trace(panels[1], read[motion], start / rate, 1.0 / rate, "baseline")
     panels[1].set_ylabel("speed (rad/s)" if channels.velocity else "angle (rad)")
     return "Above: reported current. Below: the joint's motion, by which the segments were found."

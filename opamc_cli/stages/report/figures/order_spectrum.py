@@ -46,7 +46,7 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
                 fontweight="bold",
             )
         panel.set_xlabel("order (cycles per revolution)")
-        panel.set_ylabel("amplitude (A)")
+        panel.set_ylabel(f"amplitude ({inputs.unit})")
         panel.set_ylim(0.0, 1.15 * highest if highest > 0 else 1.0)
         panel.margins(x=0.01)
         panel.legend(loc="upper right", ncols=2)

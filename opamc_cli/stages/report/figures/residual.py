@@ -32,32 +32,34 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
         drawing = canvas(4.4)
         layout = drawing.add_gridspec(2, 2)
         over_time = drawing.add_subplot(layout[0, :])
-        _over_time(over_time, rows)
+        _over_time(over_time, rows, inputs.unit)
         for place, (column, label) in enumerate(
             (("position_rad", "joint angle (rad)"), ("velocity_rad_s", "joint speed (rad/s)"))
         ):
             panel = drawing.add_subplot(layout[1, place])
-            _over_quantity(panel, rows, column, label)
+            _over_quantity(panel, rows, column, label, inputs.unit)
         handles, labels = over_time.get_legend_handles_labels()
         drawing.legend(handles, labels, loc="outside upper right", ncols=2)
         rms = {name: _rms(rows[column]) for name, column, _ in SERIES}
         over_time.set_title(
-            f"Axis {axis} · RMS {rms['before']:.3g} A before, {rms['after']:.3g} A after"
+            f"Axis {axis} · RMS {rms['before']:.3g} {inputs.unit} before, "
+            f"{rms['after']:.3g} {inputs.unit} after"
         )
         return finish(
             drawing,
             f"residual-{axis}",
             f"Residual of axis {axis} before and after",
-            "Measured less modelled current of the sealed recordings, with the declared effects "
-            "(before) and with those that the loop added (after). Above: the range of every "
-            "stretch of time, one recording after the other. Below: its RMS where the joint was "
-            "and how fast it moved.",
-            f"Residual current of axis {axis}: RMS {rms['before']:.3g} ampere before and "
-            f"{rms['after']:.3g} ampere after the loop, over time, joint angle and joint speed.",
+            f"Measured less modelled {inputs.quantity.partition(' ')[0]} of the sealed "
+            "recordings, with the declared effects (before) and with those that the loop added "
+            "(after). Above: the range of every stretch of time, one recording after the other. "
+            "Below: its RMS where the joint was and how fast it moved.",
+            f"Residual of axis {axis}: RMS {rms['before']:.3g} {inputs.unit} before and "
+            f"{rms['after']:.3g} {inputs.unit} after the loop, over time, joint angle and joint "
+            "speed.",
         )
 
 
-def _over_time(panel: Axes, rows: Columns) -> None:
+def _over_time(panel: Axes, rows: Columns, unit: str) -> None:
     size = -(-rows["time_s"].size // N_STRETCHES)
     for name, column, role in SERIES:
         low, high = _ranges(rows[column], size)
@@ -67,7 +69,7 @@ def _over_time(panel: Axes, rows: Columns) -> None:
             time, low, high, color=colour(role), alpha=0.75, linewidth=0.3, label=name, step="mid"
         )
     panel.set_xlabel("recorded time, one recording after the other (s)")
-    panel.set_ylabel("residual (A)")
+    panel.set_ylabel(f"residual ({unit})")
     panel.margins(x=0.0)
 
 
@@ -87,11 +89,11 @@ def _ranges(
     return np.minimum.reduceat(clean, starts), np.maximum.reduceat(clean, starts)
 
 
-def _over_quantity(panel: Axes, rows: Columns, column: str, label: str) -> None:
+def _over_quantity(panel: Axes, rows: Columns, column: str, label: str, unit: str) -> None:
     x = rows[column].astype(np.float64)
     known = np.isfinite(x)
     panel.set_xlabel(label)
-    panel.set_ylabel("RMS (A)")
+    panel.set_ylabel(f"RMS ({unit})")
     if np.unique(x[known]).size < 2:
         panel.text(0.5, 0.5, "not recorded", ha="center", transform=panel.transAxes)
         return

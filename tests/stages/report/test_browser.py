@@ -1,0 +1,145 @@
+"""The report in a browser: on a desk and in a hand, by day and by night."""
+
+import html
+import json
+import re
+import shutil
+import subprocess
+
+import output_folder
+import pytest
+
+from opamc_cli.stages import report
+
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), ""
+)
+WIDTHS = (1280, 390)
+LOOK = """
+function look(frame) {
+  const page = frame.contentDocument, root = page.documentElement;
+  const box = (element) => element.getBoundingClientRect();
+  const seen = (element) => box(element).width > 1 && box(element).height > 1;
+  const all = (selector) => [...page.querySelectorAll(selector)];
+  const beyond = (element) => element.scrollWidth > element.clientWidth + 1;
+  return {
+    width: frame.clientWidth,
+    page: root.scrollWidth,
+    paper: frame.contentWindow.getComputedStyle(page.body).backgroundColor,
+    headings: all(".card dt").map((term) => term.textContent),
+    stacked: box(all(".card dt")[0]).bottom <= box(all(".card dd")[0]).top + 1,
+    figures: all("figure svg").map(seen),
+    rows: all("section > .scroll .stack tbody tr").map((row) => row.innerText.trim()),
+    cut: all("section > .scroll").filter(beyond).map((area) => area.getAttribute("aria-label")),
+    unreachable: all(".scroll, .plot, pre").filter((area) => area.tabIndex !== 0).length,
+    scopeless: all("th:not([scope])").length,
+  };
+}
+addEventListener("load", () => {
+  const found = [...document.querySelectorAll("iframe")].map(look);
+  document.body.textContent = "FOUND" + JSON.stringify(found) + "DONE";
+});
+"""
+
+pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> str:
+    out = tmp_path_factory.mktemp("cell") / "out"
+    out.mkdir()
+    output_folder.make(out)
+    output_folder.add_loop(out)
+    verdict = json.loads((out / "verdict.json").read_text())
+    verdict["notes"] = ["payload_kg differs: normal-0 has 0.0, fault-0 2.0"]
+    (out / "verdict.json").write_text(json.dumps(verdict))
+    return report.run(out).path.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module", params=["light", "dark"])
+def looks(request, page, tmp_path_factory) -> list[dict]:
+    """Return what is seen at both widths in one colour scheme."""
+    folder = tmp_path_factory.mktemp("browser")
+    frames = "".join(
+        f'<iframe width="{width}" height="900" style="border:0" '
+        f'srcdoc="{html.escape(page, quote=True)}"></iframe>'
+        for width in WIDTHS
+    )
+    wrapper = folder / "page.html"
+    wrapper.write_text(f"<body>{frames}<script>{LOOK}</script></body>", encoding="utf-8")
+    options = "--headless --no-sandbox --disable-gpu --no-first-run --disable-sync "
+    options += "--disable-background-networking --disable-component-update --dump-dom "
+    options += f"--blink-settings=preferredColorScheme={int(request.param == 'light')} "
+    options += f"--user-data-dir={folder / 'profile'}"
+    command = [BROWSER, *options.split(), wrapper.as_uri()]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    found = re.search(r"FOUND(.*)DONE", html.unescape(ended.stdout))
+    assert found, ended.stderr[-500:]
+    return [{**look, "scheme": request.param} for look in json.loads(found[1])]
+
+
+def test_nothing_sticks_out_or_is_hidden(looks):
+    assert [look["width"] for look in looks] == list(WIDTHS)
+    for look in looks:
+        assert look["page"] <= look["width"]
+        assert look["figures"]
+        assert all(look["figures"])
+        assert look["rows"]
+        assert all(look["rows"])
+    # on a narrow screen rows are cards, none of which needs to be pushed sideways
+    assert looks[1]["cut"] == []
+
+
+def test_a_card_says_first_what_to_do(looks):
+    order = ["Inspect first", "Likely cause", "How sure", "Since when", "Why"]
+    for look in looks:
+        assert look["headings"] == order
+    assert [look["stacked"] for look in looks] == [False, True]
+
+
+def test_a_keyboard_reaches_every_box_and_tables_name_their_headings(looks):
+    for look in looks:
+        assert look["unreachable"] == 0
+        assert look["scopeless"] == 0
+
+
+def test_dark_is_dark(looks):
+    for look in looks:
+        red, green, blue = map(int, re.findall(r"\d+", look["paper"])[:3])
+        assert (red + green + blue < 200) == (look["scheme"] == "dark")
+
+
+def test_notes_are_in_the_page(page: str) -> None:
+    assert "payload_kg differs: normal-0 has 0.0, fault-0 2.0" in page
+
+
+def test_paper_has_no_half_empty_pages(page, tmp_path):
+    """Print it: text and figures fill all pages but the last by more than half."""
+    reader = shutil.which("pdftotext")
+    if reader is None:
+        pytest.skip("no pdftotext on this machine")
+    (tmp_path / "page.html").write_text(page, encoding="utf-8")
+    options = "--headless --no-sandbox --disable-gpu --no-first-run --no-pdf-header-footer"
+    target = tmp_path / "page.pdf"
+    subprocess.run(
+        [
+            BROWSER,
+            *options.split(),
+            f"--user-data-dir={tmp_path / 'profile'}",
+            f"--print-to-pdf={target}",
+            (tmp_path / "page.html").as_uri(),
+        ],
+        capture_output=True,
+        timeout=120,
+        check=True,
+    )
+    boxes = subprocess.run(
+        [reader, "-bbox", str(target), "-"], capture_output=True, text=True, check=True
+    ).stdout
+    filled = []
+    for sheet in boxes.split("<page ")[1:]:
+        height = float(re.search(r'height="([\d.]+)"', sheet)[1])
+        lowest = max((float(y) for y in re.findall(r'yMax="([\d.]+)"', sheet)), default=0.0)
+        filled.append(lowest / height)
+    assert len(filled) > 1
+    assert min(filled[:-1]) > 0.5
