@@ -70,7 +70,10 @@ class Output:
             with console.capture() as captured:
                 for item in shown:
                     console.print(item, soft_wrap=isinstance(item, str))
-            _write(captured.get(), sys.stdout)
+            text = captured.get()
+            if not sys.stdout.isatty():
+                text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+            _write(text, sys.stdout)
 
     def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
         """Print the runs that failed and return the exit code that they make."""

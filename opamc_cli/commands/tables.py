@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from opamc_cli.commands.fitted import FittedTable
+
 if TYPE_CHECKING:
     from rich.console import RenderableType
     from rich.padding import Padding
-    from rich.table import Table
     from rich.text import Text
 
     from opamc_cli.stages.report.inputs import ReportInputs
@@ -41,16 +42,10 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
                 style="dim",
             )
         return title
-    table = _table(
-        "axis",
-        "state",
-        "health index",
-        "p",
-        "corrected",
-        "Δμ",
-        "Δσ²",
-        "KS",
+    table = FittedTable(
+        ("axis", "state", "health index", "p", "corrected", "Δμ", "Δσ²", "KS"),
         right=(0, 2, 3, 4, 5, 6, 7),
+        dropped=("Δσ²", "Δμ", "KS", "p", "health index"),
     )
     for entry in axes:
         features = entry.get("features") or {}
@@ -77,7 +72,9 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
     from opamc_cli.stages.report.focus import choose_focus, pooled_features
 
     focus = choose_focus(inputs)
-    table = _table("axis", "order", "Δμ", "Δσ²", "KS", right=(0, 1, 2, 3, 4))
+    table = FittedTable(
+        ("axis", "order", "Δμ", "Δσ²", "KS"), right=(0, 1, 2, 3, 4), dropped=("Δσ²", "Δμ")
+    )
     for axis in inputs.axes:
         features = pooled_features(inputs, axis, focus.order[axis]) or {}
         table.add_row(
@@ -109,22 +106,20 @@ def loop_table(loop: Mapping[str, Any]) -> "RenderableType":
             Text(
                 printable(
                     f"Model of axis {entry.get('axis')}: {entry.get('verdict')}, sealed error "
-                    f"{wording.number(before)} A before, {wording.number(after)} A after"
+                    f"{wording.number(before)} {entry.get('unit', 'A')} before, "
+                    f"{wording.number(after)} {entry.get('unit', 'A')} after"
                 ),
                 style="bold",
             )
         )
         steps = entry.get("steps", ())
         if steps:
-            table = _table(
-                "step",
-                "effect",
-                "meaning",
-                "gain",
-                "decoy",
-                "A before",
-                "A after",
+            unit = entry.get("unit", "A")
+            table = FittedTable(
+                ("step", "effect", "meaning", "gain", "decoy", f"{unit} before", f"{unit} after"),
                 right=(0, 3, 4, 5, 6),
+                dropped=("decoy", "gain", "meaning"),
+                wraps=("effect", "meaning"),
             )
             for number, step in enumerate(steps, start=1):
                 table.add_row(
@@ -180,13 +175,3 @@ def _state(state: str) -> "Text":
 
 def _style(state: str) -> str:
     return STYLES.get(state, STYLES["unknown"])
-
-
-def _table(*headings: str, right: tuple[int, ...]) -> "Table":
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for place, heading in enumerate(headings):
-        table.add_column(heading, justify="right" if place in right else "left")
-    return table

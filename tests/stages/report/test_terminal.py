@@ -1,3 +1,4 @@
+import io
 import json
 from io import StringIO
 from pathlib import Path
@@ -107,3 +108,42 @@ def test_report_of_no_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
     assert ended.value.code == 3
     assert "nowhere: no such folder" in capsys.readouterr().err
     assert not (tmp_path / "nowhere").exists()
+
+
+@pytest.mark.parametrize("width", [40, 60, 79, 100, 140])
+def test_a_narrow_terminal_leaves_out_columns_and_never_digits(width: int) -> None:
+    from rich.console import Console
+
+    from opamc_cli.commands.tables import verdict_table
+
+    axes = [
+        {
+            "axis": axis,
+            "state": state,
+            "health_index": 113.673,
+            "p_value": 0.0123,
+            "p_adjusted": 0.0369,
+            "features": {"delta_mu": -0.00061, "delta_var": -1.94e-6, "ks": 0.125},
+            "reasons": [],
+        }
+        for axis, state in ((1, "insufficient-data"), (2, "fault"))
+    ]
+    console = Console(width=width, record=True, file=io.StringIO())
+    console.print(verdict_table({"axes": axes}))
+    shown = console.export_text()
+    assert "…" not in shown
+    rows = [line for line in shown.splitlines() if "✕" in line]
+    assert len(rows) == 1
+    assert "0.037" in rows[0]
+    assert ("−1.94e−6" in shown) == (width >= 100)
+
+
+def test_piped_text_has_no_trailing_blanks(capsys) -> None:
+    from opamc_cli.commands.output import Output
+    from opamc_cli.commands.tables import verdict_table
+
+    axes = [{"axis": 1, "state": "fault", "reasons": ["It has changed. " * 20]}]
+    Output().result({}, verdict_table({"axes": axes}), "a line")
+    shown = capsys.readouterr().out
+    assert shown.endswith("a line\n")
+    assert not [line for line in shown.splitlines() if line != line.rstrip()]
