@@ -64,12 +64,14 @@ def all_cases(arguments: argparse.Namespace) -> Iterator[Case]:
 
 def compared(rows: list[run.Row], file: Path) -> list[str]:
     """Lay earlier results beside these rows, where source and name agree; return their names."""
-    earlier = {
-        (row["source"], row["name"], row["size"]): row["results"]
-        for row in json.loads(file.read_text(encoding="utf-8"))["rows"]
-    }
+
+    def key(row: run.Row) -> tuple[Any, ...]:
+        return tuple(row[part] for part in ("source", "stroke", "sensing", "name", "size"))
+
+    kept = json.loads(file.read_text(encoding="utf-8"))["rows"]
+    earlier = {key(row): row["results"] for row in kept}
     for row in rows:
-        for name, result in earlier.get((row["source"], row["name"], row["size"]), {}).items():
+        for name, result in earlier.get(key(row), {}).items():
             if name == "loop":
                 row["results"][f"{name} ({file.stem})"] = result
     return [f"loop ({file.stem})"]

@@ -39,7 +39,11 @@ UNITS: dict[str, tuple[float, dict[str, float]]] = {
 
 
 def cases(seed: int, wanted: Wanted) -> Iterator[Case]:
-    """Every axis and speed, once as it is and once with an effect; 100 Hz and phases in turn."""
+    """Every axis and speed, once as it is and once with an effect; 100 Hz and phases in turn.
+
+    Last the program of configs/testbed.yaml on axes 1 and 5 with a large ripple, which a drive
+    answers with another size and phase at every speed.
+    """
     names = list(UNITS)
     for axis in range(1, 7):
         for k, speed in enumerate(SPEEDS):
@@ -49,30 +53,40 @@ def cases(seed: int, wanted: Wanted) -> Iterator[Case]:
             effect = names[(place + 5 * seed) % len(names)]
             for hidden in ("", effect):
                 size = wanted.turn(place + seed) if hidden else None
-                gear = CONFIG.robot.joints[axis - 1]
-                yield Case(
-                    "testbed",
-                    f"axis {axis} {speed:g}% {rate_hz:g} Hz {hidden or 'none'}",
-                    "cyclic",
-                    sensing,
-                    RIGID,
-                    hidden,
-                    partial(record, axis, speed, rate_hz, hidden, size or 0.0, seed, sensing),
-                    PRESENT,
-                    size,
-                    (gear.gear.ratio, gear.motor.pole_pairs) if axis % 2 else None,
-                    seed,
-                )
+                yield _case("cyclic", axis, speed, rate_hz, hidden, size, seed, sensing)
+    for axis in (1, 5):
+        size = max(wanted.sizes)
+        yield _case("four cycles", axis, 100.0, 2000.0, "ripple", size, seed, "position")
+
+
+def _case(
+    stroke: str, axis: int, speed: float, rate_hz: float, hidden: str, size: float | None,
+    seed: int, sensing: str,
+) -> Case:  # fmt: skip
+    joint = CONFIG.robot.joints[axis - 1]
+    cycles = 4
+    if stroke == "cyclic":
+        cycles = max(round(SECONDS / (3.0 + 225.0 / speed)), 2)
+    return Case(
+        "testbed",
+        f"axis {axis} {speed:g}% {rate_hz:g} Hz {hidden or 'none'}",
+        stroke,
+        sensing,
+        RIGID,
+        hidden,
+        partial(record, axis, speed, cycles, rate_hz, hidden, size or 0.0, seed, sensing),
+        PRESENT,
+        size,
+        (joint.gear.ratio, joint.motor.pole_pairs) if axis % 2 else None,
+        seed,
+    )
 
 
 def session(
-    axis: int, speed: float, rate_hz: float, effect: Effect | None, seed: int
+    axis: int, speed: float, cycles: int, rate_hz: float, effect: Effect | None, seed: int
 ) -> AxisRecording:
-    """About forty seconds of one axis."""
-    cycle_s = 3.0 + 4.5 * 100.0 / speed / 2.0
-    program = replace(
-        CONFIG.program, axes=(axis,), speed_percent=speed, cycles=max(round(SECONDS / cycle_s), 2)
-    )
+    """Record one axis alone."""
+    program = replace(CONFIG.program, axes=(axis,), speed_percent=speed, cycles=cycles)
     effects = [effect] if effect else []
     made = simulate(
         CONFIG.robot, program, seed=seed, sampling_rate_hz=rate_hz, axes=[axis], effects=effects
@@ -102,7 +116,14 @@ def unexplained(change: Floats, axis_log: AxisRecording, rate_hz: float) -> floa
 
 
 def record(
-    axis: int, speed: float, rate_hz: float, hidden: str, size: float, seed: int, sensing: str
+    axis: int,
+    speed: float,
+    cycles: int,
+    rate_hz: float,
+    hidden: str,
+    size: float,
+    seed: int,
+    sensing: str,
 ) -> list[Logged]:
     """Record an axis; an effect is scaled to so many times the noise of what is logged."""
     effect = None
@@ -110,13 +131,15 @@ def record(
         magnitude, parameters = UNITS[hidden]
         if hidden == "mains_hum" and rate_hz == 100.0:
             parameters = {"frequency_hz": 60.0}
-        whole = session(axis, speed, rate_hz, None, seed)
-        tried = session(axis, speed, rate_hz, Effect(hidden, axis, magnitude, parameters), seed)
+        whole = session(axis, speed, cycles, rate_hz, None, seed)
+        tried = session(
+            axis, speed, cycles, rate_hz, Effect(hidden, axis, magnitude, parameters), seed
+        )
         change = tried.reported_a.astype(float) - whole.reported_a.astype(float)
         left = unexplained(change, whole, rate_hz)
         wanted = size * noise_a(axis, sensing)
         effect = Effect(hidden, axis, magnitude * wanted / max(left, 1e-9), parameters)
-    axis_log = session(axis, speed, rate_hz, effect, seed)
+    axis_log = session(axis, speed, cycles, rate_hz, effect, seed)
     warm = axis_log.temperature_c.astype(float)
     if sensing == "phases":
         return [Logged(rate_hz, phases=axis_log.phases_a.astype(float), temperature=warm)]

@@ -35,7 +35,7 @@ TORQUES = (
 )  # fmt: skip
 """Their current grows with their magnitude, nearly in proportion."""
 SENSORS = ("offset", "mains_hum", "sensor_offset", "sensor_gain")
-SEARCHED = {"elasticity": (40.0, 4.0), "time_delay": (5e-4, 0.08), "dead_time": (0.5, 40.0)}
+SEARCHED = {"elasticity": (40.0, 4.0), "time_delay": (5e-4, 0.08), "dead_time": (0.5, 12.0)}
 """A stiffness (as a resonance, Hz), a delay (s), a dead time (V): from hardly anything to much."""
 EFFECTS = (*TORQUES, "offset", "mains_hum", "elasticity", "time_delay")
 ELECTRICAL = ("sensor_offset", "sensor_gain", "dead_time")
