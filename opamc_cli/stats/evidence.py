@@ -108,30 +108,36 @@ def weigh_together(
     Returns
     -------
     dict of int to SessionDistances
-        Weighted mean of the log distances. A witness weighs the less, the more its distances
-        scatter between sessions, in the middle over all axes; one that lacks a session is left out.
+        Soft maximum of the log distances, each from its own middle and in units of its own scatter
+        between sessions: in the middle over all axes for the scatter, of the axis for the middle.
+        A witness that lacks a session is left out.
 
     Notes
     -----
-    The scatter is that of all sessions, the target among them, by the median absolute deviation:
-    taken from the baseline alone it would favour the witness by which the target is odd, and the
-    target would rank first too often.
+    A fault that one witness sees must not be outvoted by those that do not see it, as in a mean:
+    there each further witness costs all others. Middle and scatter are those of all sessions, the
+    target among them, by median and median absolute deviation: taken from the baseline alone they
+    would favour the witness by which the target is odd, and the target would rank first too often.
     """
     scatter: dict[str, list[float]] = {}
     for kinds in by_axis.values():
         for name, one in kinds.items():
-            scatter.setdefault(name, []).append(_robust_scale(one.each))
+            if one.known:
+                scatter.setdefault(name, []).append(_robust_scale(one.each))
     scale = {name: max(float(np.median(s)), LEAST_SCALE) for name, s in scatter.items()}
     combined = {}
     for axis, kinds in by_axis.items():
-        weight = {name: 1 / scale[name] for name, one in kinds.items() if one.known}
-        weight = {name: w for name, w in weight.items() if w} or {next(iter(kinds)): 1.0}
-        total = sum(weight.values())
-        used = [(w / total, kinds[name]) for name, w in weight.items()]
+        used = {name: one for name, one in kinds.items() if one.known}
+        if len(used) < 2:
+            combined[axis] = next(iter((used or kinds).values()))
+            continue
+        scales = np.array([scale[name] for name in used])
+        middles = np.array([np.median(one.each) for one in used.values()])
         combined[axis] = SessionDistances(
-            np.sum([w * one.own for w, one in used], axis=0),
-            np.sum([w * one.target for w, one in used], axis=0),
-            np.sum([w * one.each for w, one in used], axis=0),
+            *(
+                soft_maximum([getattr(one, part) for one in used.values()], middles, scales)
+                for part in ("own", "target", "each")
+            )
         )
     return combined
 
@@ -149,17 +155,42 @@ def pooled_together(evidence: Sequence[Evidence], is_target: NDArray[np.bool_]) 
     Returns
     -------
     ndarray, shape (R,)
-        Weighted geometric mean; a kind weighs the less, the more it differs between labellings.
+        Soft maximum, as in `weigh_together`, over middle and scatter of all labellings.
     """
     logs = [np.log(np.maximum(one.pooled(is_target), LEAST_RATIO)) for one in evidence]
     logs = [log for log in logs if np.isfinite(log).all()] or logs[:1]
-    weight = 1 / np.array([max(float(np.nanstd(log)), LEAST_SCALE) for log in logs])
-    return np.asarray(np.exp(np.average(logs, axis=0, weights=weight)))
+    if len(logs) < 2:
+        return np.exp(logs[0])
+    scales = np.array([max(_robust_scale(log), LEAST_SCALE) for log in logs])
+    middles = np.array([np.median(log) for log in logs])
+    return np.exp(soft_maximum(logs, middles, scales))
+
+
+def soft_maximum(
+    values: Sequence[FloatArray], middles: FloatArray, scales: FloatArray
+) -> FloatArray:
+    """Log of the mean of the exponentials of standardised values, in the scales' harmonic mean.
+
+    Parameters
+    ----------
+    values : sequence of ndarray, each of one shape
+        By each witness.
+    middles, scales : ndarray, shape (number of witnesses,)
+        Of each.
+
+    Returns
+    -------
+    ndarray
+        Of the values' shape; 0 if all are at their middle.
+    """
+    z = np.array([(v - m) / s for v, m, s in zip(values, middles, scales, strict=True)])
+    largest = z.max(axis=0)
+    mean = np.exp(z - largest).mean(axis=0)
+    return np.asarray((largest + np.log(mean)) / np.mean(1 / scales))
 
 
 def _robust_scale(values: FloatArray) -> float:
-    deviation = np.abs(values - np.median(values))
-    return MAD_TO_SIGMA * float(np.median(deviation)) if np.isfinite(values).all() else np.inf
+    return MAD_TO_SIGMA * float(np.median(np.abs(values - np.median(values))))
 
 
 def log_mean(ratios: FloatArray) -> FloatArray:
