@@ -13,6 +13,7 @@ from opamc_cli.commands.options import (
     Out,
     Overrides,
     Quiet,
+    Verbose,
 )
 from opamc_cli.commands.output import Output
 from opamc_cli.errors import ExitCode
@@ -41,12 +42,13 @@ def decide(
     exit_zero: ExitZero = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Decide again from patterns, spectra and profiles, without the runs; writes verdict.json.
 
     Such as with --set score.false_alarm_rate=0.001. Causes are those that a diagnosis found.
     """
-    from opamc_cli.commands.tables import verdict_table
+    from opamc_cli.commands.tables import verdict_lines, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.stages import decide as stage
     from opamc_cli.storage.lock import output_lock
@@ -57,12 +59,11 @@ def decide(
     own, other = stage.default_tables(out)
     with output_lock(out), result(out, *stage.FILES) as staged:
         outcome = stage.run(baseline or own, target or other, effective, out, staged)
-    for note in outcome.verdict["notes"]:
-        output.note(note)
+    output.notes(outcome.verdict["notes"], verbose)
     path = out / stage.FILES[0]
     output.result(
         {**outcome.verdict, "verdict": str(path)},
-        verdict_table(outcome.verdict),
+        *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
         f"verdict: {path}",
         urgent=outcome.exit_code is not ExitCode.DONE,
     )

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from opamc_cli.commands.options import (
+    ALL_CORES,
     DEFAULT_OUT,
     ConfigFile,
     ExitZero,
@@ -14,6 +15,7 @@ from opamc_cli.commands.options import (
     Out,
     Overrides,
     Quiet,
+    Verbose,
 )
 from opamc_cli.commands.output import Output
 from opamc_cli.errors import ExitCode
@@ -39,13 +41,14 @@ def diagnose(
     out: Out = DEFAULT_OUT,
     config: ConfigFile = None,
     overrides: Overrides = None,
-    jobs: Jobs = 1,
+    jobs: Jobs = ALL_CORES,
     exit_zero: ExitZero = False,
     as_json: Json = False,
     quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
-    from opamc_cli.commands.tables import verdict_table
+    from opamc_cli.commands.tables import verdict_lines, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.stages import diagnose as stage
     from opamc_cli.stages import latent
@@ -63,15 +66,14 @@ def diagnose(
             jobs=jobs,
             progress=progress,
         )
-    for note in outcome.notes:
-        output.note(note)
+    output.notes(outcome.notes, verbose)
     output.result(
         {
             **outcome.verdict,
             "verdict": str(outcome.verdict_path),
             "report": str(outcome.report_path),
         },
-        verdict_table(outcome.verdict),
+        *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
         f"report: {outcome.report_path}",
         urgent=outcome.exit_code is not ExitCode.DONE,
     )

@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from opamc_cli.commands.options import (
+    ALL_CORES,
     DEFAULT_OUT,
     ConfigFile,
     Jobs,
@@ -35,7 +36,7 @@ def identify(
     out: Out = DEFAULT_OUT,
     config: ConfigFile = None,
     overrides: Overrides = None,
-    jobs: Jobs = 1,
+    jobs: Jobs = ALL_CORES,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:

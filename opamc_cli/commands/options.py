@@ -32,6 +32,9 @@ Json = Annotated[
     typer.Option("--json", help="Machine-readable result on stdout, all else on stderr."),
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print nothing unless something is wrong.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", help="Every reason and note, and the table of all axes.")
+]
 ExitZero = Annotated[
     bool, typer.Option("--exit-zero", help="Exit 0 where the verdict alone would make it 1.")
 ]
@@ -45,3 +48,6 @@ MovedRuns = Annotated[
 ]
 
 DEFAULT_OUT = Path("opamc-out")
+
+ALL_CORES = 0
+"""Default of `Jobs`: a night's logs are judged on all cores, a few short ones in this process."""

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -36,6 +37,11 @@ class Output:
         """Print something worth knowing that is not the result."""
         if not self.quiet:
             _write(f"{text}\n", sys.stderr)
+
+    def notes(self, texts: Sequence[str], verbose: bool = False) -> None:
+        """Print notes, those that differ in nothing but the recording and numbers as one."""
+        for text in texts if verbose else folded(texts):
+            self.note(text)
 
     def failure(self, text: str) -> None:
         """Print why one of several runs could not be used."""
@@ -97,3 +103,36 @@ def _write(text: str, stream: TextIO) -> None:
         stream.flush()
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def folded(texts: Sequence[str]) -> list[str]:
+    """Return notes with those that repeat for many runs as one line.
+
+    Examples
+    --------
+    >>> folded(["a.parquet: no ratio", "b.parquet: no ratio", "rate differs"])
+    ['2 runs: no ratio', 'rate differs']
+    >>> folded(["a.parquet: 3 samples lost", "b.parquet: 8 samples lost"])
+    ['a.parquet: 3 samples lost; 1 more run likewise']
+    """
+    groups: dict[str, list[str]] = {}
+    for text in dict.fromkeys(texts):
+        subject, colon, rest = text.partition(": ")
+        if colon and subject.endswith(".parquet"):
+            text_of_all = re.sub(r"[0-9]+", "#", rest)
+        else:
+            text_of_all = re.sub(r"[0-9]+", "#", text) if subject.startswith("axis ") else text
+        groups.setdefault(text_of_all, []).append(text)
+    lines = []
+    for alike in groups.values():
+        more = len(alike) - 1
+        rests = {text.partition(": ")[2] for text in alike}
+        if more and alike[0].startswith("axis "):
+            lines.append(f"{alike[0]} (and {more} more like this)")
+        elif more and len(rests) == 1:
+            lines.append(f"{len(alike)} runs: {rests.pop()}")
+        elif more:
+            lines.append(f"{alike[0]}; {more} more run{'s' if more > 1 else ''} likewise")
+        else:
+            lines.append(alike[0])
+    return lines

@@ -66,6 +66,52 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     return Group(title, Text(), table, Text(), *lines)
 
 
+def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
+    """Return a verdict in few lines: for each joint that is not healthy what, how sure, what to do.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+
+    Returns
+    -------
+    list of Text
+        One line if all is well; a faulty joint has five at most.
+    """
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    unhealthy = [entry for entry in verdict.get("axes", ()) if entry.get("state") != "healthy"]
+    worst = next(iter(wording.by_state(verdict)), "unknown")
+    if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
+        lines = [Text(wording.headline(verdict), style=_style(worst))]
+    else:
+        lines = []  # the one joint's own line says it
+    healthy = len(verdict.get("axes", ())) - len(unhealthy)
+    for entry in unhealthy:
+        known = entry.get("brief")
+        if not known:
+            said = next(iter(entry.get("reasons", ())), wording.advice(entry) or "not judged")
+            lines.append(Text(printable(f"axis {entry.get('axis')}: {said}")))
+            continue
+        others = f"; {healthy} other axes healthy" if len(unhealthy) == 1 and healthy > 1 else ""
+        ratio = (entry.get("distance") or {}).get("ratio")
+        state = {"fault": "at fault"}.get(str(entry.get("state")), str(entry.get("state")))
+        title = Text(f"Axis {entry.get('axis')} {state}", style=_style(str(entry.get("state"))))
+        title.append(
+            f": p {wording.p_phrase(entry.get('p_adjusted'))}, {wording.number(ratio)} times as "
+            f"far from the baseline as a healthy session{others}",
+            style="not bold",
+        )
+        lines.append(title)
+        lines.append(Text(printable(f"  do first: {known['inspect']}")))
+        lines += [Text(printable(f"  seen: {text}")) for text in known["evidence"]]
+        lines.append(Text(printable(f"  against: {known['against']}")))
+    return lines
+
+
 def feature_table(inputs: "ReportInputs") -> "RenderableType":
     """Return the features of every axis, for a folder without a verdict."""
     from opamc_cli.stages.report import wording

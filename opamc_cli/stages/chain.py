@@ -103,11 +103,18 @@ def run_chain(
         patterns=counted.path,
         runs_done=tuple(names),
         errors=(*segmented.errors, *identified.errors, *counted.errors),
-        notes=segmented.notes
-        + counted.notes
-        + tuple(
-            f"{name} axis {axis}: {unidentified} segments fit no motion of the reference cycle"
-            for (name, axis), (_, unidentified) in identified.cycles().items()
-            if unidentified
-        ),
+        notes=(*segmented.notes, *counted.notes, *_unidentified(identified)),
     )
+
+
+def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:
+    """Say, axis by axis, how many segments fit no motion of the reference."""
+    missed: dict[int, list[int]] = {}
+    for (_, axis), (_, unidentified) in identified.cycles().items():
+        if unidentified:
+            missed.setdefault(axis, []).append(unidentified)
+    return [
+        f"axis {axis}: {sum(counts)} segments of {len(counts)} runs fit no motion of the "
+        "reference cycle"
+        for axis, counts in sorted(missed.items())
+    ]

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
+from time import perf_counter
 from typing import Any, Generic, TypeVar
 
 from opamc_cli.errors import OpamcError
@@ -64,11 +65,13 @@ def map_items(
     items
         What it is applied to.
     jobs
-        Number of workers; 0: one per core; 1: this process.
+        Number of workers; 0: one per core, if they are worth their start; 1: this process.
     watch
         Called as items get done.
     """
-    workers = min(jobs or os.cpu_count() or 1, len(items))
+    if jobs == 0:
+        return _as_it_pays(function, items, watch)
+    workers = min(jobs, len(items))
     if workers <= 1:
         return _gather([_Immediate(function, item) for item in items], watch)
     saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
@@ -84,15 +87,51 @@ def map_items(
                 os.environ[name] = value
 
 
+START_S = 6.0
+"""A worker takes some 3 s to start and to load the kernels: two must save more than that."""
+
+
+def _as_it_pays(
+    function: Callable[[Item], Result], items: Sequence[Item], watch: Watch
+) -> Outcome[Result]:
+    """Work on item after item here, until what is left is worth starting workers for."""
+    cores = os.cpu_count() or 1
+    done: list[_Immediate[Item, Result]] = []
+    for k, item in enumerate(items):
+        watch(k, len(items))
+        call = _Immediate(function, item)
+        begun = perf_counter()
+        call.settle()
+        done.append(call)
+        left = items[k + 1 :]
+        # the first item pays for what is loaded once
+        if k and cores > 1 and (perf_counter() - begun) * len(left) > START_S:
+            first = _gather(done, unwatched)
+            rest = map_items(function, left, cores, lambda n, _: watch(len(done) + n, len(items)))
+            return Outcome(first.results + rest.results, first.errors + rest.errors)
+    return _gather(done, watch)
+
+
 class _Immediate(Generic[Item, Result]):
     """A call that is made when its result is asked for."""
 
     def __init__(self, function: Callable[[Item], Result], item: Item) -> None:
         self._function = function
         self._item = item
+        self._settled: list[Result] = []
+        self._error: OpamcError | None = None
+
+    def settle(self) -> None:
+        """Make the call now, and keep what comes of it."""
+        try:
+            self._settled.append(self._function(self._item))
+        except OpamcError as error:
+            self._error = error
 
     def result(self) -> Result:
-        return self._function(self._item)
+        if self._error is not None:
+            raise self._error
+        return self._settled[0] if self._settled else self._function(self._item)
 
 
 def _gather(

@@ -108,11 +108,12 @@ def in_words(baseline: Sessions, target: Sessions) -> list[str]:
                 f"{name}: {len(side.of_run)} runs are {len(side)} "
                 f"session{'' if len(side) == 1 else 's'}, told apart by {' and '.join(kinds)}"
             )
-        if BY_FILE in side.told_by and len(side.of_run) > 1:
-            notes.append(
-                f"{name}: nothing says which runs were recorded together (no session or started_at "
-                "in their metadata, no folders): each is taken for a session of its own"
-            )
+    alone = sum(len(side) for side in (baseline, target) if BY_FILE in side.told_by)
+    if alone > 2:
+        notes.append(
+            "nothing says which runs were recorded together (no session or started_at in their "
+            "metadata, no folders): each is taken for a session of its own"
+        )
     shared = sorted(set(baseline.of_run.values()) & set(target.of_run.values()))
     if shared and set(baseline.told_by) & {BY_SESSION, BY_NIGHT}:
         notes.append(

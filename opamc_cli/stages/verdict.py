@@ -13,6 +13,7 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.brief import brief
 from opamc_cli.stages.cells import bundles
 from opamc_cli.stages.pattern_rows import Key, PatternRows
 from opamc_cli.stages.reasons import reasons
@@ -175,6 +176,7 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
+                "brief": brief(final, bundle, cause),
                 "reasons": reasons(final, bundle, motions, runs, cause),
             }
         )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.stats.divergence import chance_divergence, jensen_shannon
 from opamc_cli.stats.evidence import (
+    LEAST_RATIO,
     Evidence,
     SessionDistances,
     pooled_together,
@@ -216,15 +217,17 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     lone = {
         axis: one_session_log_ratio(cells[axis]) for axis in axes if methods[axis] == "one-session"
     }
-    together = _Comparison(cells, methods, evidence, weigh_together(each), lone, policy)
+    pooled: dict[tuple[int, str], FloatArray] = {}
+    together = _Comparison(cells, methods, evidence, weigh_together(each), lone, policy, pooled)
     alone_by_witness = {
         name: _Comparison(
             cells,
             methods,
             {axis: {name: kinds[name]} for axis, kinds in evidence.items() if name in kinds},
             {axis: kinds[name] for axis, kinds in each.items() if name in kinds},
-            lone if name == PATTERNS else {},
+            {},
             policy,
+            pooled,
         )
         for name in dict.fromkeys([PATTERNS, *(n for kinds in evidence.values() for n in kinds)])
     }
@@ -254,7 +257,9 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             common_log_ratio=common[axis],
             distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
             effects=effects,
-            witnesses={name: one.p_value(axis) for name, one in alone_by_witness.items()},
+            witnesses={PATTERNS: p_values[axis]}
+            if methods[axis] == "one-session"
+            else {name: one.p_value(axis) for name, one in alone_by_witness.items()},
             method=methods[axis],
             n_baseline_sessions=_present(cells[axis], "baseline"),
             n_target_sessions=_present(cells[axis], "target"),
@@ -276,7 +281,9 @@ class _Comparison:
         distances: Mapping[int, SessionDistances],
         lone: Mapping[int, float],
         policy: Policy,
+        pooled: dict[tuple[int, str], FloatArray],
     ) -> None:
+        self._logs = pooled
         self._cells = cells
         self._methods = methods
         self._evidence = evidence
@@ -284,6 +291,7 @@ class _Comparison:
         # a witness that lacks a session has nothing to say by itself
         self._distances = {axis: one for axis, one in distances.items() if one.known}
         self._pooled: dict[int, FloatArray] = {}
+        self._by_cycles: dict[int, float] = {}
         self.shifts = _session_shifts(self._distances)
         self.shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
 
@@ -305,14 +313,15 @@ class _Comparison:
         if self._methods[axis] == "one-session":
             # What exchanging cycles cannot tell from chance is no change, however large it looks.
             # Beyond that the cycles say nothing: they cannot know how much sessions differ.
-            by_cycles = _cycle_p_value(cells, self._policy)
+            if axis not in self._by_cycles:
+                self._by_cycles[axis] = _cycle_p_value(cells, self._policy)
+            by_cycles = self._by_cycles[axis]
             return tail if by_cycles <= CYCLES_DIFFER else max(tail, by_cycles)
         n_baseline, n_target = len(cells[0].baseline), len(cells[0].target)
         if axis not in self._pooled:
-            labels = relabellings(
-                n_baseline, n_target, self._policy.permutations, self._policy.seed
+            self._pooled[axis] = pooled_together(
+                [self._log_pooled(axis, name) for name in self._evidence[axis]]
             )
-            self._pooled[axis] = pooled_together(list(self._evidence[axis].values()), labels)
         values = self._pooled[axis].copy()
         values[0] *= math.exp(-taken_off)
         values = values[np.isfinite(values)]
@@ -320,6 +329,20 @@ class _Comparison:
         # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
         # observed one, the pairs' own tail may go below it, doubled for the second look.
         return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
+
+    def _log_pooled(self, axis: int, name: str) -> FloatArray:
+        """Log distance between the groups under every labelling, computed once a witness."""
+        if (axis, name) not in self._logs:
+            cells = self._cells[axis]
+            labels = relabellings(
+                len(cells[0].baseline),
+                len(cells[0].target),
+                self._policy.permutations,
+                self._policy.seed,
+            )
+            distances = self._evidence[axis][name].pooled(labels)
+            self._logs[axis, name] = np.log(np.maximum(distances, LEAST_RATIO))
+        return self._logs[axis, name]
 
 
 def one_session_log_ratio(cells: Sequence[Cell]) -> float:

@@ -142,28 +142,25 @@ def weigh_together(
     return combined
 
 
-def pooled_together(evidence: Sequence[Evidence], is_target: NDArray[np.bool_]) -> FloatArray:
-    """Distance between two groups of sessions by several kinds of evidence.
+def pooled_together(logs: Sequence[FloatArray]) -> FloatArray:
+    """Distance between two groups of sessions by several witnesses.
 
     Parameters
     ----------
-    evidence : sequence of Evidence
-        Of one axis.
-    is_target : ndarray of bool, shape (R, B + T)
-        One row per labelling.
+    logs : sequence of ndarray, shape (R,)
+        Log of each witness's `Evidence.pooled`, one value per labelling.
 
     Returns
     -------
     ndarray, shape (R,)
         Soft maximum, as in `weigh_together`, over middle and scatter of all labellings.
     """
-    logs = [np.log(np.maximum(one.pooled(is_target), LEAST_RATIO)) for one in evidence]
-    logs = [log for log in logs if np.isfinite(log).all()] or logs[:1]
-    if len(logs) < 2:
-        return np.exp(logs[0])
-    scales = np.array([max(_robust_scale(log), LEAST_SCALE) for log in logs])
-    middles = np.array([np.median(log) for log in logs])
-    return np.exp(soft_maximum(logs, middles, scales))
+    known = [log for log in logs if np.isfinite(log).all()] or logs[:1]
+    if len(known) < 2:
+        return np.asarray(np.exp(known[0]))
+    scales = np.array([max(_robust_scale(log), LEAST_SCALE) for log in known])
+    middles = np.array([np.median(log) for log in known])
+    return np.asarray(np.exp(soft_maximum(known, middles, scales)))
 
 
 def soft_maximum(

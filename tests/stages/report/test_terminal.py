@@ -9,7 +9,7 @@ import pytest
 from rich.console import Console, RenderableType
 
 from opamc_cli import app
-from opamc_cli.commands.tables import loop_table, verdict_table
+from opamc_cli.commands.tables import loop_table, verdict_lines, verdict_table
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -147,3 +147,30 @@ def test_piped_text_has_no_trailing_blanks(capsys) -> None:
     shown = capsys.readouterr().out
     assert shown.endswith("a line\n")
     assert not [line for line in shown.splitlines() if line != line.rstrip()]
+
+
+def test_a_faulty_joint_takes_few_lines() -> None:
+    known = {"inspect": "Look at the gear.", "evidence": ["one", "two"], "against": "little"}
+    verdict = {
+        "axes": [
+            axis(1, "healthy"),
+            axis(2, "healthy"),
+            axis(3, "fault", p_adjusted=1e-9, distance={"ratio": 4.03}, brief=known),
+        ]
+    }
+    lines = [line.plain for line in verdict_lines(verdict)]
+    assert len(lines) == 5
+    assert lines[0].startswith("Axis 3 at fault: p < 0.0001, 4.03 times as far")
+    assert "2 other axes healthy" in lines[0]
+    assert [line.strip() for line in lines[1:]] == [
+        "do first: Look at the gear.",
+        "seen: one",
+        "seen: two",
+        "against: little",
+    ]
+
+
+def test_what_is_not_judged_says_why_in_a_line() -> None:
+    verdict = {"axes": [axis(1, "healthy"), axis(2, "insufficient-data", reasons=["too short"])]}
+    lines = [line.plain for line in verdict_lines(verdict)]
+    assert lines == ["Axis 2 not judged for want of data; axis 1 healthy", "axis 2: too short"]
