@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo test lint types check samples bench studies clean
+.PHONY: help install demo demo-nightly test lint types check samples bench studies clean
 
 help:  ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -23,6 +23,11 @@ demo: $(STAMP)  ## Diagnose data/samples; the report's path is printed
 	@$(BIN)/opamc diagnose --baseline data/samples/normal --target data/samples/fault \
 	  --set joint.gear_ratio=100 --set joint.pole_pairs=5 --out opamc-out --exit-zero
 	@echo "open $(CURDIR)/opamc-out/report.html"
+
+demo-nightly: $(STAMP)  ## Three virtual robots, ten nights, one joint that wears: page and alarm
+	@$(BIN)/python benchmarks/cell_logs.py opamc-cell
+	@$(BIN)/opamc nightly opamc-cell/cell.yaml --since 2026-03-01 --jobs 0 || test $$? -eq 1
+	@echo "open $(CURDIR)/opamc-cell/nightly/index.html"
 
 test: $(STAMP)  ## Run the test suite on all cores
 	$(BIN)/python -m pytest -n auto --dist loadfile -q
@@ -58,4 +63,4 @@ studies: $(STAMP)  ## The studies behind the documentation's figures; takes hour
 	$(BIN)/python benchmarks/cause.py --seeds 30 --write
 
 clean:  ## Remove the environment and every output
-	rm -rf $(VENV) opamc-out build *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) opamc-out opamc-cell build *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -9,9 +9,11 @@ from opamc_cli.commands import (
     decide,
     diagnose,
     example,
+    history,
     identify,
     ingest,
     model,
+    nightly,
     patterns,
     report,
     score,
@@ -30,6 +32,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "report": report.report,
     "diagnose": diagnose.diagnose,
     "decide": decide.decide,
+    "history": history.history,
     "sweep": sweep.sweep,
     "select": select.select,
     "simulate": simulate.simulate,
@@ -37,5 +40,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
 }
 """Subcommands by name, in the order of the chain."""
 
-GROUPS: dict[str, typer.Typer] = {"model": model.app, "config": config.app}
+GROUPS: dict[str, typer.Typer] = {
+    "nightly": nightly.app,
+    "model": model.app,
+    "config": config.app,
+}
 """Subcommands that have subcommands."""

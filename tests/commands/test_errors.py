@@ -656,7 +656,7 @@ def test_a_ripple_is_declared_by_its_order(opamc, tmp_path):
 # -- the lock --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"example"}))
+@pytest.mark.parametrize("command", sorted(set(COMMANDS) - {"example", "history"}))
 def test_a_folder_that_another_run_writes_to(opamc, tmp_path, command):
     out = tmp_path / "out"
     arguments = commands_with_output(tmp_path).get(command, [])

@@ -1,0 +1,268 @@
+"""A cell over half a year: what the memory of the nights is worth beside each night alone.
+
+Virtual robots of three joints are recorded every night over six months: the hall warms and cools
+with the season, one morning in ten is cold, nights are missing, payloads change (some logged, some
+not), gears are exchanged (and the new baseline declared), and some joints wear from severity 0 to 1
+within 30 to 90 nights. Every recording goes through the true chain (segment, identify, patterns)
+and the true decision against the robot's baseline of six nights; what `opamc nightly` does besides
+(tables, pages, the search for causes) is left out. The nights then go through the same alarm rule
+as the command's.
+
+    python benchmarks/year.py --robots 4 --nights 60 --first-seed 100
+    python benchmarks/year.py --first-seed 41000 --write
+"""
+
+import argparse
+import json
+import shutil
+import tempfile
+import time
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from opamc_cli.config import load_config
+from opamc_cli.config.testbed import load_testbed
+from opamc_cli.stages import identify, patterns, segment
+from opamc_cli.stages.cells import cells_by_axis, session_names, spectrum_cells
+from opamc_cli.stages.kept import KeptResults
+from opamc_cli.stages.score import read_patterns
+from opamc_cli.stages.verdict import policy_of
+from opamc_cli.stats.decision import judge
+from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.tables import SPECTRA, read_table
+from opamc_cli.testbed.robot import simulate
+
+ROOT = Path(__file__).resolve().parents[1]
+CACHE = Path(__file__).resolve().parent / "out" / "year"
+
+BASELINE_NIGHTS = 6
+AXES = (1, 2, 3)
+SEASON_K = 5.0  # a hall without air conditioning: 17 to 27 degrees over the year
+COLD_SHARE, COLD_K = 0.1, -8.0  # a morning after a night without heating
+MISSING_SHARE = 0.05
+PAYLOAD_KG = 1.0
+
+
+@dataclass(frozen=True)
+class Life:
+    """What happens to one robot; nights count from 0."""
+
+    seed: int
+    wearing_axis: int | None
+    wear_starts: int
+    wear_nights: int
+    exchanged_axis: int | None
+    exchanged_at: int
+    payload_from: int | None
+    unlogged_payload_at: tuple[int, ...]
+    missing: tuple[int, ...]
+    season_phase: float
+
+    def severity(self, night: int) -> float:
+        """Return the damage of the wearing axis, 0 to 1."""
+        return float(np.clip((night - self.wear_starts) / self.wear_nights, 0, 1))
+
+
+def lives(n_robots: int, n_nights: int, first_seed: int) -> list[Life]:
+    """Draw what happens to each robot: a quarter wears, a twelfth gets a new gear."""
+    drawn = []
+    for index in range(n_robots):
+        rng = np.random.default_rng([first_seed, index])
+        wears = index % 4 == 0
+        exchanged = index % 12 == 1
+        gap = int(rng.integers(20, n_nights - 10))
+        gone = set(np.flatnonzero(rng.random(n_nights) < MISSING_SHARE).tolist())
+        gone |= set(range(gap, gap + 4)) if index % 3 == 2 else set()
+        drawn.append(
+            Life(
+                seed=first_seed + index,
+                wearing_axis=int(rng.choice(AXES)) if wears else None,
+                wear_starts=int(rng.integers(n_nights // 5, n_nights // 2)),
+                wear_nights=int(rng.integers(30, 91)),
+                exchanged_axis=int(rng.choice(AXES)) if exchanged else None,
+                exchanged_at=int(rng.integers(n_nights // 3, 2 * n_nights // 3)),
+                payload_from=int(rng.integers(n_nights // 3, n_nights - 20))
+                if index % 6 == 3
+                else None,
+                unlogged_payload_at=tuple(rng.integers(20, n_nights, 2).tolist())
+                if index % 6 == 5
+                else (),
+                missing=tuple(sorted(gone)),
+                season_phase=float(rng.uniform(0, 365)),
+            )
+        )
+    return drawn
+
+
+def record(life: Life, night: int, folder: Path) -> Path:
+    """Record one night of a robot; three cycles of two motions of all joints together, 6 s."""
+    config = load_testbed(ROOT / "configs" / "samples.yaml")
+    rng = np.random.default_rng([life.seed, night, 7])
+    ambient = 22 + SEASON_K * np.sin(2 * np.pi * (night + life.season_phase) / 365)
+    ambient += COLD_K if rng.random() < COLD_SHARE else 0.0
+    joints = [
+        replace(joint, thermal=replace(joint.thermal, ambient_c=float(ambient)))
+        for joint in config.robot.joints
+    ]
+    if life.exchanged_axis and night >= life.exchanged_at:
+        at = life.exchanged_axis - 1
+        gear, friction = joints[at].gear, joints[at].friction
+        joints[at] = replace(
+            joints[at],
+            gear=replace(
+                gear,
+                error_2_circular_rad=gear.error_2_circular_rad * 1.4,
+                error_4_flexspline_rad=gear.error_4_flexspline_rad * 0.6,
+            ),
+            friction=replace(friction, coulomb_nm=friction.coulomb_nm * 0.85),
+        )
+    # nobody takes a gear apart between two nights: its mounting stays
+    spread = replace(config.robot.spread, remount=False)
+    robot = replace(config.robot, joints=tuple(joints), spread=spread)
+    loaded = life.payload_from is not None and night >= life.payload_from
+    payload = PAYLOAD_KG if loaded else 0.0
+    program = replace(
+        config.program,
+        waypoints_rad=(0.0, 1.5),
+        cycles=3,
+        lead_s=0.3,
+        dwell_s=0.2,
+        payload_kg=PAYLOAD_KG / 2 if night in life.unlogged_payload_at else payload,
+    )
+    damage = {}
+    if life.wearing_axis and life.severity(night) > 0:
+        damage[life.wearing_axis] = replace(robot.damage, severity=life.severity(night))
+    recording = simulate(robot, program, seed=life.seed, session=night, faults=damage)
+    columns = {}
+    for axis, signals in recording.axes.items():
+        for index, phase in enumerate("abc"):
+            columns[f"axis{axis}_{phase}"] = np.ascontiguousarray(signals.phases_a[:, index])
+        columns[f"axis{axis}_temperature"] = signals.temperature_c
+    path = folder / f"night-{night:03d}.parquet"
+    info = RunInfo(
+        recording.sampling_rate_hz, program="cycle", speed_percent=100.0, payload_kg=payload
+    )
+    save_run(path, info, columns)
+    return path
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the decision measured of one joint in one night."""
+
+    night: int
+    axis: int
+    state: str
+    p_value: float
+    distance: float
+    common: float
+    effect: float
+    temperature_c: float
+    payload_kg: float
+    severity: float
+
+
+def measure_robot(life: Life, n_nights: int) -> list[Measured]:
+    """Record all nights of a robot and judge each against its baseline."""
+    config = load_config()
+    found: list[Measured] = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        kept = KeptResults(folder / "kept")
+        baseline: list[Path] = []
+        condition: tuple[bool, bool] | None = None
+        for night in range(n_nights):
+            if night in life.missing:
+                continue
+            now = (
+                life.exchanged_axis is not None and night >= life.exchanged_at,
+                life.payload_from is not None and night >= life.payload_from,
+            )
+            if now != condition:
+                condition, baseline = now, []
+                shutil.rmtree(folder / "baseline", ignore_errors=True)
+            run = record(life, night, folder)
+            if len(baseline) < BASELINE_NIGHTS:
+                baseline.append(run)
+                continue
+            if not (folder / "baseline").exists():
+                tables(baseline, folder / "baseline", config, None, kept)
+            tables([run], folder / "target", config, folder / "baseline" / "motions.parquet", None)
+            found += judged(folder, config, life, night)
+            run.unlink()
+    return found
+
+
+def tables(runs, out, config, reference, kept):
+    """Run the chain over one side."""
+    segmented = segment.run(runs, config, out, kept=kept)
+    identified = identify.run(segmented.path, config, out, reference=reference, kept=kept)
+    patterns.run(identified.path, config, out, kept=kept)
+
+
+def judged(folder: Path, config, life: Life, night: int) -> list[Measured]:
+    """Judge one night from its tables."""
+    sides = [folder / role / "patterns.parquet" for role in ("baseline", "target")]
+    rows = (read_patterns(sides[0]), read_patterns(sides[1]))
+    power = [read_table(side.with_name("spectra.parquet"), "patterns", SPECTRA) for side in sides]
+    cells = cells_by_axis(*rows)
+    spectra = {
+        axis: spectrum_cells(power[0], power[1], axis, session_names(axis, *rows)) for axis in cells
+    }
+    warm = {
+        axis: float(
+            np.median(
+                [
+                    t
+                    for key, part in rows[1].items()
+                    if key[0] == axis
+                    for t in part.rows["temperature_c"]
+                ]
+            )
+        )
+        for axis in cells
+    }
+    loaded = life.payload_from is not None and night >= life.payload_from
+    return [
+        Measured(
+            night,
+            axis,
+            one.state,
+            one.p_value,
+            float(np.log(one.distance_ratio)),
+            one.common_log_ratio,
+            one.effect,
+            warm[axis],
+            PAYLOAD_KG if loaded else 0.0,
+            life.severity(night) if axis == life.wearing_axis else 0.0,
+        )
+        for axis, one in judge(cells, policy_of(config.score), spectra).items()
+    ]
+
+
+def measured_cell(
+    n_robots: int, n_nights: int, first_seed: int
+) -> list[tuple[Life, list[Measured]]]:
+    """Measure every robot of a cell; what was measured before is read."""
+    cell = []
+    for life in lives(n_robots, n_nights, first_seed):
+        path = CACHE / f"{first_seed}-{n_nights}" / f"robot-{life.seed}.json"
+        if not path.exists():
+            started = time.perf_counter()
+            found = measure_robot(life, n_nights)
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(json.dumps([asdict(one) for one in found]))
+            print(f"robot {life.seed}: {time.perf_counter() - started:.0f} s", flush=True)
+        cell.append((life, [Measured(**row) for row in json.loads(path.read_text())]))
+    return cell
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--robots", type=int, default=24)
+    parser.add_argument("--nights", type=int, default=180)
+    parser.add_argument("--first-seed", type=int, default=41000)
+    options = parser.parse_args()
+    measured_cell(options.robots, options.nights, options.first_seed)

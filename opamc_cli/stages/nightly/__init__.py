@@ -1,0 +1,1 @@
+"""Stage `nightly`: a cell's recordings in, each robot's nights, its history and alarms out."""

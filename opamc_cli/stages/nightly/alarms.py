@@ -1,0 +1,282 @@
+"""From a robot's history to its alarms and what is worth saying: a pure function of the nights."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, timedelta
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow
+from opamc_cli.trend.alarm import Episode, Night, episodes
+from opamc_cli.trend.chart import control_chart
+from opamc_cli.trend.onset import onset
+from opamc_cli.trend.slope import nights_until, robust_slope
+
+LIMIT = 4.0
+"""Standard deviations of the chart's average that count as a signal. On six virtual robots over
+half a year (benchmarks/year.py, first seed 100) the largest of 18 healthy joints was 3.4; the
+alarms of those that wear come one night later than at 3.5, and two earlier than at 4.5."""
+
+MOST_NIGHTS = 365
+"""Nights that the beginning of a change is sought in."""
+
+JUDGED = ("healthy", "changed", "fault")
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What follows from a robot's nights; see `History.settle`."""
+
+    alarms: tuple[AlarmRow, ...]
+    standing: tuple[tuple[str, int, str], ...]
+    events: tuple[Event, ...]
+
+
+def settle_robot(
+    robot: str,
+    series: Sequence[Mapping[str, Any]],
+    nights: Sequence[NightRow],
+    declared: Sequence[Declared],
+    rule: AlarmConfig,
+    fault_effect: float,
+    baseline_nights: int,
+) -> Settled:
+    """Find a robot's alarms, and what is worth saying of it.
+
+    Parameters
+    ----------
+    robot
+        Its name.
+    series
+        Its verdicts and measures by program, axis and night, as `History.series` returns them.
+    nights
+        What became of its nights, in time order.
+    declared
+        What users declared of it.
+    rule
+        When nights make an alarm.
+    fault_effect
+        Effect from which a change is a fault.
+    baseline_nights
+        Nights of a baseline.
+    """
+    alarms: list[AlarmRow] = []
+    standing: list[tuple[str, int, str]] = []
+    events: list[Event] = []
+    acknowledged = [one for one in declared if one.kind == "acknowledged"]
+    several = len({row["program"] for row in series}) > 1
+    for (program, axis), group in groupby(series, key=lambda row: (row["program"], row["axis"])):
+        joint = list(group)
+        name = f"axis {axis}" + (f" in program {program}" if several else "")
+        for _, part in groupby(joint, key=lambda row: row["baseline"]):
+            rows = list(part)
+            seen = _nights(rows, rule, baseline_nights)
+            for found in episodes(seen, rule.nights, rule.of):
+                signal = _first_signal(seen, found.raised, rule.of)
+                alarm, said = _alarm(rows, found, signal, name, acknowledged, rule, fault_effect)
+                alarms.append(alarm)
+                events += said
+                stop = len(rows) if found.cleared is None else found.cleared
+                standing += [(program, axis, row["night"]) for row in rows[found.raised : stop]]
+        events += _not_judged(joint, name, rule.remind_after)
+    events += _failed(robot, nights, rule.remind_after)
+    # an alarm of a baseline that has been replaced does not stand any more
+    return Settled(tuple(_last_stands(alarms, series)), tuple(standing), tuple(events))
+
+
+def chart_of(rows: Sequence[Mapping[str, Any]], baseline_nights: int) -> NDArray[np.float64]:
+    """Return the chart's average of each night of a joint, in its own standard deviations."""
+    values = [
+        row["distance"] - (row["common"] or 0.0)
+        if row["state"] in JUDGED and not row["harmless"] and row["distance"] is not None
+        else math.nan
+        for row in rows
+    ]
+    return control_chart(np.array(values, dtype=np.float64), baseline_nights).average
+
+
+def _nights(
+    rows: Sequence[Mapping[str, Any]], rule: AlarmConfig, baseline_nights: int
+) -> list[Night]:
+    averages = chart_of(rows, baseline_nights)
+    found = []
+    for row, average in zip(rows, averages.tolist(), strict=True):
+        # a change whose cause lies outside the joint is no wear of it
+        own = row["state"] in ("changed", "fault") and not row["harmless"]
+        gross = row["state"] == "fault" and (row["effect"] or 0.0) > rule.gross
+        found.append(Night(own or average > LIMIT, own and gross, judged=row["state"] in JUDGED))
+    return found
+
+
+def _first_signal(nights: Sequence[Night], raised: int, among: int) -> int:
+    """Return the first of the nights that raised an alarm."""
+    judged = [index for index in range(raised + 1) if nights[index].judged][-among:]
+    return next(index for index in judged if nights[index].signal)
+
+
+def _alarm(
+    rows: Sequence[Mapping[str, Any]],
+    found: Episode,
+    signal: int,
+    name: str,
+    acknowledged: Sequence[Declared],
+    rule: AlarmConfig,
+    fault_effect: float,
+) -> tuple[AlarmRow, list[Event]]:
+    first = rows[found.raised]
+    robot, axis = first["robot"], first["axis"]
+    last = len(rows) if found.cleared is None else found.cleared
+    seen = [
+        row
+        for row in rows[max(0, last - MOST_NIGHTS) : last]
+        if row["state"] in JUDGED and row["distance"] is not None
+    ]
+    days = np.array([_day(row["night"]) for row in seen], dtype=np.float64)
+    distances = np.array([row["distance"] - (row["common"] or 0.0) for row in seen])
+    begun = onset(days, distances) if seen else 0
+    # a change that was there from the first night on has no before
+    since = min(seen[begun]["night"], rows[signal]["night"]) if seen else rows[signal]["night"]
+    begun = next((index for index, row in enumerate(seen) if row["night"] >= since), 0)
+    growing = seen[begun:]
+    slope = robust_slope(
+        days[begun:], np.array([row["effect"] or 0.0 for row in growing], dtype=np.float64)
+    )
+    trend: dict[str, Any] = {}
+    if slope is not None and math.isfinite(slope.low) and math.isfinite(slope.high):
+        reach = nights_until(slope, fault_effect)
+        trend = {
+            "per_night": round(slope.per_night, 6),
+            "low": round(slope.low, 6),
+            "high": round(slope.high, 6),
+            "level": round(slope.level, 6),
+            "reach": None if reach is None else [math.floor(reach[0]), math.ceil(reach[1])],
+        }
+    latest = rows[last - 1]
+    text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
+    until = "9999" if found.cleared is None else rows[found.cleared]["night"]
+    known = next(
+        (one for one in acknowledged if one.axis == axis and first["night"] <= one.night < until),
+        None,
+    )
+    events = [Event(first["night"], robot, axis, "alarm", f"{name}: {text}")]
+    nights = [row["night"] for row in rows[found.raised : last]]
+    events += [
+        Event(night, robot, axis, "reminder", f"{name}: alarm since {since}; {text}")
+        for night in _reminders(nights, rule.remind_after)
+        if known is None or night < known.night
+    ]
+    if found.cleared is not None:
+        events.append(
+            Event(
+                until,
+                robot,
+                axis,
+                "cleared",
+                f"{name}: the alarm of {first['night']} is over, no sign of it in "
+                f"{rule.of} judged nights",
+            )
+        )
+    alarm = AlarmRow(
+        robot=robot,
+        program=first["program"],
+        axis=axis,
+        raised=first["night"],
+        since=since,
+        cleared=None if found.cleared is None else until,
+        acknowledged=None if known is None else known.why,
+        text=text,
+        trend=json.dumps(trend, sort_keys=True),
+    )
+    return alarm, events
+
+
+def _last_stands(
+    alarms: Sequence[AlarmRow], series: Sequence[Mapping[str, Any]]
+) -> Iterator[AlarmRow]:
+    """End alarms that stood when another baseline was begun."""
+    begins: dict[tuple[str, int], list[str]] = {}
+    before: dict[tuple[str, int], str] = {}
+    for row in series:
+        place = (row["program"], row["axis"])
+        if before.get(place, row["baseline"]) != row["baseline"]:
+            begins.setdefault(place, []).append(row["night"])
+        before[place] = row["baseline"]
+    for alarm in alarms:
+        later = [n for n in begins.get((alarm.program, alarm.axis), ()) if n > alarm.raised]
+        if alarm.cleared is None and later:
+            yield AlarmRow(**{**vars(alarm), "cleared": later[0]})
+        else:
+            yield alarm
+
+
+def _not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+    for unjudged, part in groupby(rows, key=lambda row: row["state"] not in JUDGED):
+        streak = list(part)
+        if unjudged:
+            first = streak[0]
+            text = f"{name}: not judged since {first['night']}: {streak[-1]['reason']}"
+            for night in _said(streak, remind_after):
+                yield Event(night, first["robot"], first["axis"], "not-judged", text)
+
+
+def _failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterator[Event]:
+    for failing, part in groupby(nights, key=lambda row: bool(row.why)):
+        streak = list(part)
+        if failing:
+            since = "" if len(streak) == 1 else f" (the {len(streak)}th night in a row)"
+            text = f"{streak[-1].night}{since}: {streak[-1].why}"
+            for night in _said([{"night": row.night} for row in streak], remind_after):
+                yield Event(night, robot, None, "failed", text)
+
+
+def _said(streak: Sequence[Mapping[str, Any]], remind_after: int) -> list[str]:
+    nights = [row["night"] for row in streak]
+    return [nights[0], *_reminders(nights, remind_after)]
+
+
+def _reminders(nights: Sequence[str], remind_after: int) -> list[str]:
+    """Return the nights in which something that began with the first is said again."""
+    said = [nights[0]]
+    for night in nights[1:]:
+        if date.fromisoformat(night) >= date.fromisoformat(said[-1]) + timedelta(remind_after):
+            said.append(night)
+    return said[1:]
+
+
+def _day(night: str) -> int:
+    return date.fromisoformat(night).toordinal()
+
+
+def _state_phrase(row: Mapping[str, Any]) -> str:
+    phrase = {
+        "fault": "at fault",
+        "changed": "changed",
+        "healthy": "each night for itself healthy, all together not",
+        "insufficient-data": "not judged in the last night",
+    }.get(row["state"], row["state"])
+    if row["effect"] is not None and row["state"] in JUDGED:
+        phrase += f", effect {row['effect']:.2f}"
+    if row["cause"]:
+        phrase += f", looks like {row['cause']}"
+    return str(phrase)
+
+
+def _trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
+    if not trend:
+        return "too few nights for a trend"
+    reach = trend["reach"]
+    if reach == [0, 0]:
+        grows = f"grows by {trend['per_night']:.3f} a night" if trend["low"] > 0 else "no trend"
+        return f"at fault level ({limit:g}), {grows}"
+    if reach is None:
+        return "no trend"
+    return (
+        f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
+        f"night, reaches fault level ({limit:g}) in {reach[0]} to {reach[1]} nights"
+    )

@@ -1,0 +1,124 @@
+"""What is said in the morning: who needs a look, and nothing to those who need none."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, timedelta
+from pathlib import Path
+from typing import Any
+
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.run import CellOutcome
+from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
+from opamc_cli.storage.history import Event, History
+
+OVER = {"silent": 0, "failed": 1, "not-judged": 2, "missing": 3, "cleared": 4}
+"""Kinds of event that are a line of their own, in the order in which they are said."""
+
+
+SILENT_DAYS = 3
+"""Days without a night after which a cell is silent: a weekend is none."""
+
+
+@dataclass(frozen=True)
+class Morning:
+    """What a start has to say.
+
+    Attributes
+    ----------
+    lines
+        Sentences for people: robots that need a look first, three lines each.
+    values
+        The same for programs.
+    exit_code
+        The largest concern of the cell.
+    """
+
+    lines: tuple[str, ...]
+    values: dict[str, Any]
+    exit_code: ExitCode
+
+
+def silent(history: History, today: date) -> Iterator[Event]:
+    """Say that the whole cell has no new night: no robot can be said to lack what others have."""
+    last = max((night for _, night in history.nights()), default="")
+    if last and date.fromisoformat(last) < today - timedelta(SILENT_DAYS):
+        yield Event(last, "the cell:", None, "silent", f"no recording of any robot since {last}")
+
+
+def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: Path) -> Morning:
+    """Say what a start has found that nobody was told of yet.
+
+    Parameters
+    ----------
+    summary
+        How the robots that were looked at stand.
+    untold
+        Events that nobody was told of.
+    outcome
+        What the start did.
+    out
+        Folder of the results, for paths.
+    """
+    names = {robot.name for robot in summary.robots}
+    news = [event for event in untold if event.robot in names or event.kind == "silent"]
+    failed_now = {(robot, why) for robot, _, why in outcome.failed}
+    lines: list[str] = []
+    for robot in summary.needing():
+        fresh = {e.axis for e in news if e.robot == robot.name and e.kind in ("alarm", "reminder")}
+        for joint in robot.alarms:
+            if joint.axis in fresh:
+                lines += _alarm_lines(robot, joint, out)
+    standing = {(r.name, joint.axis) for r in summary.robots for joint in r.joints if joint.alarm}
+    for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
+        if event.kind in OVER and not (
+            event.kind == "cleared" and (event.robot, event.axis) in standing
+        ):
+            lines.append(f"{event.robot} {event.text}")
+    alarms = any(robot.alarms for robot in summary.robots)
+    failed = bool(failed_now) or any(robot.broken for robot in summary.robots) or outcome.ended
+    code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
+    return Morning(tuple(lines), _values(summary, outcome), code)
+
+
+def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path) -> Iterator[str]:
+    alarm = joint.alarm
+    assert alarm is not None
+    program = f", program {joint.program}" if robot.several_programs else ""
+    yield f"{robot.name} axis {joint.axis}{program}: ALARM, not as it was since {alarm.since}"
+    yield f"  {alarm.text}"
+    where = out / joint.report if joint.report else out / "index.html"
+    yield (
+        f"  see {where}; silence it with: opamc nightly acknowledge {robot.name} "
+        f"--axis {joint.axis} --why TEXT"
+    )
+
+
+def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
+    robots: dict[str, Any] = {}
+    for robot in summary.robots:
+        robots[robot.name] = {
+            "state": robot.shown,
+            "done": sorted(night for name, night in outcome.done if name == robot.name),
+            "skipped": sorted(
+                night.night
+                for night in outcome.planned
+                if night.robot == robot.name and not night.why
+            ),
+            "failed": [
+                {"night": night, "why": why}
+                for name, night, why in sorted(outcome.failed)
+                if name == robot.name
+            ],
+            "alarms": [
+                {
+                    "axis": joint.axis,
+                    "program": joint.program,
+                    "since": joint.since,
+                    "text": joint.alarm.text,
+                    "acknowledged": joint.alarm.acknowledged,
+                }
+                for joint in robot.joints
+                if joint.alarm is not None
+            ],
+        }
+    return {"robots": robots}

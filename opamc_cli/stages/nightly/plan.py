@@ -1,0 +1,299 @@
+"""What is to be done of a robot's nights, and why: no recording is opened here."""
+
+import json
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from opamc_cli import __version__
+from opamc_cli.config.cell import BaselineConfig
+from opamc_cli.config.models import digest
+from opamc_cli.stages.nightly.recordings import Recording
+from opamc_cli.storage.history import NightRow
+
+LEAST_NIGHTS = 2
+"""Nights that must be left of a baseline: one says nothing of how much nights differ."""
+
+NIGHTS_AGAIN = 6
+"""Nights of a baseline that is begun anew where the first one was given by dates or files."""
+
+MOST_ATTEMPTS = 3
+"""Starts in which a night may break (time, memory, death of its worker) before it is left alone."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The recordings of one program in one night, and those that they are held against.
+
+    Attributes
+    ----------
+    program, condition
+        What they have in common.
+    targets
+        Recordings of the night.
+    baseline
+        Recordings of the healthy state; empty while it is being recorded.
+    baseline_name
+        Name of the baseline; the series of nights begins anew where it changes.
+    missing
+        Why there is nothing to compare with; empty if there is.
+    """
+
+    program: str
+    condition: str
+    targets: tuple[Recording, ...]
+    baseline: tuple[Recording, ...] = ()
+    baseline_name: str = ""
+    missing: str = ""
+
+
+@dataclass(frozen=True)
+class PlannedNight:
+    """One robot's night.
+
+    Attributes
+    ----------
+    robot, night
+        Which.
+    comparisons
+        One for each program.
+    broken
+        Recordings that cannot be used.
+    notes
+        What is worth knowing besides.
+    key
+        Hash of everything that the result depends on.
+    why
+        Why it is to be done; empty if it is done.
+    """
+
+    robot: str
+    night: str
+    comparisons: tuple[Comparison, ...]
+    broken: tuple[Recording, ...]
+    notes: tuple[str, ...]
+    key: str
+    why: str
+
+    @property
+    def in_baseline(self) -> bool:
+        """Whether nothing is judged: the night is, or will be, part of the healthy state."""
+        return bool(self.comparisons) and not any(
+            one.baseline or one.missing for one in self.comparisons
+        )
+
+
+@dataclass(frozen=True)
+class Situation:
+    """What is known of a robot beside its recordings.
+
+    Attributes
+    ----------
+    baseline
+        How the cell tells the healthy state.
+    fixed
+        Recordings that `baseline.runs` names.
+    begun
+        Nights from which a baseline was declared to begin anew, ascending.
+    pinned
+        Nights of baselines that were complete before, by program, condition and since.
+    recorded
+        What became of the robot's nights.
+    config_hash
+        Of the options of its diagnosis.
+    """
+
+    baseline: BaselineConfig
+    fixed: Sequence[Recording]
+    begun: Sequence[str]
+    pinned: Mapping[tuple[str, str, str], Sequence[str]]
+    recorded: Mapping[str, NightRow]
+    config_hash: str
+
+
+@dataclass(frozen=True)
+class RobotPlan:
+    """All nights of a robot, and the baselines that are complete by now."""
+
+    nights: tuple[PlannedNight, ...]
+    complete: Mapping[tuple[str, str, str], tuple[str, ...]]
+
+
+def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
+    """Say what is to be done of each night of a robot.
+
+    Parameters
+    ----------
+    robot
+        Its name.
+    recordings
+        All its recordings that are there.
+    now
+        What is known besides.
+    """
+    usable = [one for one in recordings if not one.facts.error]
+    fixed = {one.sha256 for one in now.fixed}
+    judged = [one for one in usable if one.sha256 not in fixed]
+    series = _main_conditions(judged)
+    baselines = _Baselines(now, series, usable)
+    nights = []
+    for night in sorted({one.night for one in recordings}):
+        broken = tuple(one for one in recordings if one.night == night and one.facts.error)
+        notes: list[str] = []
+        comparisons = []
+        for program in sorted({p for p, n in series if n == night}):
+            condition, targets = series[program, night]
+            comparisons.append(baselines.comparison(program, condition, night, tuple(targets)))
+            left = [
+                one
+                for one in judged
+                if (one.facts.program, one.night) == (program, night) and one not in targets
+            ]
+            if left:
+                notes.append(
+                    f"{len(left)} of {len(left) + len(targets)} runs left out: the night is judged "
+                    f"at {condition}, they were recorded at "
+                    f"{'; '.join(sorted({one.condition for one in left}))}"
+                )
+        if not comparisons and not broken:
+            continue  # all its recordings belong to the fixed baseline
+        key = _key(comparisons, broken, now.config_hash)
+        why = _why(key, now.recorded.get(night))
+        nights.append(
+            PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
+        )
+    return RobotPlan(tuple(nights), baselines.complete)
+
+
+Series = dict[tuple[str, str], tuple[str, list[Recording]]]
+"""Condition and recordings by program and night."""
+
+
+def _main_conditions(recordings: Sequence[Recording]) -> Series:
+    """Take of each program and night the condition under which most of it was recorded."""
+    usual = Counter((one.facts.program, one.condition) for one in recordings)
+    by_place: dict[tuple[str, str], dict[str, list[Recording]]] = {}
+    for one in recordings:
+        place = by_place.setdefault((one.facts.program, one.night), {})
+        place.setdefault(one.condition, []).append(one)
+    series: Series = {}
+    for (program, night), conditions in by_place.items():
+        # ties go to what the robot does on most nights
+        chosen = max(conditions, key=lambda c: (len(conditions[c]), usual[program, c], c))
+        series[program, night] = (chosen, conditions[chosen])
+    return series
+
+
+class _Baselines:
+    """Which recordings a night is held against."""
+
+    def __init__(self, now: Situation, series: Series, usable: Sequence[Recording]) -> None:
+        self._now = now
+        self._series = series
+        self._usable = usable
+        self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
+
+    def comparison(
+        self, program: str, condition: str, night: str, targets: tuple[Recording, ...]
+    ) -> Comparison:
+        since = max((begun for begun in self._now.begun if begun <= night), default="")
+        rule = self._now.baseline
+        if since or rule.nights is not None:
+            return self._first_nights(program, condition, night, targets, since)
+        if rule.runs is not None:
+            found = [one for one in self._now.fixed if not one.facts.error]
+            name = "runs"
+        else:
+            first, last = str(rule.first), str(rule.last)
+            if first <= night <= last:
+                return Comparison(program, condition, targets)
+            found = [one for one in self._usable if first <= one.night <= last]
+            name = f"{first} to {last}"
+        same = [one for one in found if one.facts.program == program]
+        used = tuple(one for one in same if one.condition == condition)
+        if not used:
+            known = sorted({one.condition for one in same})
+            why = (
+                f"the baseline was recorded at {' and '.join(known)}, the night at {condition}"
+                if known
+                else f"the baseline has no recording of program {program!r}"
+            )
+            return Comparison(program, condition, targets, missing=why)
+        return Comparison(program, condition, targets, used, f"{name}, {condition}")
+
+    def _first_nights(
+        self,
+        program: str,
+        condition: str,
+        night: str,
+        targets: tuple[Recording, ...],
+        since: str,
+    ) -> Comparison:
+        wanted = self._now.baseline.nights or NIGHTS_AGAIN
+        until = min((begun for begun in self._now.begun if begun > since), default="9999")
+        there = sorted(
+            n
+            for (p, n), (c, _) in self._series.items()
+            if p == program and c == condition and since <= n < until
+        )
+        key = (program, condition, since)
+        pinned = self._now.pinned.get(key)
+        members = list(pinned) if pinned else there[:wanted]
+        if len(members) < wanted and not pinned:
+            return Comparison(program, condition, targets)
+        self.complete[key] = tuple(members)
+        if night in members:
+            return Comparison(program, condition, targets)
+        left = [n for n in members if n in there]
+        if len(left) < LEAST_NIGHTS:
+            gone = ", ".join(n for n in members if n not in left)
+            why = (
+                f"the recordings of the baseline's nights {gone} are gone; put them back, or begin "
+                "a new baseline with `opamc nightly rebaseline`"
+            )
+            return Comparison(program, condition, targets, missing=why)
+        used = tuple(one for n in left for one in self._series[program, n][1])
+        name = f"from {members[0]}, {condition}"
+        return Comparison(program, condition, targets, used, name)
+
+
+def _key(comparisons: Sequence[Comparison], broken: Sequence[Recording], config_hash: str) -> str:
+    """Return what a night's result depends on, so that it can be said what has changed."""
+    rest = [
+        [one.program, one.condition, one.missing, sorted(_identity(one.baseline))]
+        for one in comparisons
+    ]
+    targets = [identity for one in comparisons for identity in _identity(one.targets)]
+    return json.dumps(
+        {
+            "version": __version__,
+            "config": config_hash,
+            "baseline": digest({"of": rest}),
+            "files": sorted([*targets, *_identity(broken)]),
+        },
+        sort_keys=True,
+    )
+
+
+def _identity(recordings: Sequence[Recording]) -> Iterator[str]:
+    return (f"{one.name} {one.sha256[:24]}" for one in recordings)
+
+
+def _why(key: str, record: NightRow | None) -> str:
+    """Say why a night is to be done; empty if its record stands."""
+    if record is None:
+        return "new"
+    now, then = json.loads(key), json.loads(record.key)
+    if now["version"] != then["version"]:
+        return f"judged by version {then['version']}"
+    if now["config"] != then["config"]:
+        return "other options"
+    if now["baseline"] != then["baseline"]:
+        return "the baseline has changed"
+    # what was judged stays judged when its logs are cleared away
+    added = set(now["files"]) - set(then["files"])
+    if added:
+        return f"{len(added)} new or changed file{'s' if len(added) > 1 else ''}"
+    if record.status == "broken" and record.attempts < MOST_ATTEMPTS:
+        return f"broke before ({record.why})"
+    return ""

@@ -1,0 +1,167 @@
+"""What is recorded of a cell: every file with its hash and facts, read once in its life."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from opamc_cli.config.cell import CellConfig
+from opamc_cli.errors import InputError
+from opamc_cli.stages.sessions import night_of
+from opamc_cli.storage.history import FileRow, History
+from opamc_cli.storage.logs import Facts, LogFile, fetch, find_logs, read_facts
+
+REMEMBER_EVERY = 50
+"""Files that are read between two writes to the history: what a kill costs."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One recording of a robot.
+
+    Attributes
+    ----------
+    log
+        Where it lies.
+    night
+        YYYY-MM-DD that it counts to; empty if nothing tells.
+    sha256
+        Of its bytes.
+    facts
+        What it says of itself.
+    """
+
+    log: LogFile
+    night: str
+    sha256: str
+    facts: Facts
+
+    @property
+    def name(self) -> str:
+        """How tables call it: its night and its file's stem."""
+        return f"{self.night}/{Path(self.log.path).stem}"
+
+    @property
+    def condition(self) -> str:
+        """The conditions that recordings to be compared have in common, in words."""
+        facts = self.facts
+        parts = (
+            (facts.sampling_rate_hz, "Hz"),
+            (facts.speed_percent, "%"),
+            (facts.payload_kg, "kg"),
+        )
+        return ", ".join(f"{value:g} {unit}" for value, unit in parts if value is not None)
+
+
+@dataclass(frozen=True)
+class CellRecordings:
+    """All recordings of a cell.
+
+    Attributes
+    ----------
+    by_robot
+        Recordings of each robot, by path; robots without any have an empty list.
+    baseline_by_robot
+        Those that `baseline.runs` names.
+    """
+
+    by_robot: dict[str, list[Recording]]
+    baseline_by_robot: dict[str, list[Recording]]
+
+
+def find_recordings(
+    cell: CellConfig, history: History, only: Sequence[str] | None, copies: Path
+) -> CellRecordings:
+    """List a cell's recordings; read those that are new or have another size or time than before.
+
+    Parameters
+    ----------
+    cell
+        What to look for.
+    history
+        What is remembered of files, and where new ones are remembered.
+    only
+        Robots that are asked for; None: all.
+    copies
+        Folder for copies of what lies in an object store.
+
+    Raises
+    ------
+    InputError
+        If nothing is found, or a robot that was asked for is none of the cell's.
+    """
+    named = None if cell.robots == "auto" else tuple(cell.robots)
+    logs = find_logs(cell.runs, named)
+    robots = sorted(named or {log.robot for log in logs})
+    fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
+    if not logs and not history.nights():
+        msg = f"{cell.runs}: no file fits this pattern; check `runs` of the cell's file"
+        raise InputError(msg)
+    known = sorted({*robots, *(robot for robot, _ in history.nights())})
+    for name in only or ():
+        if name not in known:
+            msg = f"--robot {name}: is none of the cell's robots; it has {_some(known)}"
+            raise InputError(msg)
+    wanted = [robot for robot in robots if only is None or robot in only]
+    reader = _Reader(cell, history, copies)
+    result = CellRecordings(
+        {robot: [] for robot in wanted},
+        {robot: [] for robot in wanted},
+    )
+    for log in logs:
+        if log.robot in result.by_robot:
+            result.by_robot[log.robot].append(reader.read(log))
+    for log in fixed:
+        if log.robot in result.by_robot:
+            result.baseline_by_robot[log.robot].append(reader.read(log))
+    reader.finish()
+    return result
+
+
+class _Reader:
+    """Reads what is not remembered, and remembers it."""
+
+    def __init__(self, cell: CellConfig, history: History, copies: Path) -> None:
+        self._history = history
+        self._copies = copies
+        self._known = history.files()
+        self._new: list[FileRow] = []
+        self._day_starts: dict[str, float] = {}
+        self._cell = cell
+
+    def read(self, log: LogFile) -> Recording:
+        row = self._known.get(log.path)
+        if row is None or (row.size, row.mtime_ns) != (log.size, log.mtime_ns):
+            try:
+                sha256, facts = read_facts(log, fetch(log, self._copies))
+            except InputError as error:
+                sha256, facts = "", Facts(error=str(error))
+            row = FileRow(
+                log.path, log.robot, log.night, log.size, log.mtime_ns, sha256, facts.to_json()
+            )
+            self._new.append(row)
+            if len(self._new) >= REMEMBER_EVERY:
+                self.finish()
+        facts = Facts.from_json(row.facts)
+        told = night_of(facts.started_at, self._starts_at(log.robot))
+        night = log.night or (told.isoformat() if told else None)
+        if not night and not facts.error:
+            facts = Facts(
+                error=f"{log.path}: nothing says which night it is of: no started_at in its "
+                "metadata; put {night} into `runs`, or record when it began"
+            )
+        return Recording(log, night or "", row.sha256, facts)
+
+    def finish(self) -> None:
+        if self._new:
+            self._history.remember_files(self._new)
+            self._new = []
+
+    def _starts_at(self, robot: str) -> float:
+        if robot not in self._day_starts:
+            config = self._cell.diagnosis_of(robot, "cell")
+            self._day_starts[robot] = config.score.day_starts_at
+        return self._day_starts[robot]
+
+
+def _some(names: Sequence[str], most: int = 8) -> str:
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

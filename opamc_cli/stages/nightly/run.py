@@ -1,0 +1,376 @@
+"""Reads a cell's recordings, does the robots' nights that are new, and settles what follows.
+
+Order of the writing, so that a kill at any instant costs work and nothing else: a night's folder
+is renamed into its place, then the night is recorded in the history; what follows from the history
+(alarms, pages, metrics) is made from it anew, and only then is anybody told.
+"""
+
+import shutil
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from opamc_cli import __version__
+from opamc_cli.config.cell import CellConfig
+from opamc_cli.errors import UsageError
+from opamc_cli.stages.nightly import cluster
+from opamc_cli.stages.nightly.night import (
+    COMPUTE,
+    REPORT,
+    Input,
+    NightJob,
+    ProgramJob,
+    ProgramResult,
+)
+from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
+from opamc_cli.stages.nightly.recordings import CellRecordings, Recording, find_recordings
+from opamc_cli.stages.nightly.settle import settle_cell
+from opamc_cli.stages.nightly.summary import Summary
+from opamc_cli.stages.nightly.workers import Broken, run_all
+from opamc_cli.stages.parallel import Steps, unshown
+from opamc_cli.storage.folders import remove_folder, replace_folder
+from opamc_cli.storage.history import (
+    FILE_NAME,
+    History,
+    MeasureRow,
+    NightRow,
+    VerdictRow,
+    as_notes,
+)
+
+WORK, KEPT, COPIES = ".work", ".kept", ".copies"
+"""Folders below `out` that nobody needs to look into."""
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which nights are asked for; None: all.
+
+    Attributes
+    ----------
+    night, since
+        YYYY-MM-DD.
+    robots
+        Names.
+    """
+
+    night: str | None = None
+    since: str | None = None
+    robots: tuple[str, ...] | None = None
+
+    def has(self, night: str) -> bool:
+        """Whether a night is asked for."""
+        return self.night in (None, night) and (self.since is None or night >= self.since)
+
+
+@dataclass
+class CellOutcome:
+    """What a start did.
+
+    Attributes
+    ----------
+    planned
+        Every night that was looked at, with why it was to be done.
+    done
+        Robot and night of those that were judged or taken into a baseline.
+    failed
+        Robot, night and why; of nights that were judged in part as well.
+    ended
+        Why the start came to an end before all was done; empty if it did not.
+    robots
+        Those that were looked at.
+    summary
+        How all robots of the cell stand now.
+    """
+
+    planned: list[PlannedNight] = field(default_factory=list)
+    done: list[tuple[str, str]] = field(default_factory=list)
+    failed: list[tuple[str, str, str]] = field(default_factory=list)
+    ended: str = ""
+    robots: tuple[str, ...] = ()
+    summary: Summary = field(default_factory=lambda: Summary(()))
+
+
+def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> CellOutcome:
+    """Say what would be done, without doing it."""
+    recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
+    outcome = CellOutcome()
+    past = _Past(history)
+    for robot in recordings.by_robot:
+        planned = _robot_plan(cell, source, past, recordings, robot)
+        outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
+    return outcome
+
+
+def run(
+    cell: CellConfig,
+    source: str,
+    history: History,
+    wanted: Wanted,
+    *,
+    jobs: int = 1,
+    scheduler: str | None = None,
+    progress: Steps = unshown,
+) -> CellOutcome:
+    """Do the nights that are new and asked for; the caller holds the lock of `cell.out`.
+
+    Parameters
+    ----------
+    cell
+        What to look after.
+    source
+        Name of its file, for errors.
+    history
+        Of the cell.
+    wanted
+        Which nights.
+    jobs
+        Worker processes; 0: one per core.
+    scheduler
+        Address of a Dask scheduler that is handed the nights instead.
+    progress
+        Called with each step as it begins.
+
+    Raises
+    ------
+    OpamcError
+        If the cell's recordings cannot be listed, or nothing can be written.
+    """
+    # what a killed start left behind; the lock says that nobody is using it
+    shutil.rmtree(cell.out / WORK, ignore_errors=True)
+    outcome = CellOutcome()
+    progress("looking for recordings")
+    recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
+    jobs_of: dict[tuple[str, str], PlannedNight] = {}
+    past = _Past(history)
+    for robot in recordings.by_robot:
+        planned = _robot_plan(cell, source, past, recordings, robot)
+        for key, members in planned.complete.items():
+            if key not in past.pinned.get(robot, {}):
+                history.pin_baseline((robot, *key), members)
+        for night in planned.nights:
+            if not wanted.has(night.night):
+                continue
+            outcome.planned.append(night)
+            if not night.why:
+                continue
+            if any(one.baseline for one in night.comparisons):
+                jobs_of[robot, night.night] = night
+            else:
+                _record_unjudged(cell, history, night, outcome)
+    # the newest night first: it is what the morning asks for
+    todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
+    if todo:
+        works = [_job(cell, source, night, here=scheduler is None) for night in todo]
+        watch = progress("nights")
+        watch(0, len(works))
+        for n_done, (job, answer) in enumerate(
+            _answers(cell, works, jobs, scheduler, outcome), start=1
+        ):
+            night = jobs_of[job.robot, job.night]
+            last = past.recorded.get(job.robot, {}).get(job.night)
+            attempts = last.attempts if last and last.key == night.key else 0
+            _record(cell, history, night, job, answer, attempts, outcome)
+            watch(n_done, len(works))
+    shutil.rmtree(cell.out / WORK, ignore_errors=True)
+    progress("alarms and pages")
+    outcome.robots = tuple(sorted(recordings.by_robot))
+    outcome.summary = settle_cell(cell, source, history, outcome.robots)
+    return outcome
+
+
+def open_history(cell: CellConfig, *, read_only: bool = False) -> History:
+    """Open a cell's history."""
+    return History(cell.out / FILE_NAME, read_only=read_only)
+
+
+def _answers(
+    cell: CellConfig,
+    works: Sequence[NightJob],
+    jobs: int,
+    scheduler: str | None,
+    outcome: CellOutcome,
+) -> Iterator[tuple[NightJob, tuple[ProgramResult, ...] | Broken]]:
+    if scheduler is None:
+        limits = cell.limits
+        yield from run_all(COMPUTE, works, jobs, seconds=limits.seconds, memory_gb=limits.memory_gb)
+        return
+    try:
+        yield from cluster.run_all(COMPUTE, works, scheduler, seconds=cell.limits.seconds)
+    except cluster.SchedulerLostError as error:
+        outcome.ended = str(error)
+
+
+class _Past:
+    """What the history knows, by robot."""
+
+    def __init__(self, history: History) -> None:
+        self.recorded: dict[str, dict[str, NightRow]] = {}
+        for (robot, night), row in history.nights().items():
+            self.recorded.setdefault(robot, {})[night] = row
+        self.pinned: dict[str, dict[tuple[str, str, str], list[str]]] = {}
+        for (robot, *key), nights in history.baselines().items():
+            self.pinned.setdefault(robot, {})[key[0], key[1], key[2]] = nights
+        self.begun: dict[str, set[str]] = {}
+        for one in history.declared():
+            if one.kind == "rebaselined":
+                self.begun.setdefault(one.robot, set()).add(one.night)
+
+
+def _robot_plan(
+    cell: CellConfig, source: str, past: _Past, recordings: CellRecordings, robot: str
+) -> RobotPlan:
+    config = cell.diagnosis_of(robot, source)
+    axes = cell.axes_of(robot)
+    situation = Situation(
+        baseline=cell.baseline,
+        fixed=recordings.baseline_by_robot[robot],
+        begun=sorted(past.begun.get(robot, ())),
+        pinned=past.pinned.get(robot, {}),
+        recorded=past.recorded.get(robot, {}),
+        config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),
+    )
+    return plan_robot(robot, recordings.by_robot[robot], situation)
+
+
+def _job(cell: CellConfig, source: str, night: PlannedNight, *, here: bool) -> NightJob:
+    return NightJob(
+        robot=night.robot,
+        night=night.night,
+        programs=tuple(
+            ProgramJob(
+                program=one.program,
+                condition=one.condition,
+                baseline_name=one.baseline_name,
+                missing=one.missing,
+                targets=_inputs(one.targets),
+                baseline=_inputs(one.baseline),
+                speed_percent=one.targets[0].facts.speed_percent,
+                payload_kg=one.targets[0].facts.payload_kg,
+            )
+            for one in night.comparisons
+            if one.baseline or one.missing
+        ),
+        config=cell.diagnosis_of(night.robot, source),
+        axes=cell.axes_of(night.robot),
+        kept=(cell.out / KEPT).absolute(),
+        scratch=(cell.out / WORK).absolute() if here else None,
+    )
+
+
+def _inputs(recordings: Sequence[Recording]) -> tuple[Input, ...]:
+    taken: set[str] = set()
+    inputs = []
+    for one in sorted(recordings, key=lambda one: (one.name, one.log.path)):
+        name = one.name
+        while name in taken:  # two folders of one night may hold files of one name
+            name += "'"
+        taken.add(name)
+        here = one.log.path if one.log.remote else str(Path(one.log.path).absolute())
+        inputs.append(Input(name, replace(one.log, path=here), one.sha256))
+    return tuple(inputs)
+
+
+def _record_unjudged(
+    cell: CellConfig, history: History, night: PlannedNight, outcome: CellOutcome
+) -> None:
+    """Record a night that has nothing to be compared with, or no recording that can be used."""
+    why = "; ".join(
+        [*(one.facts.error for one in night.broken), *(one.missing for one in night.comparisons)]
+    ).strip("; ")
+    status = "baseline" if night.in_baseline else "failed"
+    remove_folder(cell.out / night.robot / night.night)
+    row = NightRow(night.robot, night.night, night.key, status, 0, why, as_notes(night.notes))
+    history.record_night(row)
+    _note(outcome, row)
+
+
+def _record(
+    cell: CellConfig,
+    history: History,
+    night: PlannedNight,
+    job: NightJob,
+    answer: tuple[ProgramResult, ...] | Broken,
+    attempts: int,
+    outcome: CellOutcome,
+) -> None:
+    place = (night.robot, night.night, night.key)
+    if isinstance(answer, Broken):
+        if answer.kind == "refused":
+            # not the recordings' fault: the disk is full, or a folder cannot be written
+            raise UsageError(answer.text)
+        remove_folder(cell.out / night.robot / night.night)
+        row = NightRow(*place, "broken", attempts + 1, answer.text)
+        history.record_night(row)
+        _note(outcome, row)
+        return
+    why = [one.facts.error for one in night.broken]
+    why += [sentence for result in answer for sentence in result.failures]
+    judged = [result for result in answer if result.files]
+    notes = [*night.notes, *(note for result in answer for note in result.notes)]
+    folder = Path(night.robot) / night.night
+    if judged:
+        files: dict[str, bytes] = {}
+        for index, result in enumerate(judged):
+            # the worst program's at the top, where scripts look
+            below = "" if index == 0 else f"{_safe(result.program)}/"
+            files |= {below + name: content for name, content in result.files.items()}
+        replace_folder(cell.out / folder, files)
+    else:  # what an earlier start found must not pass for this night
+        remove_folder(cell.out / folder)
+    status = "failed" if not judged else "partial" if why else "done"
+    row = NightRow(*place, status, 0, "; ".join(why), as_notes(notes))
+    verdicts, measures = [], []
+    programs = {one.program: one for one in job.programs}
+    for index, result in enumerate(judged):
+        wanted = programs[result.program]
+        place_of = folder if index == 0 else folder / _safe(result.program)
+        for axis in result.axes:
+            verdicts.append(
+                VerdictRow(
+                    night.robot,
+                    result.program,
+                    axis.axis,
+                    night.night,
+                    axis.state,
+                    axis.health_index,
+                    axis.p_value,
+                    axis.cause,
+                    0,
+                    axis.temperature_c,
+                    wanted.payload_kg,
+                    wanted.speed_percent,
+                    len(wanted.targets),
+                    (place_of / REPORT).as_posix(),
+                    job.config.digest(),
+                    __version__,
+                )
+            )
+            measures.append(
+                MeasureRow(
+                    night.robot,
+                    result.program,
+                    axis.axis,
+                    night.night,
+                    wanted.baseline_name,
+                    axis.log_distance,
+                    axis.log_common,
+                    axis.effect,
+                    int(axis.harmless),
+                    axis.reason,
+                )
+            )
+    history.record_night(row, verdicts, measures)
+    _note(outcome, row)
+
+
+def _note(outcome: CellOutcome, row: NightRow) -> None:
+    if row.status not in ("failed", "broken"):
+        outcome.done.append((row.robot, row.night))
+    if row.why:
+        outcome.failed.append((row.robot, row.night, row.why))
+
+
+def _safe(program: str) -> str:
+    """Return a program's name as the name of a folder."""
+    return "".join(c if c.isalnum() or c in "-_." else "_" for c in program).lstrip(".") or "_"

@@ -1,0 +1,212 @@
+"""How a cell stands: robots and joints with their alarms, for terminal, page and metrics."""
+
+import json
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from opamc_cli.storage.history import AlarmRow, History, NightRow
+
+SEVERITY = (
+    "alarm",
+    "failed",
+    "fault",
+    "changed",
+    "insufficient-data",
+    "known",
+    "baseline",
+    "healthy",
+)
+"""Worst first; known: an alarm that was acknowledged."""
+
+
+@dataclass(frozen=True)
+class JointSummary:
+    """One joint of a robot in one program, as of its last night.
+
+    Attributes
+    ----------
+    state
+        Of its last night.
+    night
+        That night.
+    report
+        Where its report lies, below `out`; empty if it was pruned.
+    alarm
+        The alarm that stands, or None.
+    health_index
+        Of its last night.
+    """
+
+    axis: int
+    program: str
+    state: str
+    night: str
+    report: str
+    health_index: float | None
+    alarm: AlarmRow | None
+
+    @property
+    def shown(self) -> str:
+        """Its state, or that an alarm stands."""
+        if self.alarm is None:
+            return self.state
+        return "alarm" if self.alarm.acknowledged is None else "known"
+
+    @property
+    def since(self) -> str:
+        """Night from which on it is not as it was."""
+        return "" if self.alarm is None else self.alarm.since
+
+    @property
+    def reach(self) -> list[int] | None:
+        """In how many nights it reaches the fault level, if that can be told."""
+        trend: dict[str, Any] = json.loads(self.alarm.trend) if self.alarm else {}
+        reach: list[int] | None = trend.get("reach")
+        return reach
+
+
+@dataclass(frozen=True)
+class RobotSummary:
+    """One robot.
+
+    Attributes
+    ----------
+    joints
+        Its joints.
+    last
+        What became of its last night; None if it has none.
+    """
+
+    name: str
+    joints: tuple[JointSummary, ...]
+    last: NightRow | None
+
+    @property
+    def several_programs(self) -> bool:
+        """Whether a joint's row has to name its program."""
+        return len({joint.program for joint in self.joints}) > 1
+
+    @property
+    def last_night(self) -> str:
+        """Its last night; empty without any."""
+        return self.last.night if self.last else ""
+
+    @property
+    def broken(self) -> bool:
+        """Whether its last night could not be judged at all."""
+        return self.last is None or self.last.status in ("failed", "broken")
+
+    @property
+    def alarms(self) -> list[JointSummary]:
+        """Joints with an alarm that nobody has acknowledged, worst first."""
+        found = [joint for joint in self.joints if joint.shown == "alarm"]
+        return sorted(found, key=_worst_first)
+
+    @property
+    def shown(self) -> str:
+        """The worst of its joints, or what became of its last night."""
+        shown = [joint.shown for joint in self.joints]
+        if self.broken:
+            shown.append("failed")
+        elif self.last is not None and self.last.status == "baseline":
+            shown.append("baseline")
+        return min(shown, key=SEVERITY.index, default="failed")
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A cell, its robots by name."""
+
+    robots: tuple[RobotSummary, ...]
+
+    def only(self, names: Sequence[str]) -> "Summary":
+        """Return some robots of the cell."""
+        return Summary(tuple(robot for robot in self.robots if robot.name in names))
+
+    def needing(self) -> list[RobotSummary]:
+        """Return the robots that need a look, worst first."""
+        found = [one for one in self.robots if one.alarms or one.broken]
+        return sorted(
+            found,
+            key=lambda one: (
+                SEVERITY.index(one.shown),
+                _worst_first(one.alarms[0]) if one.alarms else (),
+                one.name,
+            ),
+        )
+
+    def headline(self) -> str:
+        """Return the cell in one sentence."""
+        if not self.robots:
+            return "No robot has been looked at yet"
+        counts = Counter(one.shown for one in self.robots)
+        n_alarms = sum(len(one.alarms) for one in self.robots)
+        parts = []
+        if n_alarms:
+            joints = "joint" if n_alarms == 1 else "joints"
+            parts.append(f"{n_alarms} {joints} of {_robots(counts['alarm'])} with an alarm")
+        for state, words in (
+            ("failed", "could not be judged"),
+            ("fault", "with a fault in the last night, no alarm yet"),
+            ("changed", "changed in the last night, no alarm yet"),
+            ("insufficient-data", "with a joint that was not judged"),
+            ("known", "with an acknowledged alarm"),
+            ("baseline", "recording the baseline"),
+            ("healthy", "healthy"),
+        ):
+            if counts[state]:
+                parts.append(f"{_robots(counts[state])} {words}")
+        return "; ".join(parts)
+
+
+def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
+    """Read how a cell stands.
+
+    Parameters
+    ----------
+    history
+        Of the cell.
+    robots
+        Robots of the cell that may have no night yet.
+    """
+    standing = {
+        (alarm.robot, alarm.program, alarm.axis): alarm for alarm in history.alarms(standing=True)
+    }
+    last: dict[str, NightRow] = {}
+    for night in history.nights().values():
+        if night.robot not in last or night.night > last[night.robot].night:
+            last[night.robot] = night
+    joints: dict[str, list[JointSummary]] = {}
+    query = (
+        "SELECT robot, program, axis, state, max(night) AS night, report, health_index "
+        "FROM verdict GROUP BY robot, program, axis"
+    )
+    for row in history.rows(query):
+        alarm = standing.get((row["robot"], row["program"], row["axis"]))
+        joints.setdefault(row["robot"], []).append(_joint(row, alarm))
+    names = sorted({*last, *joints, *robots})
+    return Summary(
+        tuple(RobotSummary(name, tuple(joints.get(name, ())), last.get(name)) for name in names)
+    )
+
+
+def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
+    return JointSummary(
+        row["axis"],
+        row["program"],
+        row["state"],
+        row["night"],
+        row["report"] or "",
+        row["health_index"],
+        alarm,
+    )
+
+
+def _worst_first(joint: JointSummary) -> tuple[int, float]:
+    return SEVERITY.index(joint.state), -(joint.health_index or 0.0)
+
+
+def _robots(count: int) -> str:
+    return f"{count} robot" if count == 1 else f"{count} robots"

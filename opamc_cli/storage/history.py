@@ -1,0 +1,516 @@
+"""The history of a cell: one SQLite file, every night that was judged, and what was said of it.
+
+The tables `verdict` and `event` are for everybody; the others hold what the next start needs. All
+that one start learns of one robot's night is one transaction: after a kill or a power cut it is
+there or it is not. Nothing in the file depends on the order in which nights were computed, nor on
+the clock, but the times at which a user acknowledged or declared something.
+"""
+
+import json
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from typing import Any, Self, get_args, get_type_hints
+
+import pyarrow as pa
+
+from opamc_cli.errors import InputError, UsageError
+from opamc_cli.storage.atomic import ensure_directory
+
+FILE_NAME = "history.sqlite"
+SCHEMA_VERSION = 1
+BUSY_S = 60.0
+"""Another process may be writing: its transactions last milliseconds."""
+
+SCHEMA = """
+CREATE TABLE verdict (
+  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, night TEXT NOT NULL,
+  state TEXT NOT NULL, health_index REAL, p_value REAL, cause TEXT, alarm INTEGER NOT NULL,
+  temperature_c REAL, payload_kg REAL, speed_percent REAL, n_runs INTEGER NOT NULL,
+  report TEXT, config_hash TEXT NOT NULL, version TEXT NOT NULL,
+  PRIMARY KEY (robot, program, axis, night)
+) WITHOUT ROWID;
+CREATE TABLE event (
+  time TEXT NOT NULL, robot TEXT NOT NULL, axis INTEGER, kind TEXT NOT NULL, text TEXT NOT NULL
+);
+CREATE INDEX event_of ON event (robot, kind);
+CREATE TABLE measure (
+  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, night TEXT NOT NULL,
+  baseline TEXT NOT NULL, distance REAL, common REAL, effect REAL, harmless INTEGER NOT NULL,
+  reason TEXT NOT NULL,
+  PRIMARY KEY (robot, program, axis, night)
+) WITHOUT ROWID;
+CREATE TABLE night (
+  robot TEXT NOT NULL, night TEXT NOT NULL, key TEXT NOT NULL, status TEXT NOT NULL,
+  attempts INTEGER NOT NULL, why TEXT NOT NULL, notes TEXT NOT NULL,
+  PRIMARY KEY (robot, night)
+) WITHOUT ROWID;
+CREATE TABLE file (
+  path TEXT NOT NULL PRIMARY KEY, robot TEXT NOT NULL, night TEXT, size INTEGER NOT NULL,
+  mtime_ns INTEGER NOT NULL, sha256 TEXT NOT NULL, facts TEXT NOT NULL
+) WITHOUT ROWID;
+CREATE INDEX file_of ON file (robot);
+CREATE TABLE baseline (
+  robot TEXT NOT NULL, program TEXT NOT NULL, condition TEXT NOT NULL, since TEXT NOT NULL,
+  night TEXT NOT NULL, PRIMARY KEY (robot, program, condition, since, night)
+) WITHOUT ROWID;
+CREATE TABLE declared (
+  time TEXT NOT NULL, robot TEXT NOT NULL, axis INTEGER, kind TEXT NOT NULL, night TEXT NOT NULL,
+  why TEXT NOT NULL
+);
+CREATE TABLE alarm (
+  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, raised TEXT NOT NULL,
+  since TEXT NOT NULL, cleared TEXT, acknowledged TEXT, text TEXT NOT NULL, trend TEXT NOT NULL,
+  PRIMARY KEY (robot, program, axis, raised)
+) WITHOUT ROWID;
+CREATE TABLE told (
+  robot TEXT NOT NULL, axis INTEGER NOT NULL, kind TEXT NOT NULL, time TEXT NOT NULL,
+  PRIMARY KEY (robot, axis, kind, time)
+) WITHOUT ROWID;
+CREATE TABLE rule (hash TEXT NOT NULL);
+CREATE TABLE stale (robot TEXT NOT NULL PRIMARY KEY) WITHOUT ROWID;
+"""
+
+OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed")
+"""Kinds of event that follow from the nights of one robot."""
+
+DERIVED = (*OF_ROBOT, "missing")
+"""Kinds of event that follow from the nights; the others were declared by a user."""
+
+
+@dataclass(frozen=True)
+class VerdictRow:
+    """One joint in one night; the columns of table `verdict`."""
+
+    robot: str
+    program: str
+    axis: int
+    night: str
+    state: str
+    health_index: float | None
+    p_value: float | None
+    cause: str | None
+    alarm: int
+    temperature_c: float | None
+    payload_kg: float | None
+    speed_percent: float | None
+    n_runs: int
+    report: str | None
+    config_hash: str
+    version: str
+
+
+@dataclass(frozen=True)
+class MeasureRow:
+    """What trend and alarm rest on beside the verdict.
+
+    Attributes
+    ----------
+    baseline
+        Name of the baseline that the night was compared with; a series ends where it changes.
+    distance
+        Logarithm of the distance from the baseline in healthy sessions' own.
+    common
+        What of it the robot's joints have in common.
+    effect
+        Relative change behind the state.
+    harmless
+        Whether the change has a cause outside the joint.
+    reason
+        First reason of the verdict, for what could not be judged.
+    """
+
+    robot: str
+    program: str
+    axis: int
+    night: str
+    baseline: str
+    distance: float | None
+    common: float | None
+    effect: float | None
+    harmless: int
+    reason: str
+
+
+@dataclass(frozen=True)
+class NightRow:
+    """What became of one robot's night.
+
+    Attributes
+    ----------
+    key
+        Hash of its inputs, options and version.
+    status
+        done, partial, baseline, failed (will fail again) or broken (may be tried again).
+    attempts
+        Starts that it broke in.
+    why
+        One sentence, if anything failed.
+    notes
+        JSON list of what is worth knowing.
+    """
+
+    robot: str
+    night: str
+    key: str
+    status: str
+    attempts: int = 0
+    why: str = ""
+    notes: str = "[]"
+
+
+@dataclass(frozen=True)
+class FileRow:
+    """A recording as it was when it was last read."""
+
+    path: str
+    robot: str
+    night: str | None
+    size: int
+    mtime_ns: int
+    sha256: str
+    facts: str
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened to a robot or one of its joints."""
+
+    time: str
+    robot: str
+    axis: int | None
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Declared:
+    """What a user said: a baseline from a night on, or an alarm that is known."""
+
+    time: str
+    robot: str
+    axis: int | None
+    kind: str
+    night: str
+    why: str
+
+
+@dataclass(frozen=True)
+class AlarmRow:
+    """One alarm, standing while `cleared` is None."""
+
+    robot: str
+    program: str
+    axis: int
+    raised: str
+    since: str
+    cleared: str | None
+    acknowledged: str | None
+    text: str
+    trend: str
+
+
+class History:
+    """An open history.
+
+    Parameters
+    ----------
+    path
+        The file; made if it is not there, unless `read_only`.
+    read_only
+        For those who look only.
+
+    Raises
+    ------
+    InputError
+        If there is no history, or the file is none of ours.
+    UsageError
+        If the file cannot be opened or written.
+    """
+
+    def __init__(self, path: Path, *, read_only: bool = False) -> None:
+        self.path = path
+        if read_only and not path.is_file():
+            msg = f"{path}: no history here yet; `opamc nightly` writes it"
+            raise InputError(msg)
+        if not read_only:
+            ensure_directory(path.parent)
+        with self._errors():
+            # WAL needs to write beside the file even to read it; a reader locks nobody out
+            self._db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+            self._db.execute("PRAGMA journal_mode = WAL")
+            self._db.execute("PRAGMA synchronous = FULL")
+            self._prepare()
+
+    def _prepare(self) -> None:
+        version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version == 0:
+            with self.transaction():
+                # another process may have been first
+                if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:
+                    for statement in SCHEMA.split(";"):
+                        self._db.execute(statement)
+                    self._db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")
+        elif version != SCHEMA_VERSION:
+            msg = (
+                f"{self.path}: is a history of layout {version}, this opamc knows "
+                f"{SCHEMA_VERSION}; use the version that wrote it, or another `out`"
+            )
+            raise InputError(msg)
+
+    def __enter__(self) -> Self:
+        """Return the history itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        self._db.close()
+
+    @contextmanager
+    def _errors(self) -> Iterator[None]:
+        try:
+            yield
+        except sqlite3.DatabaseError as error:
+            if "not a database" in str(error) or "malformed" in str(error):
+                msg = f"{self.path}: is no history of opamc ({error}); move it away"
+                raise InputError(msg) from error
+            msg = f"{self.path}: cannot be written or read ({error}); check space and permissions"
+            raise UsageError(msg) from error
+
+    @contextmanager
+    def transaction(self) -> Iterator[None]:
+        """Make what is written inside whole or absent."""
+        with self._errors():
+            self._db.execute("BEGIN IMMEDIATE")
+            try:
+                yield
+            except BaseException:
+                if self._db.in_transaction:
+                    self._db.execute("ROLLBACK")
+                raise
+            self._db.execute("COMMIT")
+
+    def rows(self, query: str, values: Sequence[Any] = ()) -> list[dict[str, Any]]:
+        """Return all rows of a query, each by its columns' names."""
+        with self._errors():
+            cursor = self._db.execute(query, values)
+            names = [column[0] for column in cursor.description]
+            return [dict(zip(names, row, strict=True)) for row in cursor]
+
+    # -- what the next start needs -----------------------------------------------------------
+
+    def files(self) -> dict[str, FileRow]:
+        """Return every recording that is remembered, by path."""
+        return {row["path"]: FileRow(**row) for row in self.rows("SELECT * FROM file")}
+
+    def remember_files(self, files: Iterable[FileRow]) -> None:
+        """Remember recordings that were read."""
+        with self.transaction():
+            self._put("file", files)
+
+    def nights(self) -> dict[tuple[str, str], NightRow]:
+        """Return what became of every robot's night."""
+        found = (NightRow(**row) for row in self.rows("SELECT * FROM night"))
+        return {(row.robot, row.night): row for row in found}
+
+    def baselines(self) -> dict[tuple[str, str, str, str], list[str]]:
+        """Return the nights of every complete baseline, by robot, program, condition and since."""
+        found: dict[tuple[str, str, str, str], list[str]] = {}
+        for row in self.rows("SELECT * FROM baseline ORDER BY night"):
+            key = (row["robot"], row["program"], row["condition"], row["since"])
+            found.setdefault(key, []).append(row["night"])
+        return found
+
+    def pin_baseline(self, key: tuple[str, str, str, str], nights: Iterable[str]) -> None:
+        """Remember the nights of a baseline that is complete: it does not move any more."""
+        with self.transaction():
+            self._db.executemany(
+                "INSERT OR REPLACE INTO baseline VALUES (?, ?, ?, ?, ?)",
+                [(*key, night) for night in nights],
+            )
+
+    def record_night(
+        self,
+        night: NightRow,
+        verdicts: Iterable[VerdictRow] = (),
+        measures: Iterable[MeasureRow] = (),
+    ) -> None:
+        """Record a robot's night, in the place of what was known of it."""
+        with self.transaction():
+            place = (night.robot, night.night)
+            for table in ("verdict", "measure"):
+                self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND night = ?", place)
+            self._put("night", [night])
+            self._put("verdict", verdicts)
+            self._put("measure", measures)
+            self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (night.robot,))
+
+    # -- trend and alarm ---------------------------------------------------------------------
+
+    def stale(self) -> list[str]:
+        """Return the robots whose alarms do not take all nights into account yet."""
+        return [row["robot"] for row in self.rows("SELECT robot FROM stale ORDER BY robot")]
+
+    def apply_rule(self, rule: str) -> None:
+        """Have all alarms found anew if the rule for them has changed."""
+        if [row["hash"] for row in self.rows("SELECT hash FROM rule")] == [rule]:
+            return
+        with self.transaction():
+            self._db.execute("DELETE FROM rule")
+            self._db.execute("INSERT INTO rule VALUES (?)", (rule,))
+            self._db.execute("INSERT OR IGNORE INTO stale SELECT DISTINCT robot FROM night")
+
+    def series(self, robot: str) -> list[dict[str, Any]]:
+        """Return verdicts and measures of a robot by program, axis and night."""
+        return self.rows(
+            "SELECT v.*, m.baseline, m.distance, m.common, m.effect, m.harmless, m.reason "
+            "FROM verdict v JOIN measure m USING (robot, program, axis, night) "
+            "WHERE robot = ? ORDER BY program, axis, night",
+            (robot,),
+        )
+
+    def settle(
+        self,
+        robot: str,
+        alarms: Iterable[AlarmRow],
+        standing: Iterable[tuple[str, int, str]],
+        events: Iterable[Event],
+    ) -> None:
+        """Replace what follows from a robot's nights.
+
+        Parameters
+        ----------
+        robot
+            Its name.
+        alarms
+            All its alarms.
+        standing
+            Program, axis and night of every night in which the alarm rule stands.
+        events
+            What is worth saying.
+        """
+        with self.transaction():
+            self._db.execute("DELETE FROM alarm WHERE robot = ?", (robot,))
+            self._db.execute(
+                f"DELETE FROM event WHERE robot = ? AND kind IN ({_marks(OF_ROBOT)})",
+                (robot, *OF_ROBOT),
+            )
+            self._db.execute("UPDATE verdict SET alarm = 0 WHERE robot = ? AND alarm", (robot,))
+            self._db.executemany(
+                "UPDATE verdict SET alarm = 1 "
+                "WHERE robot = ? AND program = ? AND axis = ? AND night = ?",
+                [(robot, *place) for place in standing],
+            )
+            self._put("alarm", alarms)
+            self._put("event", events)
+            self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
+
+    def replace_missing(self, events: Iterable[Event]) -> None:
+        """Replace what is said of nights without files; it depends on all robots."""
+        found = list(events)
+        if found == [one for one in self.events() if one.kind == "missing"]:
+            return
+        with self.transaction():
+            self._db.execute("DELETE FROM event WHERE kind = 'missing'")
+            self._put("event", found)
+
+    def alarms(self, *, standing: bool = False) -> list[AlarmRow]:
+        """Return all alarms, or those that stand, by robot, program, axis and night."""
+        where = "WHERE cleared IS NULL" if standing else ""
+        return [
+            AlarmRow(**row)
+            for row in self.rows(f"SELECT * FROM alarm {where} ORDER BY robot, axis, raised")
+        ]
+
+    def declared(self, robot: str | None = None) -> list[Declared]:
+        """Return what users declared, in the order in which they did."""
+        found = [Declared(**row) for row in self.rows("SELECT * FROM declared ORDER BY rowid")]
+        return [one for one in found if robot in (None, one.robot)]
+
+    def declare(self, said: Declared, text: str) -> None:
+        """Keep what a user declared, and the event that it is."""
+        with self.transaction():
+            self._put("declared", [said])
+            self._put("event", [Event(said.time, said.robot, said.axis, said.kind, text)])
+            self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (said.robot,))
+
+    def events(self, *, untold: bool = False) -> list[Event]:
+        """Return events in time order, or those that nobody was told of."""
+        query = "SELECT * FROM event ORDER BY time, robot, axis, kind, text"
+        found = [Event(**row) for row in self.rows(query)]
+        return self.untold(found) if untold else found
+
+    def untold(self, events: Sequence[Event]) -> list[Event]:
+        """Return those of some events that nobody was told of."""
+        known = {tuple(row.values()) for row in self.rows("SELECT * FROM told")}
+        return [
+            one for one in events if (one.robot, one.axis or 0, one.kind, one.time) not in known
+        ]
+
+    def tell(self, events: Iterable[Event]) -> None:
+        """Remember that somebody was told."""
+        with self.transaction():
+            self._db.executemany(
+                "INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)",
+                [(one.robot, one.axis or 0, one.kind, one.time) for one in events],
+            )
+
+    def forget_reports(self, robot: str, nights: Iterable[str]) -> None:
+        """Forget where the reports of nights lay that have been removed."""
+        with self.transaction():
+            self._db.executemany(
+                "UPDATE verdict SET report = NULL WHERE robot = ? AND night = ?",
+                [(robot, night) for night in nights],
+            )
+
+    def _put(self, table: str, rows: Iterable[Any]) -> None:
+        values = [astuple(row) for row in rows]
+        if values:
+            self._db.executemany(
+                f"INSERT OR REPLACE INTO {table} VALUES ({_marks(values[0])})", values
+            )
+
+
+def arrow_schema(table: str) -> pa.Schema:
+    """Return the columns of table `verdict` or `event` as exports have them."""
+    row = {"verdict": VerdictRow, "event": Event}[table]
+    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64()}
+    types = get_type_hints(row)
+    return pa.schema(
+        [
+            (name, next(kinds[t] for t in (*get_args(of), of) if t in kinds))
+            for name, of in types.items()
+        ]
+    )
+
+
+def as_notes(notes: Iterable[str]) -> str:
+    """Return notes as a night keeps them."""
+    return json.dumps(list(notes), ensure_ascii=False)
+
+
+def dump(path: Path) -> Mapping[str, list[tuple[Any, ...]]]:
+    """Return everything that a history holds but for what holds a clock, in a fixed order.
+
+    A file's modification time and the time at which a user declared something are left out.
+    """
+    with History(path, read_only=True) as history:
+        tables = [
+            row["name"]
+            for row in history.rows("SELECT name FROM sqlite_master WHERE type = 'table'")
+        ]
+        found = {}
+        for table in sorted(tables):
+            rows = history.rows(f"SELECT * FROM {table}")
+            for row in rows:
+                row.pop("mtime_ns", None)
+                if table == "declared" or (table == "event" and row["kind"] not in DERIVED):
+                    row.pop("time")
+            found[table] = sorted((tuple(row.values()) for row in rows), key=repr)
+        return found
+
+
+def _marks(values: Sequence[object]) -> str:
+    return ", ".join("?" * len(values))

@@ -1,0 +1,244 @@
+"""Where a cell's recordings lie: files that fit a pattern with {robot} and {night}.
+
+A pattern is a path with shell wildcards, on a mounted file system or, read only, an address that
+pyarrow's file systems know, such as ``s3://bucket/logs/{robot}/{night}/*.parquet``.
+"""
+
+import glob
+import hashlib
+import json
+import os
+import re
+import shutil
+import stat
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from datetime import date
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.fs
+
+from opamc_cli.errors import InputError, OpamcError
+from opamc_cli.storage.runs import Run, RunInfo
+
+BLOCK_BYTES = 1 << 22
+
+
+@dataclass(frozen=True)
+class LogFile:
+    """A recording that was found.
+
+    Attributes
+    ----------
+    path
+        Where it is: a path, or an address with ``://``.
+    robot
+        Name in the place of {robot}.
+    night
+        YYYY-MM-DD in the place of {night}; None where the pattern has none.
+    size, mtime_ns
+        To tell whether it is the file that it was.
+    """
+
+    path: str
+    robot: str
+    night: str | None
+    size: int
+    mtime_ns: int
+
+    @property
+    def remote(self) -> bool:
+        """Whether it has to be fetched before it can be read."""
+        return "://" in self.path
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a recording says of itself, or why it cannot be read.
+
+    Attributes
+    ----------
+    program
+        Its name; empty if the recording names none.
+    speed_percent, payload_kg, sampling_rate_hz
+        Its conditions.
+    started_at
+        ISO 8601.
+    error
+        Why it is no recording; empty if it is one.
+    """
+
+    program: str = ""
+    speed_percent: float | None = None
+    payload_kg: float | None = None
+    sampling_rate_hz: float | None = None
+    started_at: str | None = None
+    error: str = ""
+
+    @classmethod
+    def of(cls, info: RunInfo) -> "Facts":
+        """Take what matters from a recording's metadata."""
+        return cls(
+            info.program or "",
+            info.speed_percent,
+            info.payload_kg,
+            info.sampling_rate_hz,
+            info.started_at,
+        )
+
+    @classmethod
+    def from_json(cls, text: str) -> "Facts":
+        """Read what `to_json` wrote."""
+        return cls(**json.loads(text))
+
+    def to_json(self) -> str:
+        """Return the facts as the history keeps them."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+
+def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
+    """List the recordings that fit a pattern, sorted by path.
+
+    Parameters
+    ----------
+    pattern
+        With {robot} and maybe {night}.
+    robots
+        Names that may stand in the place of {robot}; None: any.
+
+    Raises
+    ------
+    InputError
+        If an address cannot be listed.
+    """
+    expression = _expression(pattern)
+    found = []
+    for path, size, mtime_ns in (_remote if "://" in pattern else _local)(pattern, robots):
+        fits = expression.fullmatch(path)
+        if fits is None:
+            continue
+        named = fits.groupdict()
+        robot, night = named.get("robot") or "", named.get("night")
+        if (robots is not None and robot and robot not in robots) or not _is_night(night):
+            continue
+        if robot:
+            found.append(LogFile(path, robot, night, size, mtime_ns))
+        else:  # one baseline for several robots
+            found += [LogFile(path, each, night, size, mtime_ns) for each in robots or ()]
+    return sorted(found, key=lambda one: (one.robot, one.path))
+
+
+def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
+    """Read a recording once: its SHA-256 and what it says of itself.
+
+    Parameters
+    ----------
+    log
+        The recording.
+    at
+        Where it, or its copy, can be opened.
+    """
+    digest = hashlib.sha256()
+    try:
+        with at.open("rb") as file:
+            while block := file.read(BLOCK_BYTES):
+                digest.update(block)
+        with Run(at) as run:
+            facts = Facts.of(run.info)
+    except OpamcError as error:
+        facts = Facts(error=str(error).replace(str(at), log.path))
+    except OSError as error:
+        facts = Facts(error=f"{log.path}: cannot be read ({error.strerror or error})")
+    return digest.hexdigest(), facts
+
+
+def fetch(log: LogFile, to: Path) -> Path:
+    """Return where a recording can be opened: its own place, or a copy in the folder `to`.
+
+    Raises
+    ------
+    InputError
+        If it cannot be copied.
+    """
+    if not log.remote:
+        return Path(log.path)
+    name = hashlib.sha256(f"{log.path} {log.size} {log.mtime_ns}".encode()).hexdigest()
+    copy = to / f"{name}.parquet"
+    if copy.exists():
+        return copy
+    to.mkdir(parents=True, exist_ok=True)
+    part = to / f"{name}.{os.getpid()}.part"
+    try:
+        filesystem, path = pa.fs.FileSystem.from_uri(log.path)
+        with filesystem.open_input_stream(path) as source, part.open("wb") as target:
+            shutil.copyfileobj(source, target, BLOCK_BYTES)
+        part.replace(copy)
+    except (OSError, pa.ArrowException) as error:
+        part.unlink(missing_ok=True)
+        msg = f"{log.path}: cannot be fetched ({_first_line(error)}); check address and credentials"
+        raise InputError(msg) from error
+    return copy
+
+
+def _local(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
+    wild = pattern.replace("{night}", "*")
+    names = [glob.escape(name) for name in robots] if robots is not None else ["*"]
+    for name in names if "{robot}" in wild else ["*"]:
+        # plain strings: tens of thousands of Path objects take a second
+        for path in glob.iglob(wild.replace("{robot}", name), recursive=True):  # noqa: PTH207
+            try:
+                state = os.stat(path)  # noqa: PTH116
+            except OSError:
+                continue  # gone between listing and looking
+            if stat.S_ISREG(state.st_mode):  # a pipe or a folder is no log
+                yield path, state.st_size, state.st_mtime_ns
+
+
+def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
+    del robots
+    scheme, _, rest = pattern.partition("://")
+    fixed = re.split(r"[*?\[{]", rest, maxsplit=1)[0].rpartition("/")[0]
+    try:
+        filesystem, root = pa.fs.FileSystem.from_uri(f"{scheme}://{fixed}")
+        selector = pa.fs.FileSelector(root, recursive=True, allow_not_found=True)
+        listed = filesystem.get_file_info(selector)
+    except (OSError, pa.ArrowException) as error:
+        msg = f"{pattern}: cannot be listed ({_first_line(error)}); check address and credentials"
+        raise InputError(msg) from error
+    for info in listed:
+        if info.type == pa.fs.FileType.File:
+            below = info.path[len(root) :].lstrip("/")
+            yield f"{scheme}://{fixed}/{below}", info.size, info.mtime_ns or 0
+
+
+def _expression(pattern: str) -> re.Pattern[str]:
+    """Turn a pattern into a regular expression with the groups robot and night."""
+    parts = re.split(r"(\{robot\}|\{night\}|\*\*/|\*|\?|\[[^\]]*\])", pattern)
+    known: set[str] = set()
+    text = ""
+    for part in parts:
+        if part in ("{robot}", "{night}"):
+            name = part[1:-1]
+            form = r"[^/]+?" if name == "robot" else r"\d{4}-\d{2}-\d{2}"
+            text += f"(?P={name})" if name in known else f"(?P<{name}>{form})"
+            known.add(name)
+        elif part.startswith("["):
+            text += part.replace("[!", "[^")
+        else:
+            text += {"**/": r"(?:.*/)?", "*": r"[^/]*", "?": r"[^/]"}.get(part, re.escape(part))
+    return re.compile(text)
+
+
+def _is_night(text: str | None) -> bool:
+    if text is None:
+        return True
+    try:
+        date.fromisoformat(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _first_line(error: Exception) -> str:
+    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else "no reason"

@@ -1,0 +1,60 @@
+"""When nights make an alarm: k of n of them, or one that is gross; and when it is over."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Night:
+    """What the rule looks at.
+
+    Attributes
+    ----------
+    signal : bool
+        The joint is not as it was, by the night's own verdict or by the chart.
+    gross : bool
+        So much so that one night is enough.
+    judged : bool
+        False: nothing is known of the night, which neither raises nor clears.
+    """
+
+    signal: bool
+    gross: bool = False
+    judged: bool = True
+
+
+@dataclass(frozen=True)
+class Episode:
+    """An alarm, by index of its nights: half-open, `cleared` is None while it stands."""
+
+    raised: int
+    cleared: int | None
+
+
+def episodes(nights: Sequence[Night], needed: int, among: int) -> list[Episode]:
+    """Return every alarm of a series of nights.
+
+    Parameters
+    ----------
+    nights
+        In time order.
+    needed, among
+        An alarm is raised in the night in which `needed` of the last `among` judged nights have a
+        signal; it is cleared in the first night in which none of the last `among` has.
+    """
+    found: list[Episode] = []
+    recent: list[bool] = []
+    raised: int | None = None
+    for index, night in enumerate(nights):
+        if not night.judged:
+            continue
+        recent = [*recent, night.signal][-among:]
+        if raised is None:
+            if night.gross or (night.signal and sum(recent) >= needed):
+                raised = index
+        elif not any(recent) and len(recent) == among:
+            found.append(Episode(raised, index))
+            raised = None
+    if raised is not None:
+        found.append(Episode(raised, None))
+    return found
