@@ -79,7 +79,7 @@ def algebraic_cases(seed: int, wanted: Wanted) -> Iterator[Case]:
     for k, hidden in enumerate(effects):
         number = 100 * seed + k
         motion = motions[(k + seed) % len(motions)]
-        size = wanted.turn(k + seed // len(motions)) if hidden else None
+        size = wanted.turn(k + 2 * seed) if hidden else None
         stroke = "several programs" if motion == "random" else "cyclic"
         joint = algebraic_joint.record(motion, None, 0.0, number).joint
         yield Case(
