@@ -1,82 +1,78 @@
-"""The `opamc` command: its subcommands, and the one place where errors become exit codes.
+"""The `opamc` command, and the one place where errors become exit codes.
 
-Nothing here or in the command files imports numpy or what needs it at module level, so that
-`opamc --help` answers at once.
+Nothing but the interpreter's own is imported before the signals are in hand: an interruption in
+the first millisecond ends as one in the last.
 """
 
-import json
 import os
 import sys
-import traceback
 from collections.abc import Sequence
-from typing import Annotated
 
-import typer
-
-from opamc_cli import __version__
-from opamc_cli.commands import COMMANDS, GROUPS
-from opamc_cli.commands.plain import PlainCommand
-from opamc_cli.errors import ExitCode, OpamcError
-
-app = typer.Typer(
-    name="opamc",
-    help="Tell from motor current which joint of a robot arm is healthy, which is not, and why.",
-    epilog="Exit codes: 0 done and healthy, 1 a joint has changed or is at fault, 2 usage or "
-    "config error, 3 an input cannot be used, 4 some runs failed, 5 not enough data for a "
-    "verdict, 6 another run holds the lock, 70 a bug.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-def _print_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"opamc {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _root(
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
-        ),
-    ] = False,
-) -> None: ...
-
-
-for _name, _command in COMMANDS.items():
-    app.command(_name, cls=PlainCommand)(_command)
-for _name, _group in GROUPS.items():
-    for _info in _group.registered_commands:
-        _info.cls = PlainCommand
-    app.add_typer(_group, name=_name)
+from opamc_cli.errors import ExitCode, OpamcError, UsageError
+from opamc_cli.interruption import Interrupted, interruptible
+from opamc_cli.standard_streams import open_streams, say
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run `opamc` and exit with one of `ExitCode`."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    try:
-        app(args=given, prog_name="opamc")
-    except OpamcError as error:
-        _tell(str(error), error.exit_code, given)
-        sys.exit(error.exit_code)
-    except Exception as error:  # noqa: BLE001 - the last resort; everything known is above
-        if os.environ.get("OPAMC_DEBUG"):
-            traceback.print_exc()
-        told = f"a bug: {type(error).__name__}: {error} (set OPAMC_DEBUG=1 for the traceback)"
-        _tell(told, ExitCode.BUG, given)
-        sys.exit(ExitCode.BUG)
+    """Run `opamc` and exit with one of `ExitCode`, or 128 and the number of a signal."""
+    with interruptible():
+        open_streams()
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        try:
+            _run(given)
+        except OpamcError as error:
+            _tell(str(error), error.exit_code, given)
+            sys.exit(error.exit_code)
+        except Interrupted as error:
+            _tell(str(error), error.code, given)
+            raise
+        except MemoryError:
+            message = "out of memory; use fewer --jobs, shorter recordings, or another machine"
+            _tell(message, ExitCode.USAGE, given)
+            sys.exit(ExitCode.USAGE)
+        except OSError as error:
+            # what the system refuses is no bug of ours: no space, no permission, too many files
+            where = f"{error.filename}: " if error.filename is not None else ""
+            message = f"{where}{error.strerror or error}; check space, permissions and limits"
+            _tell(message, ExitCode.USAGE, given)
+            sys.exit(ExitCode.USAGE)
+        except Exception as error:  # noqa: BLE001 - the last resort; everything known is above
+            if os.environ.get("OPAMC_DEBUG"):
+                import traceback
+
+                traceback.print_exc()
+            told = f"a bug: {type(error).__name__}: {error} (set OPAMC_DEBUG=1 for the traceback)"
+            _tell(told, ExitCode.BUG, given)
+            sys.exit(ExitCode.BUG)
 
 
-def _tell(message: str, code: ExitCode, given: Sequence[str]) -> None:
+def _run(given: list[str]) -> None:
+    for argument in given:
+        if not argument.isprintable() and any("\ud800" <= c <= "\udfff" for c in argument):
+            msg = f"{argument!r}: is not UTF-8; rename the file or write the option in UTF-8"
+            raise UsageError(msg)
+    from opamc_cli.command_line import run
+
+    sys.exit(run(given))
+
+
+def _tell(message: str, code: int, given: Sequence[str]) -> None:
     """Print an error on stderr, and as JSON on stdout where the result would have been JSON."""
-    print(f"opamc: {message}", file=sys.stderr)
+    say(f"opamc: {message}\n", sys.stderr)
     if "--json" in given:
-        print(json.dumps({"error": {"message": message, "exit_code": int(code)}}, indent=2))
+        import json
+
+        values = {"error": {"message": message, "exit_code": int(code)}}
+        say(json.dumps(values, indent=2) + "\n", sys.stdout)
+
+
+def __getattr__(name: str) -> object:
+    """Hand out the subcommands without importing them before they are asked for."""
+    if name == "app":
+        from opamc_cli.command_line import app
+
+        return app
+    raise AttributeError(name)
 
 
 if __name__ == "__main__":

@@ -113,18 +113,25 @@ def close(
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages import model as stage
     from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.result import published, result
     from opamc_cli.storage.runs import find_runs
 
     output = Output(as_json, quiet)
     declared = load_joint_model(model, overrides or ())
-    with output_lock(out), _naming(model), output.steps() as steps:
+    extended = [path.name for path in out.glob("model_axis*.yaml")]
+    with (
+        output_lock(out),
+        result(out, *stage.CLOSE_FILES, *extended) as staged,
+        _naming(model),
+        output.steps() as steps,
+    ):
         outcome = stage.close(
-            declared, find_runs(runs), axis or (), out, seed, watch=steps("close")
+            declared, find_runs(runs), axis or (), staged, seed, watch=steps("close")
         )
     output.result(
         {"axes": list(outcome.results)},
         *(shown for result in outcome.results for shown in _loop_tables(result)),
-        *(str(path) for path in outcome.written),
+        *(str(published(path)) for path in outcome.written),
     )
     raise typer.Exit(
         output.failures([str(error) for error in outcome.errors], len(outcome.results))

@@ -1,14 +1,15 @@
 """What a subcommand prints: results on stdout, notes on stderr."""
 
 import json
-import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TextIO
+from io import StringIO
+from typing import TYPE_CHECKING, Any
 
 from opamc_cli.errors import ExitCode
+from opamc_cli.standard_streams import say
 
 if TYPE_CHECKING:
     from contextlib import AbstractContextManager
@@ -36,7 +37,7 @@ class Output:
     def note(self, text: str) -> None:
         """Print something worth knowing that is not the result."""
         if not self.quiet:
-            _write(f"{text}\n", sys.stderr)
+            say(f"{text}\n", sys.stderr)
 
     def notes(self, texts: Sequence[str], verbose: bool = False) -> None:
         """Print notes, those that differ in nothing but the recording and numbers as one."""
@@ -45,7 +46,7 @@ class Output:
 
     def failure(self, text: str) -> None:
         """Print why one of several runs could not be used."""
-        _write(f"opamc: {text}\n", sys.stderr)
+        say(f"opamc: {text}\n", sys.stderr)
 
     def steps(self) -> "AbstractContextManager[Steps]":
         """Show which step is how far, on a terminal only."""
@@ -61,25 +62,27 @@ class Output:
         An urgent result, such as a joint at fault, is printed even if quiet.
         """
         if self.as_json:
-            _write(json.dumps(values, indent=2, sort_keys=True, allow_nan=False) + "\n", sys.stdout)
+            say(json.dumps(values, indent=2, sort_keys=True, allow_nan=False) + "\n", sys.stdout)
         elif urgent or not self.quiet:
             from rich.console import Console
 
             # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched;
             # brackets in a path are brackets, not markup
+            shown_text = StringIO()
             console = Console(
+                file=shown_text,
+                force_terminal=sys.stdout.isatty() or None,
                 width=None if sys.stdout.isatty() else 120,
                 markup=False,
                 emoji=False,
                 highlight=False,
             )
-            with console.capture() as captured:
-                for item in shown:
-                    console.print(item, soft_wrap=isinstance(item, str))
-            text = captured.get()
+            for item in shown:
+                console.print(item, soft_wrap=isinstance(item, str))
+            text = shown_text.getvalue()
             if not sys.stdout.isatty():
                 text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
-            _write(text, sys.stdout)
+            say(text, sys.stdout)
 
     def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
         """Print the runs that failed and return the exit code that they make."""
@@ -89,20 +92,6 @@ class Output:
             self.note(f"{len(failures)} of {len(failures) + n_done} runs failed, the rest are done")
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
-
-
-def _write(text: str, stream: TextIO) -> None:
-    """Write at once, come what may: the exit code tells more than the text.
-
-    A reader that has seen enough, as ``| head``, is no error, nor is a terminal or a cron that
-    knows no Greek: what it cannot show becomes a question mark.
-    """
-    encoding = stream.encoding or "utf-8"
-    try:
-        stream.write(text.encode(encoding, "replace").decode(encoding))
-        stream.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def folded(texts: Sequence[str]) -> list[str]:

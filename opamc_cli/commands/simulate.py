@@ -45,6 +45,7 @@ def simulate(
     from opamc_cli.config.testbed import load_testbed
     from opamc_cli.stages import simulate as stage
     from opamc_cli.storage.lock import output_lock
+    from opamc_cli.storage.result import result
 
     settings = list(overrides or ())
     for key, value in (
@@ -60,9 +61,14 @@ def simulate(
         settings.append(f"faults=[{', '.join(_fault(text) for text in fault)}]")
     testbed = load_testbed(config, settings)
     output = Output(as_json, quiet)
-    with output_lock(out), output.steps() as steps:
+    with (
+        output_lock(out),
+        # recordings are moved about by their users: plain files, no links
+        result(out, stage.TRUTH_NAME, linked=False) as staged,
+        output.steps() as steps,
+    ):
         outcome = stage.run(
-            testbed, seed, out, truth_signals=truth_signals, jobs=jobs, watch=steps("simulate")
+            testbed, seed, staged, truth_signals=truth_signals, jobs=jobs, watch=steps("simulate")
         )
     rate = testbed.recording.sampling_rate_hz
     output.result(

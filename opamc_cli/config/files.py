@@ -5,29 +5,16 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from opamc_cli.config.kinds import KEYS, USES, kind_of
 from opamc_cli.config.models import Config
+from opamc_cli.config.reading import read_text, shown
 from opamc_cli.config.shipped import shipped_file
+from opamc_cli.config.yaml_values import YamlError, plain_values
 from opamc_cli.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)
-
-
-class _UniqueKeyLoader(yaml.SafeLoader):
-    """Safe loader that refuses a key given twice instead of keeping the last."""
-
-    def construct_mapping(self, node: Any, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=deep)
-            if key in seen:
-                msg = f"key {key!r} is given twice (line {key_node.start_mark.line + 1})"
-                raise yaml.YAMLError(msg)
-            seen.add(key)
-        return super().construct_mapping(node, deep)
 
 
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
@@ -72,16 +59,16 @@ def read_values(
     for override in map(prepare, overrides):
         key, separator, text = override.partition("=")
         if not separator or not key:
-            msg = f"--set {override}: write it as key=value, such as patterns.gamma=1"
+            msg = f"--set {shown(override)}: write it as key=value, such as patterns.gamma=1"
             raise ConfigError(msg)
         try:
-            value = yaml.safe_load(text)
-        except yaml.YAMLError as error:
+            value = plain_values(text)
+        except YamlError as error:
             missing = _unclosed(text)
-            if missing:
+            if 0 < len(missing) <= 5:
                 msg = f"--set {override}: a bracket is open; write {key}={text}{missing}"
             else:
-                msg = f"--set {override}: the value is not YAML ({_flat(error)})"
+                msg = f"--set {shown(override)}: the value is not YAML ({error})"
             raise ConfigError(msg) from error
         _set(values, key.split("."), value, override)
     return values
@@ -95,19 +82,12 @@ def read_yaml(path: Path, prepare: Callable[[str], str] = str) -> dict[str, Any]
     ConfigError
         If it is missing, not YAML, has a key twice, or is no mapping.
     """
+    text = read_text(path, ConfigError)
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror}); check the path"
-        raise ConfigError(msg) from error
-    except UnicodeDecodeError as error:
-        msg = f"{path}: is not a text file in UTF-8 (byte {error.start}); save it as UTF-8"
-        raise ConfigError(msg) from error
-    try:
-        values = yaml.load(prepare(text), Loader=_UniqueKeyLoader)  # a SafeLoader
-    except yaml.YAMLError as error:
+        values = plain_values(prepare(text))
+    except YamlError as error:
         # what stands for all axes in a map is a mapping to YAML
-        what = f"is {USES['map']}" if "axis{n" in text else f"is not valid YAML: {_flat(error)}"
+        what = f"is {USES['map']}" if "axis{n" in text else f"is not valid YAML: {error}"
         msg = f"{path}: {what}"
         raise ConfigError(msg) from error
     if values is None:
@@ -131,7 +111,7 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
     except ValidationError as error:
         # a misspelt key is also a missing one: its spelling is what helps
         first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-        place = [str(part) for part in first["loc"]]
+        place = [_part(part) for part in first["loc"]]
         key = ".".join(place)
         if first["type"] == "extra_forbidden":
             known = _known_keys(model, first["loc"][:-1])
@@ -145,11 +125,10 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
         elif first["type"] == "missing":
             msg = f"{source}: {key} is missing; add it"
         else:
-            value = first["input"]
             wanted = _lower_first(first["msg"])
             if "valid tuple" in wanted:
                 wanted = f"it takes a list, such as {key}={_example(model, first['loc'])}"
-            msg = f"{source}: {key} is {value!r}; {wanted}"
+            msg = f"{source}: {key} is {shown(first['input'])}; {wanted}"
         raise ConfigError(msg) from error
 
 
@@ -208,13 +187,14 @@ def _set(values: dict[str, Any], keys: list[str], value: Any, override: str) -> 
     for key in keys[:-1]:
         values = values.setdefault(key, {})
         if not isinstance(values, dict):
-            msg = f"--set {override}: {key!r} is not a section of the configuration"
+            msg = f"--set {shown(override)}: {shown(key)} is not a section of the configuration"
             raise ConfigError(msg)
     values[keys[-1]] = value
 
 
-def _flat(error: Exception) -> str:
-    return " ".join(str(error).split())
+def _part(part: int | str) -> str:
+    """Return a part of a key's place: as it is, unless it is no name at all."""
+    return str(part) if len(str(part)) <= 80 else shown(part)
 
 
 def _lower_first(text: str) -> str:

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=1e15, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
@@ -26,7 +26,7 @@ class JointConfig(Section):
     gear_ratio: Positive | None = Field(
         None, description="Motor revolutions per joint revolution; null if unknown."
     )
-    pole_pairs: Annotated[int, Field(ge=1)] | None = Field(
+    pole_pairs: Annotated[int, Field(ge=1, le=1000)] | None = Field(
         None, description="Pole pairs of the motor; null if unknown."
     )
     explain: bool = Field(
@@ -82,10 +82,10 @@ class SegmentConfig(Section):
     min_speed_rad_s: Positive = Field(
         0.01, description="A joint that never gets faster stands still (reported current only)."
     )
-    windows: Annotated[int, Field(ge=1)] = Field(
+    windows: Annotated[int, Field(ge=1, le=1000)] = Field(
         4, description="Windows into which a recording that never stands still is cut."
     )
-    min_window_samples: Annotated[int, Field(ge=10)] = Field(
+    min_window_samples: Annotated[int, Field(ge=10, le=10**9)] = Field(
         1200,
         description="Least samples of such a window: ten for each pattern of order 5; fewer "
         "windows are made otherwise.",
@@ -105,7 +105,7 @@ class SegmentConfig(Section):
 class IdentifyConfig(Section):
     """Identification of cycles and motions (thesis 3.3)."""
 
-    segments_per_cycle: Annotated[int, Field(ge=1)] | None = Field(
+    segments_per_cycle: Annotated[int, Field(ge=1, le=10_000)] | None = Field(
         None, description="Motions in a cycle; null: found from the repetition in the reference."
     )
     min_similarity: Fraction = Field(
@@ -135,7 +135,7 @@ class PatternsConfig(Section):
     gamma: Positive = Field(
         2.0, description="Periods of the fastest carrier that the pattern window spans (4-2)."
     )
-    tau: Annotated[int, Field(ge=1)] | None = Field(
+    tau: Annotated[int, Field(ge=1, le=10**6)] | None = Field(
         None, description="Fixed time delay in samples; null: from (4-2) for each motion."
     )
     envelope: Literal["auto", "clarke", "hilbert", "reported"] = Field(
@@ -182,10 +182,10 @@ class ScoreConfig(Section):
     fault_effect: Fraction = Field(
         0.3, description="Relative change from which a change of unknown cause is called a fault."
     )
-    permutations: Annotated[int, Field(ge=100)] = Field(
+    permutations: Annotated[int, Field(ge=100, le=100_000)] = Field(
         1000, description="Most ways of exchanging sessions or cycles that are evaluated."
     )
-    seed: Annotated[int, Field(ge=0)] = Field(
+    seed: Annotated[int, Field(ge=0, le=2**63)] = Field(
         0, description="Seed of the draw where there are more ways."
     )
     day_starts_at: Annotated[float, Field(ge=0, lt=24)] = Field(
@@ -198,7 +198,9 @@ class ScoreConfig(Section):
 class ReportConfig(Section):
     """The report."""
 
-    title: str = Field("Joint health", description="Heading of the HTML report.")
+    title: Annotated[str, Field(max_length=200)] = Field(
+        "Joint health", description="Heading of the HTML report."
+    )
 
 
 class Config(Section):

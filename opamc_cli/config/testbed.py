@@ -65,8 +65,9 @@ def load_testbed(path: Path, overrides: Sequence[str] = ()) -> TestbedConfig:
     robot = values.get("robot")
     if isinstance(robot, dict):
         values["robot"] = robot = dict(robot)
-        common = robot.pop("joint", {})
-        robot["joints"] = [_merged(common, own or {}) for own in robot.get("joints") or []]
+        common, joints = robot.pop("joint", {}), robot.get("joints")
+        if isinstance(joints, list):
+            robot["joints"] = [_merged(common, own or {}) for own in joints]
     _refuse_unknown(TestbedConfig, values, str(path), "")
     config = validate(TestbedConfig, values, str(path))
     _check(config, path)

@@ -10,8 +10,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pydantic_core import from_json
+
+from opamc_cli.config.reading import read_text
+from opamc_cli.errors import InputError
 from opamc_cli.stages import patterns
 from opamc_cli.storage.atomic import write_text
+from opamc_cli.storage.json_documents import MOST_BYTES
 from opamc_cli.storage.runs import file_sha256
 
 FILE_NAME = "findings.json"
@@ -42,12 +47,12 @@ def write_findings(folder: Path, findings: Findings) -> None:
 def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
     """Return the findings in a folder; none where there are none, or of other tables."""
     try:
-        content = json.loads((folder / FILE_NAME).read_text(encoding="utf-8"))
+        content = from_json(read_text(folder / FILE_NAME, InputError, MOST_BYTES))
         vouched = [content["tables"][f"{role}/{patterns.FILE_NAME}"] for role in ROLES]
         found = Findings(
             {int(axis): dict(cause) for axis, cause in content["causes"].items()},
             {int(axis): [str(each) for each in why] for axis, why in content["unjudged"].items()},
         )
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+    except (InputError, ValueError, LookupError, TypeError, AttributeError):
         return Findings()
     return found if vouched == [file_sha256(table) for table in tables] else Findings()

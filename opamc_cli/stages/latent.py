@@ -5,13 +5,16 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import pyarrow as pa
+from pydantic import Field
 
+from opamc_cli.config.reading import read_text
 from opamc_cli.errors import InputError
 from opamc_cli.stats.discriminant import FEATURE_NAMES, LinearDiscriminant, fit
 from opamc_cli.storage.atomic import write_text
+from opamc_cli.storage.json_documents import LARGEST, MOST_BYTES, Document, parsed
 from opamc_cli.storage.runs import file_sha256
 
 CONDITIONS = ("f_max_hz",)
@@ -162,26 +165,61 @@ def read_models(path: Path) -> LatentModels:
     InputError
         If it is missing or not a model file.
     """
+    advice = "train it with --learn first"
+    raw = read_text(path, InputError, MOST_BYTES).encode()
+    content = parsed(_ModelFile, raw, f"{path}:", advice)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        msg = f"{path}: cannot be read ({error.strerror}); train it with --learn first"
-        raise InputError(msg) from error
+        orders = {
+            int(order): LinearDiscriminant.from_dict(model.model_dump())
+            for order, model in content.orders.items()
+        }
     except ValueError as error:
-        msg = f"{path}: is not JSON ({error}); train it with --learn"
+        msg = f"{path}: is not a model file of opamc ({error}); {advice}"
         raise InputError(msg) from error
-    try:
-        if content["kind"] != "opamc latent axis" or content["version"] != 1:
-            msg = f"kind {content['kind']!r}, version {content['version']!r}"
-            raise ValueError(msg)
-        return LatentModels(
-            path,
-            tuple(content["rows"]),
-            {
-                int(order): LinearDiscriminant.from_dict(model)
-                for order, model in content["orders"].items()
-            },
-        )
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
-        msg = f"{path}: is not a model file of opamc ({error}); train it with --learn"
-        raise InputError(msg) from error
+    return LatentModels(path, tuple(row.model_dump() for row in content.rows), orders)
+
+
+Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+
+
+Interval = Annotated[list[Number], Field(min_length=2, max_length=2)]
+
+
+class _Row(Document):
+    """One labelled row; see `LatentModels.rows`."""
+
+    delta_mu: Number
+    delta_var: Number
+    ks: Number
+    f_max_hz: Number
+    axis: int
+    order: Annotated[int, Field(ge=2, le=8)]
+    fault: bool
+    source: str
+
+
+class _Class(Document):
+    count: Annotated[int, Field(ge=0, le=10**9)]
+    mean: Number
+
+
+class _Discriminant(Document):
+    """A trained discriminant; see `LinearDiscriminant.as_dict`."""
+
+    kind: str
+    version: int
+    feature_names: list[str]
+    weights: list[Number]
+    centre: list[Number]
+    classes: dict[str, _Class]
+    shrinkage: Number
+    conditions: dict[Literal["f_max_hz"], Interval]
+
+
+class _ModelFile(Document):
+    """The whole file."""
+
+    kind: Literal["opamc latent axis"]
+    version: Literal[1]
+    orders: dict[Annotated[str, Field(pattern="^[2-8]$")], _Discriminant]
+    rows: list[_Row]

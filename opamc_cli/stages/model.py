@@ -42,6 +42,8 @@ LOOP_NAME = "loop.json"
 MODEL_NAME = "model.yaml"
 RESIDUALS_NAME = "residuals.parquet"
 SPECTRUM_NAME = "order_spectrum.parquet"
+CLOSE_FILES = (LOOP_NAME, MODEL_NAME, CANDIDATES_NAME, FIT_NAME, RESIDUALS_NAME, SPECTRUM_NAME)
+"""What closing the loop leaves, beside `model_axis1.yaml` and so on where there are many axes."""
 
 
 @dataclass(frozen=True)

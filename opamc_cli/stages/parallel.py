@@ -1,14 +1,20 @@
 """One worker process per run: the same results for any number of workers."""
 
+import ctypes
 import os
+import signal
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context, parent_process
 from time import perf_counter
 from typing import Any, Generic, TypeVar
 
-from opamc_cli.errors import OpamcError
+from opamc_cli.errors import OpamcError, UsageError
+from opamc_cli.interruption import held_back
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -76,10 +82,20 @@ def map_items(
         return _gather([_Immediate(function, item) for item in items], watch)
     saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
     os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent, (os.getpid(),))
     try:
-        with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-            return _gather([pool.submit(function, item) for item in items], watch)
+        with held_back():
+            calls = [pool.submit(function, item) for item in items]
+        return _gather(calls, watch)
+    except BrokenProcessPool as error:
+        msg = "a worker process was killed, most often for want of memory; use fewer --jobs"
+        raise UsageError(msg) from error
+    except BaseException:
+        for worker in active_children():
+            worker.kill()
+        raise
     finally:
+        pool.shutdown(cancel_futures=True)
         for name, value in saved.items():
             if value is None:
                 os.environ.pop(name, None)
@@ -110,6 +126,26 @@ def _as_it_pays(
             rest = map_items(function, left, cores, lambda n, _: watch(len(done) + n, len(items)))
             return Outcome(first.results + rest.results, first.errors + rest.errors)
     return _gather(done, watch)
+
+
+def _end_with_parent(parent: int) -> None:
+    """Have this worker end when its parent does, however that ends."""
+    with suppress(AttributeError, OSError):
+        # at once, where the kernel can; below as soon as the interpreter gets to it
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+    threading.Thread(target=_watch_parent, daemon=True).start()
+
+
+def _watch_parent() -> None:
+    process = parent_process()
+    if process is not None:
+        process.join()
+        os._exit(1)
+
+
+_PR_SET_PDEATHSIG = 1
 
 
 class _Immediate(Generic[Item, Result]):

@@ -1,9 +1,10 @@
 """Files that are either whole or not there."""
 
 import os
+import re
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from opamc_cli.errors import UsageError
@@ -59,6 +60,22 @@ def atomic_path(path: Path) -> Iterator[Path]:
         raise UsageError(msg) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+_PART = re.compile(r"\..+\.([a-z0-9_]{8}|link)\.part")
+"""Names of temporary files of `atomic_path` and of a result's links."""
+
+
+def clear_parts(folder: Path) -> None:
+    """Remove what killed processes left half-written in a folder and the folders in it.
+
+    The caller holds the folder's lock.
+    """
+    for pattern in (".*.part", "*/.*.part", "*/*/.*.part"):
+        for path in folder.glob(pattern):
+            if _PART.fullmatch(path.name) and not path.is_dir():
+                with suppress(OSError):
+                    path.unlink()
 
 
 def write_text(path: Path, text: str) -> None:

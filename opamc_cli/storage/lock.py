@@ -7,7 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from opamc_cli.errors import LockedError, UsageError
-from opamc_cli.storage.atomic import ensure_directory
+from opamc_cli.storage.atomic import clear_parts, ensure_directory
+from opamc_cli.storage.result import clear
 
 LOCK_NAME = ".opamc.lock"
 
@@ -39,6 +40,8 @@ def output_lock(folder: Path) -> Iterator[None]:
                 "wait for it to end or choose another folder with --out"
             )
             raise LockedError(msg) from error
+        clear(folder)
+        clear_parts(folder)
         yield
     finally:
         os.close(descriptor)

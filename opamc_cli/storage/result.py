@@ -92,6 +92,8 @@ def clear(folder: Path) -> None:
 def _publish(folder: Path, names: Sequence[str], linked: bool) -> None:
     staged, current = folder / STAGED, folder / CURRENT
     written = _files(staged)
+    if not written:
+        return
     if not linked or not _has_links(staged):
         _move(folder, names, written)
         return

@@ -6,22 +6,25 @@ row group as they are asked for.
 
 import hashlib
 import json
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import asdict, dataclass, fields
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import asdict, dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
+from pydantic import BeforeValidator, Field
 
+from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
 from opamc_cli.storage.atomic import atomic_path
+from opamc_cli.storage.json_documents import Document, parsed
+from opamc_cli.storage.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.paths import expand_patterns
 
 METADATA_KEY = b"opamc"
@@ -36,6 +39,14 @@ RATE_TOLERANCE = 1e-3
 
 CURRENT_UNITS = ("A", "Nm")
 """A torque in Nm may stand for a current; nothing of it is called a current then."""
+
+MOST_HZ = 1e8
+"""No converter of a motor current is faster; a time in nanoseconds that was taken for a rate is."""
+
+MOST_GROUP_SAMPLES = 1 << 24
+"""Rows of a row group, which is decoded at once: two hours at 2048 Hz."""
+
+MOST_AXES = 999
 
 _AXIS_COLUMN = re.compile(r"axis([1-9][0-9]*)_(a|b|c|current|position|velocity|temperature)")
 
@@ -116,6 +127,18 @@ class Run:
         self.name = name or self.path.stem
         self._file = _open_parquet(self.path)
         schema = self._file.schema_arrow
+        repeated = {name for name in schema.names if schema.names.count(name) > 1}
+        if repeated:
+            msg = f"{self.path}: has column {shown(min(repeated))} more than once; write it again"
+            raise InputError(msg)
+        for group in range(self._file.num_row_groups):
+            n_rows = self._file.metadata.row_group(group).num_rows
+            if n_rows > MOST_GROUP_SAMPLES:
+                msg = (
+                    f"{self.path}: a row group has {n_rows} samples, at most {MOST_GROUP_SAMPLES} "
+                    "are read at once; write it again with smaller row groups"
+                )
+                raise InputError(msg)
         self.info = _parse_info(self.path, schema.metadata)
         self.n_samples: int = self._file.metadata.num_rows
         self.columns: tuple[str, ...] = tuple(schema.names)
@@ -194,10 +217,8 @@ class Run:
         start = 0
         batches = self._file.iter_batches(ROW_GROUP_SAMPLES, columns=list(columns))
         while True:
-            try:
+            with self._reading(columns):
                 batch = next(batches, None)
-            except (pa.ArrowException, OSError) as error:
-                raise self._damaged(columns, error) from error
             if batch is None:
                 return
             yield start, {name: _to_numpy(batch.column(name)) for name in columns}
@@ -221,15 +242,14 @@ class Run:
         return found
 
     def _read_groups(self, groups: list[int], columns: Sequence[str]) -> pa.Table:
-        try:
+        with self._reading(columns):
             return self._file.read_row_groups(groups, columns=list(columns), use_threads=False)
-        except (pa.ArrowException, OSError) as error:
-            raise self._damaged(columns, error) from error
 
-    def _damaged(self, columns: Sequence[str], error: Exception) -> InputError:
-        return InputError(
-            f"{self.path}: samples of {', '.join(columns)} cannot be read "
-            f"({_first_line(error)}); the file is damaged, copy it again from its source"
+    def _reading(self, columns: Sequence[str]) -> AbstractContextManager[None]:
+        return reading(
+            self.path,
+            "the file is damaged, copy it again from its source",
+            f"samples of {', '.join(columns)} cannot be read",
         )
 
     def check_time(self) -> None:
@@ -310,6 +330,10 @@ def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
         else:
             msg = f"{path}: no such file or folder; check the path"
             raise InputError(msg)
+    for path in found:
+        if any("\ud800" <= c <= "\udfff" for c in str(path)):
+            msg = f"{str(path)!r}: its name is not UTF-8; rename it"
+            raise InputError(msg)
     runs = [(name, path) for path, name in found.items()]
     names = [name for name, _ in runs]
     if len(set(names)) < len(names):
@@ -323,8 +347,8 @@ def _may_be_run(folder: Path, file: Path) -> bool:
     if any(part.startswith(".") for part in relative.parts):
         return False
     try:
-        metadata = pq.read_schema(file).metadata or {}
-    except (pa.ArrowException, OSError):
+        metadata = read_schema(file, "").metadata or {}
+    except InputError:
         return True  # opening it will say what is wrong with it
     return b"opamc_table" not in metadata
 
@@ -376,7 +400,14 @@ def save_run(path: Path, info: RunInfo, columns: Mapping[str, Array]) -> None:
 
 
 def file_sha256(path: Path) -> str:
-    """Return the SHA-256 of a file's content as hexadecimal digits."""
+    """Return the SHA-256 of a file's content as hexadecimal digits.
+
+    Raises
+    ------
+    InputError
+        If it is missing or no regular file.
+    """
+    require_regular_file(path, InputError)
     state = path.stat()
     return _sha256(path.resolve(), state.st_mtime_ns, state.st_size)
 
@@ -403,20 +434,15 @@ def _open_parquet(path: Path) -> pq.ParquetFile:
     if not path.exists():
         msg = f"{path}: no such file; check the path"
         raise InputError(msg)
-    if path.is_dir():
-        msg = f"{path}: is a folder where a run file (*.parquet) is needed"
-        raise InputError(msg)
-    try:
+    require_regular_file(path, InputError, "a run file (*.parquet)")
+    advice = "if it is another format, turn it into a run with `opamc ingest`"
+    with reading(path, advice, "cannot be opened as Parquet"):
         # pre-buffering would hold the columns of all row groups at once
-        return pq.ParquetFile(
+        file = pq.ParquetFile(
             path, page_checksum_verification=True, memory_map=False, pre_buffer=False
         )
-    except (pa.ArrowException, OSError) as error:
-        msg = (
-            f"{path}: cannot be opened as Parquet ({_first_line(error)}); "
-            "if it is another format, turn it into a run with `opamc ingest`"
-        )
-        raise InputError(msg) from error
+        _ = file.schema_arrow.names  # which may be no UTF-8
+    return file
 
 
 def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
@@ -428,40 +454,32 @@ def _parse_info(path: Path, metadata: Mapping[bytes, bytes] | None) -> RunInfo:
             "make a run of it with `opamc ingest`"
         )
         raise InputError(msg)
-    try:
-        values = json.loads(raw)
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
-        msg = f"{path}: metadata key 'opamc' is not JSON ({error}); write the run again"
-        raise InputError(msg) from error
-    if not isinstance(values, dict):
-        msg = f"{path}: metadata key 'opamc' holds {type(values).__name__}, not a JSON object"
-        raise InputError(msg)
-    rate = values.get("sampling_rate_hz")
-    if rate is None:
-        msg = f"{path}: no sampling_rate_hz in metadata key 'opamc'; add the samples per second"
-        raise InputError(msg)
-    if (
-        isinstance(rate, bool)
-        or not isinstance(rate, int | float)
-        or not (math.isfinite(rate) and rate > 0)
-    ):
-        msg = f"{path}: sampling_rate_hz is {rate!r}; it must be a positive number of Hz"
-        raise InputError(msg)
-    known = {f.name for f in fields(RunInfo)}
-    kept = {key: value for key, value in values.items() if key in known}
-    for key in ("speed_percent", "payload_kg"):
-        if kept.get(key) is not None and not isinstance(kept[key], int | float):
-            msg = f"{path}: {key} is {kept[key]!r} in metadata key 'opamc'; it must be a number"
-            raise InputError(msg)
-    if kept.get("current_unit", "A") not in CURRENT_UNITS:
-        msg = f"{path}: current_unit is {kept['current_unit']!r}; it must be 'A' or 'Nm'"
-        raise InputError(msg)
-    for key in ("robot", "program", "started_at", "session", "source_sha256", "map_sha256"):
-        # a program called 7 in one run and "7" in another is the same program
-        if kept.get(key) is not None:
-            kept[key] = str(kept[key])
-    kept["sampling_rate_hz"] = float(rate)
-    return RunInfo(**kept)
+    document = parsed(RunMetadata, raw, f"{path}: metadata key 'opamc'", "write the run again")
+    return RunInfo(**document.model_dump())
+
+
+def _as_text(value: object) -> object:
+    # a program called 7 in one run and "7" in another is the same program
+    return str(value) if isinstance(value, int | float) else value
+
+
+Text = Annotated[str, Field(max_length=1000), BeforeValidator(_as_text)]
+Condition = Annotated[float, Field(ge=-1e6, le=1e6)]
+
+
+class RunMetadata(Document):
+    """The JSON of the metadata key `opamc`; see `RunInfo`."""
+
+    sampling_rate_hz: Annotated[float, Field(gt=0, le=MOST_HZ)]
+    robot: Text | None = None
+    program: Text | None = None
+    speed_percent: Condition | None = None
+    payload_kg: Condition | None = None
+    started_at: Text | None = None
+    session: Text | None = None
+    source_sha256: Text | None = None
+    map_sha256: Text | None = None
+    current_unit: Literal["A", "Nm"] = "A"
 
 
 def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
@@ -474,6 +492,9 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
             msg = f"{path}: column {field.name} has type {field.type}; it must hold numbers"
             raise InputError(msg)
         if match is not None:
+            if len(match[1]) > len(str(MOST_AXES)) or int(match[1]) > MOST_AXES:
+                msg = f"{path}: column {shown(field.name)}: axes count from 1 to {MOST_AXES}"
+                raise InputError(msg)
             by_axis.setdefault(int(match[1]), set()).add(match[2])
     channels = {}
     for axis in sorted(by_axis):
@@ -494,7 +515,7 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
             temperature=column("temperature"),
         )
     if not channels:
-        names = ", ".join(schema.names[:8])
+        names = ", ".join(map(shown_line, schema.names[:8]))
         msg = (
             f"{path}: no current column among [{names}]; a run needs axis1_a (axis1_b, axis1_c) "
             "or axis1_current, counted from axis 1; rename with `opamc ingest --map`"
@@ -517,7 +538,3 @@ def _to_numpy(column: pa.ChunkedArray | pa.Array) -> Array:
 
 def _join(pieces: list[Array]) -> Array:
     return pieces[0] if len(pieces) == 1 else np.concatenate(pieces)
-
-
-def _first_line(error: Exception) -> str:
-    return str(error).strip().splitlines()[0].rstrip(".") if str(error).strip() else "no reason"

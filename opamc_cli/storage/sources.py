@@ -6,12 +6,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from opamc_cli.errors import InputError
+from opamc_cli.storage.parquet import read_schema
 from opamc_cli.storage.result import published
-from opamc_cli.storage.runs import Run, RunInfo
+from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
 from opamc_cli.storage.tables import table_record
 
 REQUIRED_EQUAL = ("sampling_rate_hz", "program", "current_unit")
@@ -121,11 +119,7 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
         if not folder.exists():
             msg = f"{folder}: no such folder; name the folder of the runs with --runs"
             raise InputError(msg)
-    try:
-        metadata = pq.read_schema(table).metadata
-    except (pa.ArrowException, OSError) as error:
-        msg = f"{table}: cannot be read as Parquet; run the stage before this one"
-        raise InputError(msg) from error
+    metadata = read_schema(table, "run the stage before this one").metadata
     record = table_record(table, metadata)
     if "runs" not in record:
         msg = f"{table}: does not say which runs it was made from; make it again"
@@ -136,7 +130,7 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
             path=_locate(published(table.parent) / entry["path"], entry["name"], moved_to),
             sha256=entry["sha256"],
             n_samples=entry["n_samples"],
-            info=RunInfo(**entry["info"]),
+            info=RunInfo(**RunMetadata(**entry["info"]).model_dump()),
         )
         for entry in record["runs"]
     )

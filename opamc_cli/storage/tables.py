@@ -12,18 +12,23 @@ import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from math import factorial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
+from pydantic import ConfigDict, Field, field_validator
 
 from opamc_cli import __version__
-from opamc_cli.config.models import digest
+from opamc_cli.config.models import Config, digest
 from opamc_cli.errors import InputError
 from opamc_cli.storage.atomic import atomic_path
+from opamc_cli.storage.json_documents import LARGEST, Document, parsed
+from opamc_cli.storage.parquet import read_schema, read_whole
 from opamc_cli.storage.result import published
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs import MOST_HZ, RunMetadata, file_sha256
 
 TABLE_KEY = b"opamc_table"
 SCHEMA_VERSION = 1
@@ -180,13 +185,7 @@ def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Ta
     if path.is_dir():
         msg = f"{path}: is a folder where a table of `opamc {stage}` is needed; name the file"
         raise InputError(msg)
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            table = file.read()
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).strip().splitlines()[0]
-        msg = f"{path}: cannot be read as Parquet ({reason}); run `opamc {stage}` again"
-        raise InputError(msg) from error
+    table = read_whole(path, f"run `opamc {stage}` again")
     record = table_record(path, table.schema.metadata)
     if record.get("stage") != stage:
         msg = f"{path}: is a table of stage {record.get('stage')!r}, {stage!r} is needed here"
@@ -224,6 +223,11 @@ def _check_rows(
                 f"run `opamc {record['stage']}` again"
             )
             raise InputError(msg)
+    for field in needed:
+        if table.num_rows:
+            _check_values(path, table.column(field.name), field.name, record)
+    if "counts" in table.column_names and "order" in table.column_names:
+        _check_counts(path, table, record)
     if "runs" in record and "run" in table.column_names:
         known = {entry["name"] for entry in record["runs"]}
         for name in table.column("run").unique().to_pylist():
@@ -233,6 +237,72 @@ def _check_rows(
                     f"run `opamc {record['stage']}` again"
                 )
                 raise InputError(msg)
+
+
+LIMITS: Mapping[str, tuple[float, float]] = {
+    "axis": (1, 999),
+    "segment": (0, 1e9),
+    "cycle": (-1, 1e9),
+    "motion": (-1, 1e9),
+    "start": (0, 1e15),
+    "stop": (1, 1e15),
+    "sampling_rate_hz": (1e-9, MOST_HZ),
+    "direction": (-1, 1),
+    "variance": (0, 1e15),
+    "order": (2, 8),
+    "tau": (1, 1e9),
+    "n_patterns": (0, 1e15),
+    "n_masked": (0, 1e15),
+    "n_pool": (0, 1e15),
+    "f_max_hz": (0, MOST_HZ),
+    "base": (1, 1e15),
+    "jsd": (0, 1e3),
+    "ks": (0, 1),
+    "frames": (0, 1e6),
+    "bins": (0, 1e6),
+}
+"""Of the values of stage tables, both included; other columns have to be within `LARGEST`."""
+
+
+def _check_values(
+    path: Path, column: pa.ChunkedArray, name: str, record: Mapping[str, Any]
+) -> None:
+    """Refuse numbers that no stage writes."""
+    values = pc.list_flatten(column) if pa.types.is_list(column.type) else column
+    if not (pa.types.is_integer(values.type) or pa.types.is_floating(values.type)):
+        return
+    low, high = LIMITS.get(name, (-LARGEST, LARGEST))
+    if name == "counts":
+        low = 0
+    smallest, largest = (_known(values, find) for find in (pc.min, pc.max))
+    for value in (smallest, largest):
+        if value is not None and not low <= value <= high:
+            msg = (
+                f"{path}: column {name} holds {value:g}, {low:g} to {high:g} is possible; "
+                f"run `opamc {record['stage']}` again"
+            )
+            raise InputError(msg)
+
+
+def _known(values: pa.ChunkedArray, find: Any) -> float | None:
+    if pa.types.is_floating(values.type):
+        # an unknown number is NaN in some columns
+        values = values.filter(pc.invert(pc.is_nan(values)))
+    found = find(values).as_py()
+    return None if found is None else float(found)
+
+
+def _check_counts(path: Path, table: pa.Table, record: Mapping[str, Any]) -> None:
+    """Refuse counts that are not of their order's patterns."""
+    lengths = pc.list_value_length(table["counts"]).to_pylist()
+    orders = table["order"].to_pylist()
+    for length, order in zip(lengths, orders, strict=True):
+        if length != factorial(order):
+            msg = (
+                f"{path}: counts of order {order} are {length}, there are {factorial(order)} "
+                f"patterns; run `opamc {record['stage']}` again"
+            )
+            raise InputError(msg)
 
 
 def table_record(path: Path, metadata: Mapping[bytes, bytes] | None) -> dict[str, Any]:
@@ -248,14 +318,47 @@ def table_record(path: Path, metadata: Mapping[bytes, bytes] | None) -> dict[str
         kind = "a run" if b"opamc" in (metadata or {}) else "a Parquet file of another program"
         msg = f"{path}: is {kind}, not a stage table of opamc"
         raise InputError(msg)
-    try:
-        record = json.loads(raw)
-    except (UnicodeDecodeError, json.JSONDecodeError):
-        record = None
-    if not isinstance(record, dict):
-        msg = f"{path}: its metadata key 'opamc_table' is not a JSON object; make the table again"
-        raise InputError(msg)
-    return record
+    place = f"{path}: its metadata key 'opamc_table'"
+    document = parsed(_Record, raw, place, "make the table again")
+    return document.model_dump(exclude_none=True)
+
+
+class _Input(Document):
+    path: str
+    sha256: str
+
+
+class RunEntry(Document):
+    """A run that a table was made from; see `RunSource`."""
+
+    name: str
+    path: str
+    sha256: str
+    n_samples: Annotated[int, Field(ge=1)]
+    info: RunMetadata
+
+
+class _Record(Document):
+    """The JSON of the metadata key `opamc_table`; a stage may have added to it."""
+
+    model_config = ConfigDict(extra="allow")
+
+    stage: str
+    schema_version: int
+    config: dict[str, Any] = Field(default_factory=dict)
+    config_hash: str = ""
+    inputs: list[_Input] = Field(default_factory=list)
+    versions: dict[str, str] = Field(default_factory=dict)
+    runs: list[RunEntry] | None = None
+
+    @field_validator("config")
+    @classmethod
+    def _sections_are_mappings(cls, config: dict[str, Any]) -> dict[str, Any]:
+        for name in Config.model_fields.keys() & config.keys():
+            if not isinstance(config[name], dict):
+                msg = f"{name} is no section of a configuration"
+                raise ValueError(msg)
+        return config
 
 
 def table_provenance(path: Path) -> Provenance:
@@ -266,12 +369,7 @@ def table_provenance(path: Path) -> Provenance:
     InputError
         If it is not a stage table.
     """
-    try:
-        metadata = pq.read_schema(path).metadata
-    except (pa.ArrowException, OSError) as error:
-        msg = f"{path}: cannot be read as Parquet ({error})"
-        raise InputError(msg) from error
-    record = table_record(path, metadata)
+    record = table_record(path, read_schema(path, "make the table again").metadata)
     return Provenance(
         stage=record["stage"],
         config=record["config"],

@@ -145,7 +145,7 @@ def raw_run(path, metadata, columns=None):
         ({"opamc_table": "{}"}, None, "is a stage table"),
         ({"opamc": "{"}, None, "is not JSON"),
         ({"opamc": b"\xff"}, None, "is not JSON"),
-        ({"opamc": "[1]"}, None, "not a JSON object"),
+        ({"opamc": "[1]"}, None, "holds no JSON object"),
         ({"opamc": "{}"}, None, "no sampling_rate_hz"),
         ({"opamc": '{"sampling_rate_hz": 0}'}, None, "sampling_rate_hz is 0;"),
         ({"opamc": '{"sampling_rate_hz": -5}'}, None, "sampling_rate_hz is -5"),

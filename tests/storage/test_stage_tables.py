@@ -37,6 +37,13 @@ ROW = {
     "signal": "phases",
     "temperature_c": None,
 }
+RUN = {
+    "name": "r",
+    "path": "r.parquet",
+    "sha256": "0",
+    "n_samples": 100,
+    "info": {"sampling_rate_hz": 2048.0},
+}
 TABLE = pa.Table.from_pylist([ROW, {**ROW, "segment": 1}], schema=SEGMENTS)
 
 
@@ -83,7 +90,7 @@ def record(**changes):
     [
         (None, TABLE, "a Parquet file of another program, not a stage table"),
         ({"opamc": "{}"}, TABLE, "is a run, not a stage table"),
-        ({TABLE_KEY: b"[]"}, TABLE, "is not a JSON object"),
+        ({TABLE_KEY: b"[]"}, TABLE, "holds no JSON object"),
         (record(stage="identify"), TABLE, "is a table of stage 'identify', 'segment' is needed"),
         (record(schema_version=99), TABLE, "has schema version 99, this opamc reads 1"),
         (record(), TABLE.drop_columns(["stop"]), "column stop is missing"),
@@ -122,7 +129,7 @@ def test_files_that_are_not_parquet_are_refused(tmp_path, content):
 def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected):
     rows = [ROW, {**ROW, column: value}]
     table = pa.Table.from_pylist(rows, schema=SEGMENTS)
-    path = write(tmp_path / "segments.parquet", table, extra={"runs": [{"name": "r"}]})
+    path = write(tmp_path / "segments.parquet", table, extra={"runs": [RUN]})
     if expected is None:
         assert read_table(path, "segment", SEGMENTS).num_rows == 2
         return

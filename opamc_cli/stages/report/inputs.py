@@ -1,6 +1,5 @@
 """What a report is made from: the tables, the verdict and the loop of one output folder."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -8,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from opamc_cli.errors import InputError
 from opamc_cli.stages.report.columns import Columns, n_rows, to_columns
+from opamc_cli.storage.json_documents import read_json
+from opamc_cli.storage.parquet import read_schema, read_whole
 from opamc_cli.storage.runs import Run, file_sha256
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import TABLE_KEY, read_table, table_record
@@ -234,7 +234,7 @@ class _Folder:
         path = self.out / name
         if not path.exists():
             return None
-        table = _read_parquet(path)
+        table = read_whole(path, "make it again or remove it")
         _need_columns(path, table, needed)
         metadata = table.schema.metadata or {}
         self._note(path, table_record(path, metadata) if TABLE_KEY in metadata else None)
@@ -245,7 +245,7 @@ class _Folder:
         if not path.exists():
             return None
         self._note(path, None)
-        return _read_json(path)
+        return read_json(path, path.stem, "make it again or remove it")
 
     def _note(self, path: Path, record: Mapping[str, Any] | None) -> None:
         name = path.relative_to(self.out).as_posix()
@@ -265,31 +265,6 @@ def _role_tables(folder: _Folder, role: str, moved_to: Sequence[Path]) -> RoleTa
     )
 
 
-def _read_parquet(path: Path) -> pa.Table:
-    try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            return file.read()
-    except (pa.ArrowException, OSError) as error:
-        reason = str(error).strip().splitlines()[0]
-        msg = f"{path}: cannot be read as Parquet ({reason}); make it again or remove it"
-        raise InputError(msg) from error
-
-
-def _read_json(path: Path) -> Mapping[str, Any]:
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        msg = f"{path}: cannot be read as JSON ({error}); make it again or remove it"
-        raise InputError(msg) from error
-    axes = values.get("axes") if isinstance(values, dict) else None
-    if not isinstance(axes, list) or not all(
-        isinstance(entry, dict) and isinstance(entry.get("axis"), int) for entry in axes
-    ):
-        msg = f"{path}: holds no list 'axes' of objects with 'axis'; make it again or remove it"
-        raise InputError(msg)
-    return dict(values)
-
-
 def _need_columns(path: Path, table: pa.Table, needed: Sequence[str]) -> None:
     missing = [name for name in needed if name not in table.column_names]
     if missing:
@@ -302,7 +277,7 @@ def _sources(out: Path, role: str, moved_to: Sequence[Path]) -> tuple[RunSource,
         path = out / role / name
         if not path.exists():
             continue
-        record = table_record(path, pq.read_schema(path).metadata)
+        record = table_record(path, read_schema(path, "make it again").metadata)
         if "runs" in record:
             found = read_sources(path, moved_to)
             return tuple(sorted(found, key=lambda s: (s.info.started_at or "", s.name)))

@@ -15,7 +15,10 @@ from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
 from opamc_cli.storage.ingest.source import Listed, Name
 from opamc_cli.storage.ingest.units import QUANTITY_OF_KIND, conversion
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e15, le=1e15, allow_inf_nan=False)]
+MOST_SKIPPED = 1_000_000
+"""Lines before the data: no logger writes a longer heading."""
 Format = Literal["csv", "mat", "hdf5", "tdms", "parquet", "feather", "ros", "mdf"]
 
 
@@ -32,8 +35,8 @@ class ColumnMap(_Strict):
     source: Name
     unit: str
     index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
-    scale: Annotated[float, Field(allow_inf_nan=False)] = 1.0
-    offset: Annotated[float, Field(allow_inf_nan=False)] = 0.0
+    scale: Finite = 1.0
+    offset: Finite = 0.0
     unwrap: bool = False
     optional: bool = False
 
@@ -106,12 +109,12 @@ class IngestMap(_Strict):
     """
 
     format: Format | None = None
-    separator: str = Field(",", min_length=1)
+    separator: str = Field(",", min_length=1, max_length=100)
     decimal: Literal[".", ","] = "."
     header: bool = True
     encoding: str = "utf-8"
-    skip_rows: Annotated[int, Field(ge=0)] = 0
-    units_rows: Annotated[int, Field(ge=0)] = 0
+    skip_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
+    units_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
     axes: Annotated[int, Field(ge=1, le=32)] | None = None
     columns: dict[str, ColumnMap] = Field(min_length=1)
     sampling_rate_hz: Positive | RateMap | None = None

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
+from opamc_cli.config.reading import require_regular_file
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import is_ros2_bag
 from opamc_cli.storage.ingest.map import IngestMap, format_of
@@ -43,6 +44,8 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
     if not path.exists():
         msg = f"{path}: no such file; check the path"
         raise InputError(msg)
+    if not path.is_dir():
+        require_regular_file(path, InputError, "a recording")
     if path.is_file() and path.stat().st_size == 0:
         msg = f"{path}: is empty (0 bytes); record it again"
         raise InputError(msg)

@@ -164,7 +164,7 @@ def test_names_from_files_stay_text(tmp_path: Path) -> None:
     output_folder.make(out, Plan(names=("normal", evil)))
     verdict = json.loads((out / "verdict.json").read_text())
     verdict["axes"][2]["reasons"] = ["<img src=x onerror=alert(1)>"]
-    verdict["axes"][2]["state"] = '"><svg onload=alert(1)>'
+    verdict["axes"][2]["reasons"] += ['"><svg onload=alert(1)>']
     (out / "verdict.json").write_text(json.dumps(verdict))
     text = report.run(out, title="<b>cell</b>").path.read_text(encoding="utf-8")
     tags = [tag for tag, _ in _Page(text).tags]

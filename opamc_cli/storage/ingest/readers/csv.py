@@ -26,6 +26,9 @@ FIELD_MARK = "\x1f"
 _CONVERSION = re.compile(r"column #(\d+): Row #(\d+): .*invalid value '(.*)'", re.DOTALL)
 _WIDTH = re.compile(r"Row #(\d+): Expected (\d+) columns, got (\d+)")
 
+MOST_LINE = 1 << 22
+"""Characters of a line of the heading that are read at once."""
+
 
 class CsvSource:
     """An open text table.
@@ -116,7 +119,8 @@ class CsvSource:
         try:
             with self._text() as text:
                 for _ in range(self._map.skip_rows):
-                    text.readline()
+                    if not text.readline(MOST_LINE):
+                        break
                 rows = (row for row in csv.reader(text, delimiter=self._delimiter) if row)
                 header = next(rows, []) if self._map.header else []
                 for _ in range(self._map.units_rows * self._map.header):

@@ -1,0 +1,77 @@
+"""Parquet files that others may have written or damaged: whatever the reader makes of them."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from opamc_cli.config.reading import require_regular_file, shown
+from opamc_cli.errors import InputError
+
+MOST_ROWS = 50_000_000
+"""Of a stage table, which is read as a whole: years of nights have less."""
+
+
+@contextmanager
+def reading(path: Path, advice: str, what: str = "cannot be read as Parquet") -> Iterator[None]:
+    """Take whatever the Parquet reader stumbles over for a damaged file.
+
+    Raises
+    ------
+    InputError
+        With the reader's first words.
+    """
+    try:
+        yield
+    except (MemoryError, InputError):
+        raise
+    except Exception as error:  # of another's library, whose errors no list keeps up with
+        lines = str(error).strip().splitlines()
+        reason = shown_line(lines[0]) if lines else type(error).__name__
+        msg = f"{path}: {what} ({reason}); {advice}"
+        raise InputError(msg) from error
+
+
+def shown_line(text: str) -> str:
+    """Return a line of another's making, as far as a sentence can hold it."""
+    plain = "".join(c if c.isprintable() else "�" for c in text.rstrip("."))
+    return plain if len(plain) <= 160 else f"{plain[:160]}…"
+
+
+def read_schema(path: Path, advice: str) -> pa.Schema:
+    """Return the schema of a Parquet file with its metadata.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read.
+    """
+    require_regular_file(path, InputError)
+    with reading(path, advice):
+        schema = pq.read_schema(path)
+        # names that are not UTF-8 are found when they are first looked at
+        repeated = sorted({name for name in schema.names if schema.names.count(name) > 1})
+    if repeated:
+        msg = f"{path}: has column {shown(repeated[0])} more than once; {advice}"
+        raise InputError(msg)
+    return schema
+
+
+def read_whole(path: Path, advice: str) -> pa.Table:
+    """Read a Parquet file of bounded length, and verify its checksums.
+
+    Raises
+    ------
+    InputError
+        If it cannot be read, or is too long.
+    """
+    read_schema(path, advice)
+    with reading(path, advice), pq.ParquetFile(path, page_checksum_verification=True) as file:
+        if file.metadata.num_rows > MOST_ROWS:
+            msg = f"{path}: has {file.metadata.num_rows} rows, at most {MOST_ROWS} are read"
+            raise InputError(msg)
+        table = file.read()
+        table.validate(full=True)
+        return table
