@@ -76,7 +76,8 @@ def _recordings(
 ) -> list[Recording]:
     found = []
     for source in sources:
-        stop = round(seconds / len(sources) * source.info.sampling_rate_hz)
+        # minutes are those of a log of this rate: a slower one costs no more for being longer
+        stop = round(seconds / len(sources) * max(source.info.sampling_rate_hz, LEAST_HZ))
         stop += first_motion.get(source.name, 0)
         try:
             with source.open() as run:

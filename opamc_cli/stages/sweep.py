@@ -16,6 +16,7 @@ from opamc_cli.signal.ordinal import ordinal_counts, time_delay
 from opamc_cli.stages.envelope import EnvelopeKind, current_offset, read_envelope
 from opamc_cli.stages.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.patterns import aligned_span, identified_parts
+from opamc_cli.stages.sessions import Sessions, lie_in_folders, sessions_of
 from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
 from opamc_cli.stats.features import ks_statistic
 from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
@@ -136,7 +137,8 @@ def run(
     baseline, target
         Tables of stage `identify`; without a target only the baseline's own divergences.
     config
-        `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma` and `score.base` are used.
+        `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma`, `score.base` and
+        `score.day_starts_at` are used.
     out
         Folder of the sweep table.
     taus, orders
@@ -160,7 +162,9 @@ def run(
         outcome = map_items(_count, _work(path, sources[role], config, taus, orders), jobs, watch)
         counted[role] = list(outcome.results)
         errors += outcome.errors
-    table = pa.Table.from_pylist(_rows(counted, config), schema=SWEEP)
+    own = sources["baseline"]
+    sessions = sessions_of(own, config.score.day_starts_at, lie_in_folders(own))
+    table = pa.Table.from_pylist(_rows(counted, sessions, config), schema=SWEEP)
     path = out / FILE_NAME
     write_table(
         path,
@@ -168,7 +172,10 @@ def run(
         stage="sweep",
         config={
             "patterns": {"envelope": config.patterns.envelope, "gamma": config.patterns.gamma},
-            "score": {"base": config.score.base},
+            "score": {
+                "base": config.score.base,
+                "day_starts_at": config.score.day_starts_at,
+            },
             "sweep": {"tau": list(taus), "order": list(orders)},
         },
         inputs=[table_input(path) for path in tables.values()],
@@ -214,7 +221,9 @@ def _count(job: _Job) -> _Counted:
     return _Counted(job.rows, counts)
 
 
-def _rows(counted: dict[str, list[_Counted]], config: Config) -> list[dict[str, Any]]:
+def _rows(
+    counted: dict[str, list[_Counted]], sessions: Sessions, config: Config
+) -> list[dict[str, Any]]:
     """Turn counts into divergences, motion by motion, as `score` does."""
     found = []
     base = config.score.base
@@ -230,7 +239,10 @@ def _rows(counted: dict[str, list[_Counted]], config: Config) -> list[dict[str, 
             if "baseline" not in group:
                 continue
             pool = np.stack([values for _, values in group["baseline"]])
-            labels = [f"{row['run']}/{row['cycle']}" for row, _ in group["baseline"]]
+            own = [row for row, _ in group["baseline"]]
+            labels = [sessions.of_run[row["run"]] for row in own]
+            if len(set(labels)) == 1:
+                labels = [f"{row['run']}/{row['cycle']}" for row in own]
             jsd = {"baseline": leave_cycle_out_divergences(pool, np.asarray(labels), base)}
             if "target" in group:
                 target = np.stack([values for _, values in group["target"]])
