@@ -8,10 +8,12 @@ healthy recordings in the same sizes.
 
     python benchmarks/actuator.py --quick
     python benchmarks/actuator.py --draws 40 --seed 1
+    python benchmarks/actuator.py --causes --draws 10 --seed 11
 """
 
 import argparse
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Sequence
 from itertools import combinations
 from math import comb
@@ -25,6 +27,7 @@ from sklearn.ensemble import IsolationForest
 
 from opamc_cli.config import load_config
 from opamc_cli.signal.ordinal import ordinal_counts
+from opamc_cli.stages.cause import explain
 from opamc_cli.stages.cells import bundles
 from opamc_cli.stages.chain import run_chain
 from opamc_cli.stages.side import Side, Sides, read_side
@@ -184,13 +187,35 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="*", default=[5])
     parser.add_argument("--without", default="", help="Leave a witness out.")
     parser.add_argument("--no-rivals", action="store_true")
+    parser.add_argument("--causes", action="store_true", help="Only say what causes are named.")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     draws = 3 if arguments.quick else arguments.draws
     with tempfile.TemporaryDirectory() as folder:
         machine = Machine(Path(folder))
+        if arguments.causes:
+            causes(machine, draws, arguments.seed)
+            return
     for size in arguments.sizes:
         table(machine, size, size, draws, arguments)
+
+
+def causes(machine: Machine, draws: int, seed: int) -> None:
+    """Print which cause is named first for each state, and how often."""
+    config = load_config().joint
+    for state in machine.currents:
+        if state == HEALTHY:
+            continue
+        rng = np.random.default_rng([seed, *state.encode()])
+        named: Counter[str] = Counter()
+        for _ in range(draws):
+            sources = []
+            for side in (HEALTHY, state):
+                runs = rng.choice(list(machine.currents[side]), 5, replace=False)
+                sources.append([s for s in machine.sides[side].sources if s.name in runs])
+            found = explain(1, *sources, config)
+            named[found["effect"] if found else "none"] += 1
+        print(state, dict(named.most_common()), flush=True)
 
 
 def table(machine: Machine, n_baseline: int, n_target: int, draws: int, arguments) -> None:

@@ -54,7 +54,7 @@ def _inspect(cause: Mapping[str, Any] | None) -> str:
     meaning = cause.get("interpretation") or cause.get("effect")
     if cause.get("harmless") or cause.get("origin", "joint") != "joint":
         return f"Check before the gear: {meaning}."
-    return f"Inspect first: {meaning}."
+    return f"Inspect the joint for {meaning}."
 
 
 def _evidence(judgement: Judgement, bundle: Bundle) -> list[str]:
