@@ -10,6 +10,7 @@ from opamc_cli.signal.segmentation import hysteresis
 
 ON_SHARE = 0.05  # of the largest speed
 OFF_SHARE = 0.02
+MOVING_SHARE = 0.3  # of the largest speed: clearly on its way
 PROBE = 1 << 20
 
 LEAST_WINDOW = 5
@@ -195,10 +196,8 @@ def fluctuation_frequency(current: NDArray[np.floating], fs_hz: float) -> float:
     return fs_hz / (4 * max(quarter, 1))
 
 
-def signed_by_speed(
-    current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]
-) -> NDArray[np.float64] | None:
-    """Give a current that was logged without its sign that of the speed.
+def lacks_sign(current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]) -> bool | None:
+    """Tell whether a current was logged without its sign.
 
     Parameters
     ----------
@@ -209,27 +208,52 @@ def signed_by_speed(
 
     Returns
     -------
-    array, shape (n,), A, or None
-        None where the current has its sign: it changes, or the joint does not reverse, or what
-        is drawn at rest lies between what either direction draws, as a load's does.
+    bool or None
+        False where it changes its sign, the joint does not reverse, or what is drawn at rest lies
+        between what either direction draws, as a load's does. None where the joint reverses under
+        a current of one sign and never rests long enough to tell.
 
     Notes
     -----
     Friction draws current either way, so that its modulus is larger in both directions than at
     rest; a constant load that outweighs friction adds to one direction what it takes off the
-    other. While it brakes the joint may draw current against its speed: there the sign is wrong.
+    other.
     """
     x = np.asarray(current, dtype=np.float64)
     v = np.asarray(velocity_rad_s, dtype=np.float64)
     known = np.isfinite(x) & np.isfinite(v)
     if not known.any() or (x[known].min() < 0 < x[known].max()):
-        return None
+        return False
     fastest = float(np.quantile(np.abs(v[known]), 0.99))
-    forth, back = known & (v > 0.3 * fastest), known & (v < -0.3 * fastest)
+    forth, back = known & (v > MOVING_SHARE * fastest), known & (v < -MOVING_SHARE * fastest)
+    if min(np.count_nonzero(part) for part in (forth, back)) < FEWEST_SAMPLES:
+        return False
     rest = known & (np.abs(v) < OFF_SHARE * fastest)
-    if min(np.count_nonzero(part) for part in (forth, back, rest)) < FEWEST_SAMPLES:
+    if np.count_nonzero(rest) < FEWEST_SAMPLES:
         return None
     at_rest = float(np.median(np.abs(x[rest])))
-    if at_rest >= min(float(np.median(np.abs(x[part]))) for part in (forth, back)):
-        return None
-    return np.abs(x) * np.sign(v)
+    return at_rest < min(float(np.median(np.abs(x[part]))) for part in (forth, back))
+
+
+def signed_by_speed(
+    current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """Give a current that was logged without its sign that of the speed.
+
+    Parameters
+    ----------
+    current : array, shape (n,), A
+        Reported current that `lacks_sign`.
+    velocity_rad_s : array, shape (n,), rad/s
+        Joint velocity.
+
+    Returns
+    -------
+    array, shape (n,), A
+        Fading to zero where the joint stands. While it brakes it may draw current against its
+        speed: there the sign is wrong.
+    """
+    x = np.abs(np.asarray(current, dtype=np.float64))
+    v = np.asarray(velocity_rad_s, dtype=np.float64)
+    slow = OFF_SHARE * float(np.nanquantile(np.abs(v), 0.99))
+    return np.asarray(x * np.clip(v / max(slow, 1e-12), -1.0, 1.0))

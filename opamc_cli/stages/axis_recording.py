@@ -1,12 +1,15 @@
 """One axis of a run, as a model of the joint needs it."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import datetime
 
 import numpy as np
 
 from opamc_cli.errors import InputError
 from opamc_cli.joint.kinematics import Recording, speed_ratio
+from opamc_cli.signal.reported import lacks_sign, signed_by_speed, velocity_from_position
 from opamc_cli.storage.runs import Array, Run
 
 UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
@@ -65,6 +68,8 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
     for channel, values in samples.items():
         _check_channel(run, channel, values)
     _check_units(run, axis, arrays["position"], arrays["velocity"])
+    if arrays["current"] is not None:
+        arrays["current"] = _with_sign(arrays, run.sampling_rate_hz)
     return Recording(
         name=run.name,
         rate_hz=run.sampling_rate_hz,
@@ -75,6 +80,41 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
         temperature_c=arrays["temperature"],
         started_s=_seconds(run),
     )
+
+
+def interpolated(recording: Recording, least_hz: float) -> Recording:
+    """Return a slow recording with samples between its own, by straight lines.
+
+    What a model of the joint looks at is laid out for drives that log 100 times a second and more.
+    Nothing is learned between the samples; sessions, not samples, are what is compared.
+    """
+    factor = math.ceil(least_hz / recording.rate_hz)
+    if factor < 2 or recording.current_a is None:
+        return recording
+    place = np.arange(len(recording.current_a))
+    fine = np.arange((len(place) - 1) * factor + 1) / factor
+
+    def between(values: Array | None) -> Array | None:
+        return None if values is None else np.interp(fine, place, values)
+
+    return replace(
+        recording,
+        rate_hz=recording.rate_hz * factor,
+        current_a=between(recording.current_a),
+        position_rad=between(recording.position_rad),
+        velocity_rad_s=between(recording.velocity_rad_s),
+        temperature_c=between(recording.temperature_c),
+    )
+
+
+def _with_sign(arrays: dict[str, Array | None], rate_hz: float) -> Array | None:
+    """Return the reported current, with the speed's sign where it was logged without one."""
+    current, velocity = arrays["current"], arrays["velocity"]
+    if velocity is None and arrays["position"] is not None:
+        velocity = velocity_from_position(arrays["position"], rate_hz)
+    if current is None or velocity is None or not lacks_sign(current, velocity):
+        return current
+    return signed_by_speed(current, velocity)
 
 
 def _check_channel(run: Run, name: str, values: Array) -> None:

@@ -11,12 +11,15 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Cause, Change, explain_change
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.track import Joint
-from opamc_cli.stages.axis_recording import read_recording
+from opamc_cli.stages.axis_recording import interpolated, read_recording
 from opamc_cli.storage.sources import RunSource
 
 MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
 much better from more."""
+
+LEAST_HZ = 100.0
+"""Slower logs are interpolated: the change of a joint is sought on a grid of this rate."""
 
 OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
 
@@ -81,7 +84,7 @@ def _recordings(
         stop += first_motion.get(source.name, 0)
         try:
             with source.open() as run:
-                found.append(read_recording(run, axis, stop))
+                found.append(interpolated(read_recording(run, axis, stop), LEAST_HZ))
         except OpamcError:
             continue  # the run served the chain but not a model, which needs motion beside current
     return found

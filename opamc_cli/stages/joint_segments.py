@@ -9,6 +9,7 @@ from opamc_cli.signal.quality import clipped_share
 from opamc_cli.signal.reported import (
     JointMotion,
     find_joint_motions,
+    lacks_sign,
     motor_frequency,
     velocity_from_position,
 )
@@ -78,6 +79,15 @@ def joint_segments(
         notes.append(
             f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
         )
+    unsigned = lacks_sign(current, velocity) if motions else False
+    if unsigned or unsigned is None:
+        what = (
+            "it is taken for a modulus, and a model of the joint gives it the speed's"
+            if unsigned
+            else "the joint does not rest long enough to tell a modulus from a load; it is taken "
+            "as it is"
+        )
+        notes.append(f"{run.path}: column {name} keeps its sign though the joint reverses: {what}")
     segments = _segments(run, current, motions, config, joint)
     return AxisSegments(
         run.name,

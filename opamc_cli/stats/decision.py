@@ -233,7 +233,18 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     }
     shifts = together.shifts
     common = {axis: common_log_ratio(shifts, axis) if axis in evidence else 0.0 for axis in axes}
-    p_values = {axis: together.p_value(axis) for axis in axes}
+    witnesses = {
+        axis: {name: one.p_value(axis) for name, one in alone_by_witness.items()}
+        for axis in axes
+        if axis in evidence
+    }
+    p_values = {
+        axis: _beyond_ranks(
+            together.p_value(axis), together.lowest_step(axis), witnesses.get(axis, {})
+        )
+        for axis in axes
+    }
+    witnesses |= {axis: {PATTERNS: p_values[axis]} for axis in axes if axis not in evidence}
     p_alone = {
         axis: max(p_values[axis], together.p_value(axis, common[axis]))
         if common[axis]
@@ -257,9 +268,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             common_log_ratio=common[axis],
             distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
             effects=effects,
-            witnesses={PATTERNS: p_values[axis]}
-            if methods[axis] == "one-session"
-            else {name: one.p_value(axis) for name, one in alone_by_witness.items()},
+            witnesses=witnesses[axis],
             method=methods[axis],
             n_baseline_sessions=_present(cells[axis], "baseline"),
             n_target_sessions=_present(cells[axis], "target"),
@@ -268,6 +277,19 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         )
         judgements[axis] = replace(judgement, state=_state(judgement, policy))
     return judgements
+
+
+def _beyond_ranks(p_value: float, step: float, witnesses: Mapping[str, float]) -> float:
+    """Say how improbable a shift is that exceeds all healthy ones.
+
+    Ranks say no more of it than the lowest step. The soft maximum has a longer tail than its parts
+    have, which a Student tail does not know: below the step the p-value is that of the witness
+    that is surest, times the number that were asked (Bonferroni).
+    """
+    known = [p for p in witnesses.values() if math.isfinite(p)]
+    if len(known) < 2 or not p_value <= step:
+        return p_value
+    return min(step, len(known) * min(known))
 
 
 class _Comparison:
@@ -329,6 +351,17 @@ class _Comparison:
         # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
         # observed one, the pairs' own tail may go below it, doubled for the second look.
         return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
+
+    def lowest_step(self, axis: int) -> float:
+        """Smallest p-value that ranks alone can give; 0 where they give none."""
+        if axis not in self._evidence:
+            return 0.0
+        n_baseline, n_target = len(self._cells[axis][0].baseline), len(self._cells[axis][0].target)
+        if self._methods[axis] == "sessions":
+            return 1 / (n_baseline + 1)
+        return 1 / len(
+            relabellings(n_baseline, n_target, self._policy.permutations, self._policy.seed)
+        )
 
     def _log_pooled(self, axis: int, name: str) -> FloatArray:
         """Log distance between the groups under every labelling, computed once a witness."""

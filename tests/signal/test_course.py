@@ -7,7 +7,7 @@ import pytest
 
 from opamc_cli.signal.course import mean_course
 from opamc_cli.signal.quality import clipped_share
-from opamc_cli.signal.reported import fluctuation_frequency, signed_by_speed
+from opamc_cli.signal.reported import fluctuation_frequency, lacks_sign, signed_by_speed
 
 
 @pytest.mark.parametrize(("n", "parts"), [(64, 8), (65, 8), (7, 8), (100, 33)])
@@ -38,10 +38,10 @@ def speed_and_friction(load):
     return v, 0.8 * np.sign(v) + 0.1 * v + load
 
 
-def test_an_unsigned_current_gets_its_sign_from_the_speed():
-    v, current = speed_and_friction(0.0)
-    np.testing.assert_allclose(signed_by_speed(np.abs(current), v), current)
-    v, current = speed_and_friction(0.3)
+@pytest.mark.parametrize("load", [0.0, 0.3])
+def test_an_unsigned_current_gets_its_sign_from_the_speed(load):
+    v, current = speed_and_friction(load)
+    assert lacks_sign(np.abs(current), v) is True
     found = signed_by_speed(np.abs(current), v)
     np.testing.assert_allclose(found[v != 0], current[v != 0])
 
@@ -49,7 +49,14 @@ def test_an_unsigned_current_gets_its_sign_from_the_speed():
 @pytest.mark.parametrize("load", [0.0, 3.0, -3.0])
 def test_a_current_that_has_its_sign_keeps_it(load):
     v, current = speed_and_friction(load)
-    assert signed_by_speed(current, v) is None
+    assert lacks_sign(current, v) is False
+
+
+def test_a_joint_that_never_rests_does_not_tell_a_load_from_a_lost_sign():
+    v = np.sign(np.sin(np.arange(400) / 20))
+    assert lacks_sign(np.abs(0.8 * v), v) is None
+    assert lacks_sign(0.8 * v, v) is False
+    assert lacks_sign(np.full(400, 0.8), np.ones(400)) is False
 
 
 def test_a_current_that_rests_at_zero_is_not_clipped():
