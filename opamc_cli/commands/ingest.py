@@ -99,8 +99,10 @@ def _guess(files: list[str], output: Output) -> None:
 def _own_map(files: list[str]) -> Path:
     """Return the shipped map of recordings that say themselves what is what: ROS joint states."""
     from opamc_cli.storage.ingest.formats import format_by_ending
+    from opamc_cli.storage.ingest.recordings import find_recordings
 
-    if all(format_by_ending(Path(file)) == "ros" for file in files):
+    found = [Path(each.source) for each in find_recordings(files)]
+    if all(format_by_ending(path) == "ros" for path in found):
         return Path("ros_joint_state")
     msg = "no --map; `opamc ingest FILE --guess` prints one to look at, correct and save"
     raise UsageError(msg)

@@ -124,9 +124,10 @@ def _check_channel(run: Run, name: str, values: Array) -> None:
         raise InputError(msg)
     is_current = not name.endswith(("position", "velocity", "temperature"))
     if is_current and np.ptp(values[known]) == 0:
+        level = f"{float(values[known][0]):g} {run.info.current_unit}"
         msg = (
-            f"{run.path}: column {name} is constant at {float(values[known][0]):g} A in all "
-            f"{len(values)} samples; check the sensor"
+            f"{run.path}: column {name} is constant at {level} in all {len(values)} samples; "
+            "check the sensor"
         )
         raise InputError(msg)
 

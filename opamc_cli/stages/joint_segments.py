@@ -64,8 +64,8 @@ def joint_segments(
     )
     if motions and known.min() == known.max():
         msg = (
-            f"{run.path}: column {name} is constant at {known[0]:g} A while the joint moves; "
-            "check the drive's log or leave the axis out"
+            f"{run.path}: column {name} is constant at {known[0]:g} {run.info.current_unit} while "
+            "the joint moves; check the drive's log or leave the axis out"
         )
         raise InputError(msg)
     notes = []

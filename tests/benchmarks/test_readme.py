@@ -1,0 +1,129 @@
+"""The first hour of who knows only the README: raw files to a verdict, by its commands alone."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests" / "storage")]
+
+import foreign  # noqa: E402
+import readme  # noqa: E402
+
+README = readme.README.read_text(encoding="utf-8")
+MOST_LINES = 180
+
+
+def commands(text):
+    """Return the `opamc` commands of the README's blocks, as a reader would copy them."""
+    blocks = re.findall(r"```\n(.*?)```", text, re.DOTALL)
+    lines = [
+        line.removeprefix("$ ").split("   ")[0] for block in blocks for line in block.split("\n")
+    ]
+    return [line.strip() for line in lines if line.removeprefix("$ ").startswith("opamc ")]
+
+
+def taken(*beginnings):
+    """Return the README's first command with each beginning."""
+    known = commands(README)
+    return [next(line for line in known if line.startswith(start)) for start in beginnings]
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    work = tmp_path_factory.mktemp("first-hour")
+    readme.make_logs(work)
+    return work
+
+
+def read_log(path):
+    """Return a log as a recording of three joints."""
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    return foreign.Recording(rows[:, 0], rows[:, 1:4], rows[:, 4:7], rows[:, 7:10])
+
+
+def verdict_of(work, given):
+    """Run commands in a folder and return the verdict that they end in."""
+    assert len(given) <= 3
+    for command in given:
+        readme.run(command, work)
+    return json.loads((work / "opamc-out" / "verdict.json").read_text())
+
+
+def check_found(verdict):
+    states = {entry["axis"]: entry["state"] for entry in verdict["axes"]}
+    assert states == {1: "healthy", 2: "healthy", 3: "fault"}
+
+
+def test_the_readme_is_short():
+    assert len(README.splitlines()) <= MOST_LINES
+
+
+def test_a_map_of_the_readme_is_ten_lines_at_most():
+    for block in re.findall(r"```yaml\n(.*?)```", README, re.DOTALL):
+        assert len(yaml.safe_dump(yaml.safe_load(block)).splitlines()) <= 10
+
+
+@pytest.mark.slow
+def test_what_the_readme_shows_is_what_its_commands_print():
+    check = [sys.executable, str(ROOT / "benchmarks" / "readme.py"), "--check"]
+    ended = subprocess.run(check, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stderr
+
+
+@pytest.mark.slow
+def test_a_ros_bag_ends_in_a_verdict(logs, tmp_path):
+    for path in sorted((logs / "logs").rglob("*.csv")):
+        target = tmp_path / "bags" / path.parent.name
+        target.mkdir(parents=True, exist_ok=True)
+        foreign.bag(target / path.stem, read_log(path), joints=("base", "shoulder", "elbow"))
+    given = taken("opamc ingest bags/", "opamc diagnose --baseline runs/normal")
+    # recordings of uneven clocks have to have one rate, as ingest says
+    given[0] += " --set resample_hz=125"
+    verdict = verdict_of(tmp_path, given)
+    check_found(verdict)
+    # a torque is never called a current's ampere
+    assert not re.search(r"[0-9] A\b", json.dumps(verdict))
+    page = (tmp_path / "opamc-out" / "report.html").read_text()
+    assert "torque (Nm)" in page
+    assert "(A)" not in page
+
+
+@pytest.mark.slow
+def test_a_foreign_parquet_ends_in_a_verdict(logs, tmp_path):
+    for path in sorted((logs / "logs").rglob("*.csv")):
+        r = read_log(path)
+        target = tmp_path / "logs" / path.parent.name / f"{path.stem}.parquet"
+        target.parent.mkdir(parents=True, exist_ok=True)
+        stamps = np.datetime64("2026-03-01T08:00", "us") + (r.time_s * 1e6).astype("m8[us]")
+        columns = {"ts": stamps}
+        for axis in range(3):
+            columns[f"J{axis + 1}_motor_current_mA"] = r.current[:, axis] * 1000
+            columns[f"J{axis + 1}_angle_deg"] = np.rad2deg(r.angle[:, axis])
+        pq.write_table(pa.table(columns), target)
+    given = taken(
+        "opamc ingest logs --guess >", "opamc ingest logs --map", "opamc diagnose --baseline runs"
+    )
+    check_found(verdict_of(tmp_path, given))
+
+
+@pytest.mark.slow
+@pytest.mark.measured
+def test_a_measured_arm_ends_in_a_closed_loop(tmp_path):
+    if not readme.MEASURED.exists():
+        pytest.skip("measured recordings are not in ../shared/data")
+    given = taken("opamc ingest kinova/", "opamc model close arm/")
+    assert len(given) <= 3
+    for command in given:
+        readme.run(command.replace("kinova/", f"{readme.MEASURED.parent}/"), tmp_path)
+    loop = json.loads((tmp_path / "arm" / "loop.json").read_text())["axes"][0]
+    assert loop["verdict"] in ("closed", "partial")
+    assert loop["after"]["rmse_a"] < 0.6 * loop["before"]["rmse_a"]
