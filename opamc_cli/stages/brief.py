@@ -18,7 +18,7 @@ COMMON = 1.5
 
 
 def brief(
-    judgement: Judgement, bundle: Bundle, cause: Mapping[str, Any] | None
+    judgement: Judgement, bundle: Bundle, cause: Mapping[str, Any] | None, unit: str = "A"
 ) -> dict[str, Any] | None:
     """Return what a maintainer needs of an unhealthy joint; None for any other.
 
@@ -30,6 +30,8 @@ def brief(
         What it was made from.
     cause
         The cause found for the change, if any.
+    unit
+        Of the current, or of the torque that stands for it.
 
     Returns
     -------
@@ -41,7 +43,7 @@ def brief(
         return None
     return {
         "inspect": _inspect(cause),
-        "evidence": _evidence(judgement, bundle),
+        "evidence": _evidence(judgement, bundle, unit),
         "against": _against(judgement, cause),
     }
 
@@ -57,13 +59,13 @@ def _inspect(cause: Mapping[str, Any] | None) -> str:
     return f"Inspect the joint for {meaning}."
 
 
-def _evidence(judgement: Judgement, bundle: Bundle) -> list[str]:
+def _evidence(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
     strongest = sorted((p, name) for name, p in judgement.witnesses.items() if math.isfinite(p))
-    said = [_of_witness(name, judgement, bundle) for _, name in strongest]
+    said = [_of_witness(name, judgement, bundle, unit) for _, name in strongest]
     return [text for text in said if text][:MOST_EVIDENCE]
 
 
-def _of_witness(name: str, judgement: Judgement, bundle: Bundle) -> str | None:
+def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> str | None:
     effect, p = judgement.effects.get(name, math.nan), judgement.witnesses[name]
     by = f"p {p:.2g}" if p >= 1e-4 else "p < 0.0001"
     if name == PATTERNS:
@@ -85,10 +87,14 @@ def _of_witness(name: str, judgement: Judgement, bundle: Bundle) -> str | None:
         if part is None:
             return None
         return (
-            f"The mean current is {part.change_a:+.2g} A off in motion {part.motion}, "
+            f"The mean {_called(unit)} is {part.change_a:+.2g} {unit} off in motion {part.motion}, "
             f"{part.start:.0%} to {part.stop:.0%}; its size {part.scale:.2f} times ({by})."
         )
     return None
+
+
+def _called(unit: str) -> str:
+    return "torque" if unit == "Nm" else "current"
 
 
 def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:

@@ -2,16 +2,18 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from opamc_cli.config.models import ScoreConfig
 from opamc_cli.stages.sessions import started
 from opamc_cli.stats.decision import PATTERNS, Bundle, Judgement
 from opamc_cli.stats.profiles import ProfileEvidence, clearest_course
 from opamc_cli.stats.sessions import Cell, effect_by_cell
 from opamc_cli.stats.spectra import SpectrumEvidence, clearest_change
-from opamc_cli.storage.sources import RunSource
+from opamc_cli.storage.sources import RunSource, current_unit
 
 INSPECT = (
     "Inspect the joint's strain wave gear first: backlash by hand with the motor held, flexspline "
@@ -46,6 +48,7 @@ def reasons(
     motions: Sequence[Mapping[str, Any]],
     sources: Mapping[str, Sequence[RunSource]],
     cause: Mapping[str, Any] | None = None,
+    limits: ScoreConfig | None = None,
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -61,6 +64,8 @@ def reasons(
         Recordings of "baseline" and "target" in which the axis moves.
     cause
         The cause found for the change, if any.
+    limits
+        What a change has to exceed; None: the defaults.
 
     Returns
     -------
@@ -72,8 +77,9 @@ def reasons(
     if judgement.state == "insufficient-data":
         return [*_missing(judgement, cells), *_short(cells)]
     unhealthy = judgement.state != "healthy"
+    unit = current_unit(chain(*sources.values()))
     sentences = [
-        *_change(judgement, bundle, motions),
+        *_change(judgement, bundle, motions, limits or ScoreConfig(), unit),
         _certainty(judgement),
         _rest(judgement, sources),
         *_siblings(judgement),
@@ -91,7 +97,11 @@ def reasons(
 
 
 def _change(
-    judgement: Judgement, bundle: Bundle, motions: Sequence[Mapping[str, Any]]
+    judgement: Judgement,
+    bundle: Bundle,
+    motions: Sequence[Mapping[str, Any]],
+    limits: ScoreConfig,
+    unit: str,
 ) -> list[str]:
     cells = bundle.cells
     distance = (
@@ -109,18 +119,24 @@ def _change(
                 f"No change beyond what healthy sessions show: {distance}.",
                 _pattern_change(judgement, cells, motions),
             ]
-        first = (
-            "A change too small, too uncertain or too common to all joints to act on: "
-            f"{distance}; keep an eye on it."
-        )
+        first = f"A change {_why_spared(judgement, limits)}: {distance}; keep an eye on it."
     else:
         first = f"The course of the torque has changed: {distance}."
     return [
         first,
         _pattern_change(judgement, cells, motions),
         *_size_change(judgement, bundle),
-        *_course_change(judgement, bundle),
+        *_course_change(judgement, bundle, unit),
     ]
+
+
+def _why_spared(judgement: Judgement, limits: ScoreConfig) -> str:
+    """Return why a change that healthy sessions hardly show is not called one."""
+    if judgement.p_adjusted > limits.false_alarm_rate:
+        return "too uncertain to act on"
+    if judgement.p_alone > limits.false_alarm_rate:
+        return "common to all joints, and so none of this one"
+    return "too small to act on"
 
 
 def _pattern_change(
@@ -163,7 +179,7 @@ def _size_change(judgement: Judgement, bundle: Bundle) -> list[str]:
     ]
 
 
-def _course_change(judgement: Judgement, bundle: Bundle) -> list[str]:
+def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
     witness = bundle.witnesses.get("profile")
     if not isinstance(witness, ProfileEvidence):
         return []
@@ -173,8 +189,8 @@ def _course_change(judgement: Judgement, bundle: Bundle) -> list[str]:
     return [
         f"The course of the current changed by {judgement.effects['profile']:.0%} (root mean "
         f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
-        f"{change.stop:.0%} of its way, by {change.change_a:+.3g} A; its size over the motion is "
-        f"{change.scale:.3g} times the baseline's."
+        f"{change.stop:.0%} of its way, by {change.change_a:+.3g} {unit}; its size over the "
+        f"motion is {change.scale:.3g} times the baseline's."
     ]
 
 

@@ -22,6 +22,7 @@ from opamc_cli.stages.sessions import Sessions, started
 from opamc_cli.stages.side import Side, Sides
 from opamc_cli.stats.decision import Bundle, Judgement, Policy, judge
 from opamc_cli.storage.atomic import write_text
+from opamc_cli.storage.sources import current_unit
 
 FILE_NAME = "verdict.json"
 
@@ -137,6 +138,7 @@ def content(
     jsd = _divergences(scored.scores)
     pooled = _pooled_features(scored.features)
     sides = (decided.sides.baseline, decided.sides.target)
+    unit = current_unit([source for side in sides for source in side.sources])
     axes = []
     for axis, judgement in decided.judgements.items():
         cause = causes.get(axis)
@@ -176,8 +178,8 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "brief": brief(final, bundle, cause),
-                "reasons": reasons(final, bundle, motions, runs, cause),
+                "brief": brief(final, bundle, cause, unit),
+                "reasons": reasons(final, bundle, motions, runs, cause, config.score),
             }
         )
     return {

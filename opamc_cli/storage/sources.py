@@ -1,7 +1,7 @@
 """Which runs a stage table was made from, and how a later stage finds their samples again."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -134,6 +134,11 @@ def read_sources(table: Path, moved_to: Sequence[Path] = ()) -> tuple[RunSource,
         )
         for entry in record["runs"]
     )
+
+
+def current_unit(sources: Iterable[RunSource]) -> str:
+    """Return the unit of the runs' current: "Nm" where a torque stands for it, else "A"."""
+    return "Nm" if {source.info.current_unit for source in sources} == {"Nm"} else "A"
 
 
 def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> tuple[str, ...]:

@@ -44,15 +44,18 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
     features = dict(pooled_features(inputs, axis, focus.order[axis]) or {})
     features.update({k: v for k, v in (entry.get("features") or {}).items() if v is not None})
     elsewhere = wording.said_elsewhere(entry)
+    brief = entry.get("brief") or {}
     reasons = [str(reason) for reason in entry.get("reasons", ())]
+    shown = [reason for reason in reasons if reason not in elsewhere]
     return {
         "axis": axis,
         "inspect": wording.inspection(entry),
         "likely": wording.likely_cause(entry),
         "chance": wording.chance_phrase(entry, len((inputs.verdict or {}).get("axes", ()))),
         "distance": wording.distance_phrase(entry),
-        "why": [reason for reason in reasons if reason not in elsewhere],
-        "more": [str(why) for why in (entry.get("cause") or {}).get("why", ())],
+        "why": list(brief.get("evidence") or shown),
+        "against": brief.get("against"),
+        "more": [*(shown if brief else ()), *(entry.get("cause") or {}).get("why", ())],
         "state": entry.get("state", "not judged"),
         "health_index": entry.get("health_index"),
         "p_value": entry.get("p_value"),
