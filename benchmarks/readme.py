@@ -70,6 +70,7 @@ def run(command: str, work: Path) -> str:
         **os.environ,
         "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
         "PYTHONPATH": str(ROOT),
+        "COLUMNS": "120",
     }
     ended = subprocess.run(
         command,

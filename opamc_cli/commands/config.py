@@ -33,7 +33,7 @@ def check(
         Path | None,
         typer.Argument(
             metavar="FILE",
-            help="Options of the stages, a testbed, a map or a joint's model: told by its keys.",
+            help="Options of the stages, a testbed, a map, a joint's model or a cell: told by its keys.",
         ),
     ] = None,
     config: ConfigFile = None,
@@ -64,6 +64,7 @@ def check(
 
 def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
     """Return a document that is not the options of the stages, or say what is wrong with it."""
+    from opamc_cli.config.cell import load_cell
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.config.testbed import load_testbed
     from opamc_cli.storage.ingest.map import load_map
@@ -72,6 +73,8 @@ def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
         return load_testbed(file, overrides)
     if kind == "map":
         return load_map(file, overrides)
+    if kind == "cell":
+        return load_cell(file)
     return load_joint_model(file, overrides)
 
 
