@@ -33,7 +33,7 @@ def check(
         Path | None,
         typer.Argument(
             metavar="FILE",
-            help="Options of the stages, a testbed, a map, a joint's model or a cell: told by its keys.",
+            help="Options, a testbed, a map, a joint's model or a cell: told by its keys.",
         ),
     ] = None,
     config: ConfigFile = None,

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from opamc_cli.commands.effects import effects
 from opamc_cli.commands.options import DEFAULT_OUT, Json, Out, Overrides, Quiet
 from opamc_cli.commands.output import Output
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, OpamcError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -29,6 +30,7 @@ ModelFile = Annotated[
         help="What is declared; default: the shipped `model`, see configs/model.yaml.",
     ),
 ]
+PACKAGE = Path(__file__).parents[1]
 DECLARED = Path("model")
 """Inertia, gravity and friction, gear unknown."""
 
@@ -36,6 +38,8 @@ Axis = Annotated[
     list[int] | None,
     typer.Option("--axis", min=1, help="Axis, counted from 1; may be repeated. Default: all."),
 ]
+
+app.command()(effects)
 
 
 @app.command()
@@ -140,12 +144,33 @@ def close(
 
 @contextmanager
 def _naming(model: Path) -> Iterator[None]:
-    """Name the model's file in what is wrong with its declarations."""
+    """Name the model's file in what is wrong with it, and a line of a user's own effect."""
     try:
         yield
     except ConfigError as error:
         msg = f"{model}: {error}"
         raise ConfigError(msg) from error
+    except OpamcError:
+        raise
+    except Exception as error:
+        where = _in_a_users_effect(error)
+        if where is None:
+            raise
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        msg = f"{where}: this effect cannot be used ({what}); correct it"
+        raise ConfigError(msg) from error
+
+
+def _in_a_users_effect(error: BaseException) -> str | None:
+    """Return file and line where an error arose in a user's effect, None where in none."""
+    import traceback
+
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        own = frame.filename.endswith(".py") and Path(frame.filename).is_relative_to(PACKAGE)
+        installed = "site-packages" in frame.filename or "/lib/python" in frame.filename
+        if not own and not installed and Path(frame.filename).is_file():
+            return f"{frame.filename}:{frame.lineno}"
+    return None
 
 
 def _parameters(values: dict[str, float]) -> str:

@@ -169,6 +169,36 @@ def test_a_users_effect_is_used_by_name(folder):
     assert loop["declared"][-1] == "knee"
 
 
+def test_a_mistake_in_a_users_effect_is_told_with_file_and_line(folder, capsys):
+    (folder / "mine.py").write_text(
+        "from opamc_cli.joint.effects.base import Effect\n"
+        "class Knee(Effect):\n"
+        "    name = 'knee'\n"
+        "    domain = 'velocity'\n"
+        "    def columns(self, track, parameters):\n"
+        "        return track.velocty\n"
+    )
+    (folder / "model.yaml").write_text("effects: [coulomb, knee]\nlibrary: [mine.py]\n")
+    run, model = folder / "run.parquet", folder / "model.yaml"
+    assert opamc("model", "fit", run, "--model", model, "--axis", 1, "--out", folder / "o") == 2
+    told = capsys.readouterr().err
+    assert f"{folder / 'mine.py'}:6: this effect cannot be used (AttributeError" in told
+    assert "a bug" not in told
+
+
+def test_effects_are_listed_and_shown(capsys):
+    assert opamc("model", "effects", "--json") == 0
+    listed = {effect["name"]: effect for effect in json.loads(capsys.readouterr().out)["effects"]}
+    assert len(listed) == 23
+    assert all(effect["domain"] and effect["text"] for effect in listed.values())
+    assert opamc("model", "effects", "stribeck") == 0
+    shown = capsys.readouterr().out
+    assert "exp(-(v / v_s)^2)" in shown
+    assert "mixed lubrication" in shown
+    assert opamc("model", "effects", "stribec") == 2
+    assert "did you mean stribeck" in capsys.readouterr().err
+
+
 def test_phases_alone_are_enough(tmp_path):
     made = simulate(6, ("stribeck",), 1.0, rate=2048.0, cycles=6)
     write_run(
