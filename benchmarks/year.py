@@ -9,7 +9,7 @@ and the true decision against the robot's baseline of six nights; what `opamc ni
 as the command's.
 
     python benchmarks/year.py --robots 4 --nights 60 --first-seed 100
-    python benchmarks/year.py --first-seed 41000 --write
+    python benchmarks/year.py --first-seed 41000
 """
 
 import argparse
@@ -17,21 +17,22 @@ import json
 import shutil
 import tempfile
 import time
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
+from datetime import date, timedelta
 from pathlib import Path
 
 import numpy as np
 
 from opamc_cli.config import load_config
+from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.stages import identify, patterns, segment
-from opamc_cli.stages.cells import cells_by_axis, session_names, spectrum_cells
 from opamc_cli.stages.kept import KeptResults
-from opamc_cli.stages.score import read_patterns
-from opamc_cli.stages.verdict import policy_of
-from opamc_cli.stats.decision import judge
+from opamc_cli.stages.nightly.alarms import settle_robot
+from opamc_cli.stages.side import Sides, read_side
+from opamc_cli.stages.verdict import decide
+from opamc_cli.storage.history import AlarmRow
 from opamc_cli.storage.runs import RunInfo, save_run
-from opamc_cli.storage.tables import SPECTRA, read_table
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -43,6 +44,8 @@ SEASON_K = 5.0  # a hall without air conditioning: 17 to 27 degrees over the yea
 COLD_SHARE, COLD_K = 0.1, -8.0  # a morning after a night without heating
 MISSING_SHARE = 0.05
 PAYLOAD_KG = 1.0
+FAULT_EFFECT = 0.3
+FIRST_NIGHT = date(2026, 1, 1)
 
 
 @dataclass(frozen=True)
@@ -204,27 +207,15 @@ def tables(runs, out, config, reference, kept):
 
 def judged(folder: Path, config, life: Life, night: int) -> list[Measured]:
     """Judge one night from its tables."""
-    sides = [folder / role / "patterns.parquet" for role in ("baseline", "target")]
-    rows = (read_patterns(sides[0]), read_patterns(sides[1]))
-    power = [read_table(side.with_name("spectra.parquet"), "patterns", SPECTRA) for side in sides]
-    cells = cells_by_axis(*rows)
-    spectra = {
-        axis: spectrum_cells(power[0], power[1], axis, session_names(axis, *rows)) for axis in cells
-    }
-    warm = {
-        axis: float(
-            np.median(
-                [
-                    t
-                    for key, part in rows[1].items()
-                    if key[0] == axis
-                    for t in part.rows["temperature_c"]
-                ]
-            )
-        )
-        for axis in cells
-    }
+    sides = Sides(
+        read_side(folder / "baseline" / "patterns.parquet"),
+        read_side(folder / "target" / "patterns.parquet"),
+        config.score.day_starts_at,
+    )
     loaded = life.payload_from is not None and night >= life.payload_from
+    warm: dict[int, list[float]] = {}
+    for key, part in sides.rows[1].items():
+        warm.setdefault(key[0], []).extend(part.rows["temperature_c"])
     return [
         Measured(
             night,
@@ -234,22 +225,25 @@ def judged(folder: Path, config, life: Life, night: int) -> list[Measured]:
             float(np.log(one.distance_ratio)),
             one.common_log_ratio,
             one.effect,
-            warm[axis],
+            float(np.median(warm[axis])),
             PAYLOAD_KG if loaded else 0.0,
             life.severity(night) if axis == life.wearing_axis else 0.0,
         )
-        for axis, one in judge(cells, policy_of(config.score), spectra).items()
+        for axis, one in decide(sides, config).judgements.items()
     ]
 
 
-def measured_cell(
-    n_robots: int, n_nights: int, first_seed: int
-) -> list[tuple[Life, list[Measured]]]:
+Cell = list[tuple[Life, list[Measured]]]
+
+
+def measured_cell(n_robots: int, n_nights: int, first_seed: int, only_known: bool) -> Cell:
     """Measure every robot of a cell; what was measured before is read."""
     cell = []
     for life in lives(n_robots, n_nights, first_seed):
         path = CACHE / f"{first_seed}-{n_nights}" / f"robot-{life.seed}.json"
         if not path.exists():
+            if only_known:
+                continue
             started = time.perf_counter()
             found = measure_robot(life, n_nights)
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -259,10 +253,145 @@ def measured_cell(
     return cell
 
 
+def history_of(life: Life, rows: list[Measured], *, chart: bool) -> list[dict[str, object]]:
+    """Return what the history would hold; without the chart, nothing but each night's verdict."""
+    return [
+        {
+            **{"robot": str(life.seed), "program": "cycle", "axis": one.axis},
+            **{"night": day(one.night), "state": one.state, "effect": one.effect},
+            **{"distance": one.distance if chart else None, "common": one.common},
+            **{"harmless": 0, "cause": None, "reason": ""},
+            "baseline": f"{one.payload_kg} {one.night >= life.exchanged_at}"
+            if life.exchanged_axis
+            else str(one.payload_kg),
+        }
+        for one in sorted(rows, key=lambda one: (one.axis, one.night))
+    ]
+
+
+def day(night: int) -> str:
+    """Return a night's date."""
+    return (FIRST_NIGHT + timedelta(night)).isoformat()
+
+
+def number(text: str) -> int:
+    """Return the number of a night's date."""
+    return (date.fromisoformat(text) - FIRST_NIGHT).days
+
+
+@dataclass
+class Score:
+    """How an alarm rule did over a cell."""
+
+    false: int = 0
+    alarmed: list[tuple[int, float, int, int]] = field(default_factory=list)
+    missed: list[int] = field(default_factory=list)
+    forecasts: list[tuple[int, bool]] = field(default_factory=list)
+
+
+def evaluate(cell: Cell, *, chart: bool) -> Score:
+    """Let every robot's nights go through the command's own alarm rule."""
+    score = Score()
+    for life, rows in cell:
+        series = history_of(life, rows, chart=chart)
+        settled = settle_robot(
+            str(life.seed), series, [], [], AlarmConfig(), FAULT_EFFECT, BASELINE_NIGHTS
+        )
+        found = False
+        for alarm in settled.alarms:
+            raised = number(alarm.raised)
+            severity = life.severity(raised) if alarm.axis == life.wearing_axis else 0.0
+            if severity == 0:
+                score.false += 1
+            elif not found:
+                found = True
+                until_half = life.wear_starts + life.wear_nights / 2 - raised
+                since = number(as_first_told(life, series, alarm.raised).since)
+                score.alarmed.append((life.seed, severity, round(until_half), since))
+        if life.wearing_axis and not found:
+            score.missed.append(life.seed)
+        if life.wearing_axis and chart:
+            score.forecasts += forecasts(life, rows, series)
+    return score
+
+
+def as_first_told(life: Life, series: list[dict[str, object]], until: str) -> AlarmRow:
+    """Return the wearing joint's alarm as it was told in a night."""
+    known = [row for row in series if row["axis"] == life.wearing_axis and row["night"] <= until]
+    return settle_robot(
+        str(life.seed), known, [], [], AlarmConfig(), FAULT_EFFECT, BASELINE_NIGHTS
+    ).alarms[-1]
+
+
+def forecasts(
+    life: Life, rows: list[Measured], series: list[dict[str, object]]
+) -> list[tuple[int, bool]]:
+    """Hold each night's forecast of the fault level against the night that reached it."""
+    own = sorted((one for one in rows if one.axis == life.wearing_axis), key=lambda o: o.night)
+    nights = np.array([one.night for one in own])
+    effects = np.array([one.effect for one in own])
+    # the level is reached in the night around which the median of seven nights is above it
+    smooth = np.array([np.median(effects[max(0, t - 3) : t + 4]) for t in range(len(own))])
+    above = np.flatnonzero((smooth >= FAULT_EFFECT) & (nights >= life.wear_starts))
+    if not above.size:
+        return []
+    reached = int(nights[above[0]])
+    found = []
+    for night in nights[(nights >= life.wear_starts) & (nights < reached)].tolist():
+        known = [row for row in series if row["night"] <= day(night)]
+        known = [row for row in known if row["axis"] == life.wearing_axis]
+        alarms = settle_robot(
+            str(life.seed), known, [], [], AlarmConfig(), FAULT_EFFECT, BASELINE_NIGHTS
+        ).alarms
+        trend = json.loads(alarms[-1].trend) if alarms and not alarms[-1].cleared else {}
+        if trend.get("reach"):
+            low, high = trend["reach"]
+            found.append((life.seed, bool(low <= reached - night <= high)))
+    return found
+
+
+def report(cell: Cell) -> str:
+    """Return the figures as a table."""
+    nights = sum(len({one.night for one in rows}) for _, rows in cell)
+    wearing = sum(life.wearing_axis is not None for life, _ in cell)
+    lines = [
+        f"{len(cell)} robots, {nights / 365:.1f} robot-years judged, {wearing} joints that wear",
+        "",
+        "| | with memory | each night alone, 2 of 3 |",
+        "|---|---|---|",
+    ]
+    scores = [evaluate(cell, chart=True), evaluate(cell, chart=False)]
+    rows = {
+        "false alarms (per robot-year)": lambda s: f"{s.false} ({s.false / (nights / 365):.2f})",
+        "wearing joints alarmed": lambda s: f"{len(s.alarmed)} of {wearing}",
+        "before severity 0.5": lambda s: f"{sum(a[1] < 0.5 for a in s.alarmed)} of {wearing}",
+        "severity at the alarm, median (largest)": lambda s: (
+            f"{np.median([a[1] for a in s.alarmed]):.2f} ({max(a[1] for a in s.alarmed):.2f})"
+        ),
+        "nights before severity 0.5, median": lambda s: (
+            f"{np.median([a[2] for a in s.alarmed]):.0f}"
+        ),
+    }
+    for name, of in rows.items():
+        lines.append(f"| {name} | {' | '.join(of(s) if s.alarmed else '–' for s in scores)} |")
+    begun = {life.seed: life.wear_starts for life, _ in cell}
+    off = [a[3] - begun[a[0]] for a in scores[0].alarmed]
+    right = sum(abs(o) <= 5 for o in off)
+    lines.append(f"\n'since when' off by (nights): {off}; within 5 nights: {right} of {len(off)}")
+    told = scores[0].forecasts
+    inside = sum(ok for _, ok in told)
+    lines.append(
+        f"forecasts of the fault level: {len(told)} nights of {len({s for s, _ in told})} joints, "
+        f"{inside} held the night in which it was reached"
+    )
+    return "\n".join(lines)
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser()
     parser.add_argument("--robots", type=int, default=24)
     parser.add_argument("--nights", type=int, default=180)
     parser.add_argument("--first-seed", type=int, default=41000)
+    parser.add_argument("--known", action="store_true", help="only robots measured before")
     options = parser.parse_args()
-    measured_cell(options.robots, options.nights, options.first_seed)
+    print(report(measured_cell(options.robots, options.nights, options.first_seed, options.known)))

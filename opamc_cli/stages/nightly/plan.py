@@ -137,17 +137,28 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     series = _main_conditions(judged)
     baselines = _Baselines(now, series, usable)
     nights = []
+    known: dict[int, list[str]] = {}
+    broken_of: dict[str, list[Recording]] = {}
+    judged_of: dict[str, list[Recording]] = {}
+    programs_of: dict[str, list[str]] = {}
+    for one in recordings:
+        if one.facts.error:
+            broken_of.setdefault(one.night, []).append(one)
+    for one in judged:
+        judged_of.setdefault(one.night, []).append(one)
+    for program, night in series:
+        programs_of.setdefault(night, []).append(program)
     for night in sorted({one.night for one in recordings}):
-        broken = tuple(one for one in recordings if one.night == night and one.facts.error)
+        broken = tuple(broken_of.get(night, ()))
         notes: list[str] = []
         comparisons = []
-        for program in sorted({p for p, n in series if n == night}):
+        for program in sorted(programs_of.get(night, ())):
             condition, targets = series[program, night]
             comparisons.append(baselines.comparison(program, condition, night, tuple(targets)))
             left = [
                 one
-                for one in judged
-                if (one.facts.program, one.night) == (program, night) and one not in targets
+                for one in judged_of[night]
+                if one.facts.program == program and one.condition != condition
             ]
             if left:
                 notes.append(
@@ -157,7 +168,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
                 )
         if not comparisons and not broken:
             continue  # all its recordings belong to the fixed baseline
-        key = _key(comparisons, broken, now.config_hash)
+        key = _key(comparisons, broken, now.config_hash, known)
         why = _why(key, now.recorded.get(night))
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
@@ -192,6 +203,8 @@ class _Baselines:
         self._series = series
         self._usable = usable
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
+        self._there: dict[tuple[str, str, str], list[str]] = {}
+        self._used: dict[tuple[str, str, str], tuple[Recording, ...]] = {}
 
     def comparison(
         self, program: str, condition: str, night: str, targets: tuple[Recording, ...]
@@ -230,13 +243,8 @@ class _Baselines:
         since: str,
     ) -> Comparison:
         wanted = self._now.baseline.nights or NIGHTS_AGAIN
-        until = min((begun for begun in self._now.begun if begun > since), default="9999")
-        there = sorted(
-            n
-            for (p, n), (c, _) in self._series.items()
-            if p == program and c == condition and since <= n < until
-        )
         key = (program, condition, since)
+        there = self._nights_there(key)
         pinned = self._now.pinned.get(key)
         members = list(pinned) if pinned else there[:wanted]
         if len(members) < wanted and not pinned:
@@ -252,16 +260,38 @@ class _Baselines:
                 "a new baseline with `opamc nightly rebaseline`"
             )
             return Comparison(program, condition, targets, missing=why)
-        used = tuple(one for n in left for one in self._series[program, n][1])
+        if key not in self._used:
+            self._used[key] = tuple(one for n in left for one in self._series[program, n][1])
+        used = self._used[key]
         name = f"from {members[0]}, {condition}"
         return Comparison(program, condition, targets, used, name)
 
+    def _nights_there(self, key: tuple[str, str, str]) -> list[str]:
+        """Return the nights that may belong to a baseline, the same list for all its nights."""
+        if key not in self._there:
+            program, condition, since = key
+            until = min((begun for begun in self._now.begun if begun > since), default="9999")
+            self._there[key] = sorted(
+                n
+                for (p, n), (c, _) in self._series.items()
+                if p == program and c == condition and since <= n < until
+            )
+        return self._there[key]
 
-def _key(comparisons: Sequence[Comparison], broken: Sequence[Recording], config_hash: str) -> str:
+
+def _key(
+    comparisons: Sequence[Comparison],
+    broken: Sequence[Recording],
+    config_hash: str,
+    known: dict[int, list[str]],
+) -> str:
     """Return what a night's result depends on, so that it can be said what has changed."""
+    for one in comparisons:
+        if id(one.baseline) not in known:
+            # the same tuple for all nights of a baseline, alive as long as the plan is made
+            known[id(one.baseline)] = sorted(_identity(one.baseline))
     rest = [
-        [one.program, one.condition, one.missing, sorted(_identity(one.baseline))]
-        for one in comparisons
+        [one.program, one.condition, one.missing, known[id(one.baseline)]] for one in comparisons
     ]
     targets = [identity for one in comparisons for identity in _identity(one.targets)]
     return json.dumps(

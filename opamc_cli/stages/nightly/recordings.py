@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from opamc_cli.config.cell import CellConfig
@@ -35,12 +36,13 @@ class Recording:
     sha256: str
     facts: Facts
 
-    @property
+    @cached_property
     def name(self) -> str:
         """How tables call it: its night and its file's stem."""
-        return f"{self.night}/{Path(self.log.path).stem}"
+        file = self.log.path.rpartition("/")[2]
+        return f"{self.night}/{file.rpartition('.')[0] or file}"
 
-    @property
+    @cached_property
     def condition(self) -> str:
         """The conditions that recordings to be compared have in common, in words."""
         facts = self.facts
