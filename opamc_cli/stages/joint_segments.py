@@ -11,7 +11,7 @@ from opamc_cli.signal.reported import (
     find_joint_motions,
     lacks_sign,
     motor_frequency,
-    velocity_from_position,
+    quiet_velocity,
 )
 from opamc_cli.signal.windows import carrier_windows
 from opamc_cli.stages.segment_rows import AxisSegments, Segment, make_rows, mean_variance
@@ -150,7 +150,7 @@ def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
         velocity = run.read([channels.velocity])[channels.velocity].astype(np.float64)
     elif channels.position is not None:
         position = run.read([channels.position])[channels.position]
-        velocity = velocity_from_position(position, run.sampling_rate_hz)
+        velocity = quiet_velocity(position, run.sampling_rate_hz)
     else:
         axis = channels.axis
         msg = (
