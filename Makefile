@@ -7,7 +7,7 @@ BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo demo-nightly test lint types check samples bench studies clean
+.PHONY: fuzz kill faults help install demo demo-nightly test lint types check samples bench studies clean
 
 help:  ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -52,6 +52,15 @@ bench: $(STAMP)  ## Speed, short form: kernels, commands, an hour from segment t
 	$(BIN)/python benchmarks/kernels.py --quick
 	$(BIN)/python benchmarks/commands.py --times 3 --minutes 2
 	$(BIN)/python benchmarks/pipeline.py --hours 0.25 0.5 1
+
+fuzz: $(STAMP)  ## 5000 wrong inputs, ten minutes: each a sentence and the right code
+	$(BIN)/python tests/reliability/fuzz.py --count 5000 --minutes 10
+
+kill: $(STAMP)  ## 500 kills and interruptions of all commands: whole results, no orphans
+	$(BIN)/python tests/reliability/kills.py --count 500
+
+faults: $(STAMP)  ## Every system call on a command's output failing once (needs a C compiler)
+	$(BIN)/python tests/reliability/faults.py --every 1
 
 studies: $(STAMP)  ## The studies behind the documentation's figures; takes hours
 	$(BIN)/python benchmarks/itsc.py

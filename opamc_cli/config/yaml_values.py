@@ -125,7 +125,7 @@ def _scalar(event: ScalarEvent, line: int) -> Any:
         if event.style is None and tag == f"{_TAG}str" and _FLOAT.fullmatch(text):
             tag = f"{_TAG}float"  # 1e5, which YAML 1.1 takes for a word
     kind = tag.removeprefix(_TAG)
-    if kind in ("str", "timestamp") and not _SURROGATE.search(text):
+    if kind in ("str", "timestamp") and not _NO_TEXT.search(text):
         return text
     if kind == "null" and text.lower() in ("", "~", "null"):
         return None
@@ -161,7 +161,8 @@ def _number(text: str) -> int | float | None:
     return None
 
 
-_SURROGATE = re.compile("[\ud800-\udfff]")
+_NO_TEXT = re.compile("[\\x00\ud800-\udfff]")
+"""What no name of a file and no UTF-8 can hold."""
 _FLOAT = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _TRUTH = {"yes": True, "true": True, "on": True, "no": False, "false": False, "off": False}
 

@@ -47,6 +47,9 @@ def parsed(model: type[Model], raw: bytes, place: str, advice: str) -> Model:
     InputError
         If it is no JSON or another document.
     """
+    if b"\\u0000" in raw:
+        msg = f"{place} holds a character 0, which no name has; {advice}"
+        raise InputError(msg)
     try:
         return model.model_validate_json(raw)
     except ValidationError as error:

@@ -74,6 +74,27 @@ def test_aliases_that_multiply_are_counted():
         plain_values("\n".join(layers))
 
 
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import sys\nsys.exit(0)",
+        "def (",
+        "x = 1",
+        "from opamc_cli.joint.effects.base import Effect\n"
+        "class Mine(Effect):\n    name, domain = 'mine', 7\n",
+        "from opamc_cli.joint.effects.base import Effect\n"
+        "class Mine(Effect):\n    name, domain = 'mine', 'time'\n"
+        "    def __init__(self): raise RuntimeError('no')\n",
+    ],
+)
+def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
+    (tmp_path / "mine.py").write_text(code)
+    (tmp_path / "model.yaml").write_text("library: [mine.py]\n")
+    ended = opamc("model", "fit", tonight, "--model", tmp_path / "model.yaml", "--out", tmp_path)
+    assert ended.code == 2
+    assert "mine.py" in ended.sentences[0]
+
+
 METADATA = [
     ({"sampling_rate_hz": 1e300}, "less than or equal"),
     ({"sampling_rate_hz": math.nan}, "is not JSON|finite"),
@@ -102,7 +123,7 @@ def test_odd_run_metadata(values, said):
     st.builds(
         RunInfo,
         sampling_rate_hz=st.floats(1e-3, 1e8),
-        robot=st.none() | st.text(st.characters(exclude_categories=("Cs",)), max_size=50),
+        robot=st.none() | st.text(st.characters(exclude_categories=("Cs", "Cc")), max_size=50),
         payload_kg=st.none() | st.floats(-1e6, 1e6),
     )
 )

@@ -125,3 +125,29 @@ def test_a_baseline_in_another_unit_does_not_make_all_healthy(opamc, tonight, tm
 def test_healthy_joints_are_judged_without_a_word(opamc, baseline, tonight, tmp_path):
     ended = diagnose(opamc, baseline, tonight, tmp_path / "out", "--quiet")
     assert (ended.code, ended.out, ended.err) == (ExitCode.DONE, "", "")
+
+
+def test_joints_exchanged_with_one_another_fit_nothing(opamc, baseline, tmp_path):
+    def exchange(columns):
+        for name in "abc":
+            one, other = f"axis1_{name}", f"axis2_{name}"
+            columns[one], columns[other] = columns[other], columns[one]
+
+    target = record(tmp_path / "tonight.parquet", 9, exchange)
+    ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "no axis can be judged" in ended.sentences[0]
+
+
+def test_a_gain_of_ten_per_cent_is_a_change_without_its_name(opamc, baseline, tmp_path):
+    """A limit: the current alone does not tell a sensor's gain from a load."""
+
+    def amplify(columns):
+        for name in columns:
+            columns[name] *= np.float32(1.1)
+
+    target = record(tmp_path / "tonight.parquet", 9, amplify)
+    ended = diagnose(opamc, baseline, target, tmp_path / "out")
+    assert ended.code == ExitCode.UNHEALTHY
+    axes = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert {axis["state"] for axis in axes} == {"changed"}

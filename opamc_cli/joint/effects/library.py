@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from opamc_cli.errors import ConfigError
+from opamc_cli.interruption import Interrupted
 from opamc_cli.joint.effects.asymmetric_friction import AsymmetricFriction
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.coulomb import Coulomb
@@ -107,15 +108,18 @@ def load_user_effects(path: Path) -> list[Effect]:
     module = importlib.util.module_from_spec(spec)
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
+        found = [
+            member()
+            for _, member in inspect.getmembers(module, inspect.isclass)
+            if issubclass(member, Effect) and member.__module__ == module.__name__ and member.name
+        ]
+        named = [isinstance(e.name, str) and isinstance(e.domain, str) and e.domain for e in found]
+    except Interrupted:
+        raise
+    except (Exception, SystemExit) as error:  # of a user's own code
         msg = f"Effect file {path} does not run: {type(error).__name__}: {error}"
         raise ConfigError(msg) from error
-    found = [
-        member()
-        for _, member in inspect.getmembers(module, inspect.isclass)
-        if issubclass(member, Effect) and member.__module__ == module.__name__ and member.name
-    ]
-    if not found or any(not effect.domain for effect in found):
+    if not found or not all(named):
         msg = f"Effect file {path} defines no class of Effect with a name and a domain"
         raise ConfigError(msg)
     return found
