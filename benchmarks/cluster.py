@@ -38,12 +38,13 @@ def nightly(cell: Path, scheduler: str | None) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--real", action="store_true")
+    parser.add_argument("--robots", type=int, default=3)
     parser.add_argument("--nights", type=int, default=12)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        cell = cell_logs.record_cell(Path(name), 3, options.nights, {})
+        cell = cell_logs.record_cell(Path(name), options.robots, options.nights, {})
         out = cell.parent / "nightly"
-        n = 3 * (options.nights - 2)
+        n = options.robots * (options.nights - 2)
         with nullcontext() if options.real else nightly_kills.with_stand_in():
             took = nightly(cell, None)
             plain = nightly_kills.end_state(out)
@@ -57,7 +58,11 @@ def main() -> None:
                         killer.start()
                     took = nightly(cell, cluster.scheduler_address)
                     killer.cancel()
-                    same = nightly_kills.end_state(out) == plain
+                    found = nightly_kills.end_state(out)
+                    same = found == plain
+                    differing = [key for key in plain if found.get(key) != plain[key]]
+                    if differing:
+                        print("differing:", differing)
                     print(
                         f"cluster of two{', one killed' if kill else ''}: "
                         f"{took / n * 1000:.0f} ms a night, same bytes: {same}",

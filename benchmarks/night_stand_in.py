@@ -13,8 +13,7 @@ from opamc_cli.stages.nightly.night import AxisResult, NightJob, ProgramResult
 
 def stand_in(job: NightJob) -> tuple[ProgramResult, ...]:
     """Answer like a diagnosis: the same for the same job, with work on the disk that can fail."""
-    if job.scratch is not None:
-        job.scratch.mkdir(parents=True, exist_ok=True)
+    job.scratch.mkdir(parents=True, exist_ok=True)
     place = Path(tempfile.mkdtemp(dir=job.scratch))
     try:
         for index in range(3):

@@ -15,6 +15,7 @@ import ctypes
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -36,6 +37,7 @@ from opamc_cli.storage.history import dump
 STAND_IN = "night_stand_in:stand_in"
 OURS = (".work", ".kept", ".copies", ".opamc.lock")
 SECONDS = 60.0
+VERDICT_HASH = re.compile(rb'(<td>verdict.json</td><td>[^<]*</td><td class="hash">)[0-9a-f]{64}')
 
 SHIM = r"""
 #define _GNU_SOURCE
@@ -91,6 +93,8 @@ def end_state(out: Path) -> dict[str, object]:
             values = json.loads(content)
             values.pop("created_at", None)
             content = json.dumps(values, sort_keys=True).encode()
+        if path.name == "report.html":  # it names the verdict by hash, which tells the time
+            content = VERDICT_HASH.sub(rb"\1", content)
         state[name] = content
     return state
 

@@ -43,9 +43,7 @@ def compute(job: NightJob) -> tuple[ProgramResult, ...]:
     if job.version != __version__:
         msg = f"the worker has version {__version__} of opamc, {job.version} is needed; install it"
         raise UsageError(msg)
-    if job.scratch is not None:
-        job.scratch.mkdir(parents=True, exist_ok=True)
-    folder = Path(tempfile.mkdtemp(prefix=f"{job.night}-", dir=job.scratch))
+    folder = _scratch(job)
     try:
         return tuple(
             sorted(
@@ -55,6 +53,22 @@ def compute(job: NightJob) -> tuple[ProgramResult, ...]:
         )
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _scratch(job: NightJob) -> Path:
+    """Make a folder for what is thrown away: below `out`, or in the system's where that is not.
+
+    Tables name their recordings by relative paths, and the verdict names its tables by hash: on all
+    machines that see `out` the bytes are the same.
+    """
+    try:
+        if job.scratch.parent.is_dir():
+            job.scratch.mkdir(exist_ok=True)
+            return Path(tempfile.mkdtemp(prefix=f"{job.night}-", dir=job.scratch))
+        return Path(tempfile.mkdtemp(prefix=f"{job.night}-"))
+    except OSError as error:
+        msg = f"{job.scratch}: cannot be written ({error.strerror}); check space and permissions"
+        raise UsageError(msg) from error
 
 
 def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:

@@ -59,7 +59,7 @@ class NightJob:
     kept
         Folder of what is kept of baselines; None where the worker cannot reach it.
     scratch
-        Folder for what is thrown away; None: the system's.
+        Folder for what is thrown away.
     version
         Of the program that planned the night.
     """
@@ -70,7 +70,7 @@ class NightJob:
     config: Config
     axes: tuple[int, ...] | None
     kept: Path | None
-    scratch: Path | None
+    scratch: Path
     version: str = __version__
 
 

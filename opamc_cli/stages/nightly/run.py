@@ -161,7 +161,7 @@ def run(
     # the newest night first: it is what the morning asks for
     todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
     if todo:
-        works = [_job(cell, source, night, here=scheduler is None) for night in todo]
+        works = [_job(cell, source, night) for night in todo]
         watch = progress("nights")
         watch(0, len(works))
         for n_done, (job, answer) in enumerate(
@@ -233,7 +233,7 @@ def _robot_plan(
     return plan_robot(robot, recordings.by_robot[robot], situation)
 
 
-def _job(cell: CellConfig, source: str, night: PlannedNight, *, here: bool) -> NightJob:
+def _job(cell: CellConfig, source: str, night: PlannedNight) -> NightJob:
     return NightJob(
         robot=night.robot,
         night=night.night,
@@ -254,7 +254,7 @@ def _job(cell: CellConfig, source: str, night: PlannedNight, *, here: bool) -> N
         config=cell.diagnosis_of(night.robot, source),
         axes=cell.axes_of(night.robot),
         kept=(cell.out / KEPT).absolute(),
-        scratch=(cell.out / WORK).absolute() if here else None,
+        scratch=(cell.out / WORK).absolute(),
     )
 
 
