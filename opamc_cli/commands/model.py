@@ -42,6 +42,9 @@ Axis = Annotated[
 app.command()(effects)
 
 
+MOST_REJECTED = 3
+
+
 @app.command()
 def fit(
     runs: Runs,
@@ -208,16 +211,14 @@ def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
 
 
 def _trace_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
-    ceiling = result["ceiling"]
-    domains = _table(
-        f"Axis {result['axis']}: {ceiling['share']:.1%} of the residual's mean square repeats "
-        f"(seen in {ceiling['how']})",
-        "domain",
-        "held-out share",
-        "t",
+    explained = result["explained"]
+    domains = ", ".join(dict.fromkeys(explained["domains"]))
+    first = (
+        f"Axis {result['axis']}: {explained['share']:.0%} of the held-out error can be explained "
+        f"without a name, by {domains}"
+        if domains
+        else f"Axis {result['axis']}: nothing can be explained"
     )
-    for entry in result["domains"]:
-        domains.add_row(entry["domain"], f"{entry['gain']:.1%}", f"{entry['t_value']:.1f}")
     table = _table("Candidates", "effect", "parameters", "held-out gain", "p", "why not")
     for entry in result["candidates"][:10]:
         table.add_row(
@@ -227,29 +228,52 @@ def _trace_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
             f"{entry['p_value']:.2g}",
             entry["why_not"] or "passes",
         )
-    return [domains, table, *_untestable(result)]
+    return [first, *([table] if result["candidates"] else []), *_untestable(result)]
+
+
+def _headline(result: dict[str, Any]) -> str:
+    """Say in words what was missing."""
+    before, after = result["before"]["rmse_a"], result["after"]["rmse_a"]
+    named = [step for step in result["steps"] if not step["effect"].startswith("unnamed")]
+    words = [
+        step["interpretation"].split(":")[0]
+        + (f" ({step['effect']}, approximately)" if step["approximate"] else f" ({step['effect']})")
+        for step in named
+    ]
+    error = f"error {before:.4g} → {after:.4g} A"
+    reached = f"{result['explained_share']:.0%} of what can be explained"
+    if named:
+        listed = "; ".join(words)
+        return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"
+    if result["verdict"] == "nothing-missing":
+        return f"Axis {result['axis']} lacks nothing that the data can show: error {before:.4g} A"
+    curves = [step["interpretation"].split(";")[0] for step in result["steps"]]
+    what = "; ".join(curves) or f"something in the {result['domain']} domain"
+    return f"Axis {result['axis']} lacks {what}, which no effect of the library describes: {error}"
 
 
 def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
-    before, after = result["before"], result["after"]
+    before, after, ceiling = result["before"], result["after"], result["ceiling"]
     shown: list[RenderableType] = [
-        f"Axis {result['axis']}: {result['verdict']}. Sealed error {before['rmse_a']:.4g} A "
-        f"before, {after['rmse_a']:.4g} A after (r2 {before['r2']:.4f}, {after['r2']:.4f}); floor "
-        f"{result['floor_a']:.4g} A, explained {result['explained_share']:.0%}"
+        _headline(result),
+        f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; ceiling "
+        f"{ceiling['share']:.0%} ± {ceiling['standard_error']:.0%} of the mean square, floor "
+        f"{result['floor_a']:.4g} A",
     ]
     if result["steps"]:
-        table = _table("Steps", "effect", "parameters", "meaning", "gain", "A before", "A after")
+        table = _table("Steps", "effect", "parameters", "gain", "form", "A before", "A after")
         for step in result["steps"]:
             ties = f" (or {', '.join(step['ties'])})" if step["ties"] else ""
             table.add_row(
                 step["effect"] + ties,
                 _parameters(step["parameters"]),
-                step["interpretation"],
                 f"{step['gain']:.1%}",
+                f"{step['fit_of_name']:.0%}",
                 f"{step['rmse_before_a']:.4g}",
                 f"{step['rmse_after_a']:.4g}",
             )
         shown.append(table)
+    shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
     shown += [
         f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"
         for step in result["steps"]
@@ -257,8 +281,9 @@ def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
     ]
     if result["domain"]:
         shown.append(f"what remains is structured in the {result['domain']} domain")
-    best = sorted(result["rejected"], key=lambda entry: -entry["gain"])[:5]
-    shown += [f"rejected {entry['effect']}: {entry['why']}" for entry in best]
+    shown += [
+        f"rejected {entry['effect']}: {entry['why']}" for entry in result["rejected"][:MOST_REJECTED]
+    ]
     return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
 
 

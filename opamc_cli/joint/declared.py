@@ -1,11 +1,54 @@
 """Fit a declared model, parameters that are not given included."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.model import Fit, Session, Term, fit_terms
-from opamc_cli.joint.search import search
-from opamc_cli.joint.view import prepare
+from opamc_cli.joint.kinematics import Recording, smoothings
+from opamc_cli.joint.model import Fit, Session, Term, fit_terms, open_session
+from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.search import Pool, candidates
+from opamc_cli.joint.recordings import grouped_track, is_moving
+from opamc_cli.joint.track import Joint
+
+BETTER = 0.97
+"""Of the held-out mean square error: another window than the noise asks for must be worth it."""
+
+
+Declared = tuple[tuple[Effect, Term | None], ...]
+
+
+def best_fit(
+    recordings: list[Recording], joint: Joint, declared: Callable[[Session], Declared]
+) -> Fit | None:
+    """Fit a declared model to recordings, differentiated in the way that predicts best.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        In time order, all at one rate.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    declared : callable
+        Gives the model on a session.
+
+    Returns
+    -------
+    Fit or None
+        None where too little moves to seal anything off.
+    """
+    best: tuple[float, Fit] | None = None
+    for smoothing in smoothings(recordings):
+        track, grouping = grouped_track(recordings, joint, smoothing)
+        if grouping is None or not is_moving(track):
+            continue
+        session = open_session(track, grouping)
+        fit = declared_fit(session, declared(session))
+        error = float(fit.sums.held_out().sum()) / fit.sums.parts.rows.size
+        if best is None or error < BETTER * best[0]:
+            best = (error, fit)
+    return None if best is None else best[1]
 
 
 def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
@@ -39,14 +82,10 @@ def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], .
     fitted = fit_terms(session, tuple(terms[place] for place in sorted(terms)))
     for place in open_places:
         effect = declared[place][0]
-        view = prepare(fitted, fine=effect.fast)
-        found, _tried = search(fitted.session, view, effect)
-        if found is None:
-            guesses = effect.guesses(view.grid.track, view.residual)
-            if not guesses:
-                continue
-            terms[place] = Term(effect, guesses[0])
-        else:
-            terms[place] = found.term
+        chain = chain_of(fitted, 0)
+        found = candidates(chain, Pool.of(session, {effect.name: effect}), every=True)
+        if not found:
+            continue
+        terms[place] = found[0].term
         fitted = fit_terms(fitted.session, tuple(terms[key] for key in sorted(terms)))
     return fitted

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from opamc_cli.joint.model import Fit
-from opamc_cli.joint.normal import SINGULAR_BELOW, eigenvectors
+from opamc_cli.joint.least_squares import SINGULAR_BELOW, eigenvectors
 from opamc_cli.joint.track import Floats
 
 INSEPARABLE = 0.995
@@ -22,7 +22,7 @@ class Certainty:
     standard_errors : tuple of arrays
         One array per term, in the coefficient's unit.
     factor : float
-        Student factor of the 95 % interval (degrees of freedom: groups less one).
+        Student factor of the 95 % interval (degrees of freedom: units less one).
     condition_number : float
         Of the regressors scaled to unit length.
     inseparable : tuple of tuple of str
@@ -36,7 +36,7 @@ class Certainty:
 
 
 def certainty(fit: Fit) -> Certainty:
-    """Compute standard errors that allow for any correlation inside a group, and collinear terms.
+    """Compute standard errors that allow for any correlation inside a unit, and collinear terms.
 
     Parameters
     ----------
@@ -49,17 +49,18 @@ def certainty(fit: Fit) -> Certainty:
 
     References
     ----------
-    Liang and Zeger, Biometrika 73, 1986 (the cluster sandwich), with the factor groups/(groups-1).
+    Liang and Zeger, Biometrika 73, 1986 (the cluster sandwich), with the factor units/(units-1).
     """
-    normal = fit.normal
-    gram = normal.gram.sum(axis=0)
+    sums = fit.sums
+    gram = sums.gram.sum(axis=0)
     scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
     scaled = gram / np.outer(scale, scale)
     inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
     flat = np.concatenate(fit.coefficients) if fit.coefficients else np.zeros(0)
-    scores = (normal.moment - np.einsum("gij,j->gi", normal.gram, flat)) / scale
-    groups = scores.shape[0]
-    meat = scores.T @ scores * (groups / max(groups - 1, 1))
+    units = sums.parts.units
+    scores = np.zeros((units, flat.size))
+    np.add.at(scores, sums.parts.unit, (sums.moment - sums.gram @ flat) / scale)
+    meat = scores.T @ scores * (units / max(units - 1, 1))
     covariance = inverse @ meat @ inverse
     errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale
     widths = [values.size for values in fit.coefficients]
@@ -67,7 +68,7 @@ def certainty(fit: Fit) -> Certainty:
     condition = float(np.sqrt(values[-1] / max(values[0], 1e-16 * values[-1])))
     return Certainty(
         tuple(np.split(errors, np.cumsum(widths)[:-1])) if widths else (),
-        float(student.ppf(0.975, max(groups - 1, 1))),
+        float(student.ppf(0.975, max(units - 1, 1))),
         condition,
         _inseparable(scaled, fit, widths),
     )

@@ -1,5 +1,6 @@
 """From recordings to a track: motion by local polynomials, torque current with its sign."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,6 +74,29 @@ class Recording:
         return 0
 
 
+WINDOWS_S = (0.01, 0.02, 0.05, 0.12)
+"""Windows that compete with the one that the noise of the path asks for: where the drive itself
+moves a joint that should go steadily, the acceleration that the noise would smooth away is real."""
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How a motion is differentiated: over which window, and from a logged speed or a position."""
+
+    window_s: float
+    from_velocity: bool
+
+
+def smoothings(recordings: Sequence[Recording]) -> list[Smoothing | None]:
+    """Ways to differentiate recordings; None leaves the choice to the noise of each path."""
+    if any(recording.position_rad is None for recording in recordings):
+        return [None]
+    speeds = all(recording.velocity_rad_s is not None for recording in recordings)
+    windows = {max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window for window in WINDOWS_S}
+    ways = [False, True] if speeds else [False]
+    return [None, *(Smoothing(window, way) for window in windows.values() for way in ways)]
+
+
 @dataclass(frozen=True)
 class Motion:
     """Smoothed motion of one recording.
@@ -125,7 +149,10 @@ class Motion:
 
 
 def motion_from_position(
-    position_rad: Floats, velocity_rad_s: Floats | None, rate_hz: float
+    position_rad: Floats,
+    velocity_rad_s: Floats | None,
+    rate_hz: float,
+    smoothing: Smoothing | None = None,
 ) -> Motion:
     """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
 
@@ -137,21 +164,26 @@ def motion_from_position(
         Logged speed: used where it agrees with the position and is the cleaner of the two.
     rate_hz : float
         Sampling rate.
+    smoothing : Smoothing, optional
+        Another window.
 
     Returns
     -------
     Motion
     """
     window = smoothing_window(position_rad, rate_hz, derivative=2)
+    if smoothing is not None:
+        window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
     position = derivatives(position_rad, rate_hz, window, 0)
     velocity = derivatives(position_rad, rate_hz, window, 1)
     acceleration = derivatives(position_rad, rate_hz, window, 2)
-    if velocity_rad_s is not None and window > 5:
+    asked = smoothing is not None and smoothing.from_velocity
+    if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         speed = velocity_rad_s
         spread = float(np.std(velocity))
         agrees = spread > 0 and float(np.std(speed - velocity)) < 0.1 * spread
-        own = smoothing_window(speed, rate_hz, derivative=1)
-        if agrees and own < window:
+        own = window if asked else smoothing_window(speed, rate_hz, derivative=1)
+        if agrees and (asked or own < window):
             acceleration = derivatives(speed, rate_hz, own, 1)
             spread = float(np.std(acceleration))
             return Motion(
@@ -264,7 +296,9 @@ def filled(values: Floats) -> Floats:
     return np.interp(indices, indices[good], values[good])
 
 
-def build_track(recordings: list[Recording], joint: Joint) -> Track:
+def build_track(
+    recordings: list[Recording], joint: Joint, smoothing: Smoothing | None = None
+) -> Track:
     """Put recordings of one joint on one grid, with smoothed motion and torque current.
 
     Parameters
@@ -273,6 +307,8 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         All at the same rate; each with a signed current, or three phases.
     joint : Joint
         Gear ratio and pole pairs, where known.
+    smoothing : Smoothing, optional
+        Another window than the noise of each path asks for.
 
     Returns
     -------
@@ -285,7 +321,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
         If a recording holds neither three phases nor a current with position or speed.
     """
     rate = recordings[0].rate_hz
-    pieces = [_one(recording, joint) for recording in recordings]
+    pieces = [_one(recording, joint, smoothing) for recording in recordings]
     with_phases = all("phases" in piece.channels for piece in pieces)
     with_angle = all(piece.electrical_rad is not None for piece in pieces)
     with_temperature = all(piece.temperature_c is not None for piece in pieces)
@@ -340,7 +376,7 @@ def build_track(recordings: list[Recording], joint: Joint) -> Track:
     )
 
 
-def _one(recording: Recording, joint: Joint) -> Track:
+def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Track:
     rate = recording.rate_hz
     ratio, poles = joint.gear_ratio, joint.pole_pairs
     channels: set[str] = set()
@@ -356,7 +392,10 @@ def _one(recording: Recording, joint: Joint) -> Track:
         speed = recording.velocity_rad_s
         usable &= np.isfinite(recording.position_rad)
         motion = motion_from_position(
-            filled(recording.position_rad), None if speed is None else filled(speed), rate
+            filled(recording.position_rad),
+            None if speed is None else filled(speed),
+            rate,
+            smoothing,
         )
         channels |= {"position", "scale", "logged"}
         kind = "joint"

@@ -1,34 +1,95 @@
-"""Close the loop: find what the model lacks, add it, and open the sealed data once."""
+"""Close the loop: explain, name, and open the sealed data once."""
 
-from collections.abc import Mapping
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.domains import Ceiling, Structure, ceiling, structures
+from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.experiments import separating_experiment
-from opamc_cli.joint.form import slow_misfit
-from opamc_cli.joint.gate import Gate, sealed_fall
-from opamc_cli.joint.model import Fit, Session, fit_terms
-from opamc_cli.joint.retraction import (
-    confirmed,
-    pruned,
-    without_disagreement,
-    without_imitations,
-    without_trifles,
-)
-from opamc_cli.joint.rounds import Round, Rules
-from opamc_cli.joint.search import Candidate
+from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
+from opamc_cli.joint.model import Fit, Term
+from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
+from opamc_cli.joint.name.decoy import decoy_gain
+from opamc_cli.joint.name.form import APPROXIMATE, EXACT, Curve, curve_of, share_of_form
+from opamc_cli.joint.name.search import Pool, Trial, beam, trials
+from opamc_cli.joint.name.settle import Named, settled
 from opamc_cli.joint.spectra import highest_order, order_resolution
-from opamc_cli.joint.steps import Progress, Rejected, Step
-from opamc_cli.joint.trace import Untestable, ties_of
 
-MOST_STEPS = 16
-ATTEMPTS = 3
 CLOSED_SHARE = 0.9
-SEALED_EXCESS = 4.0
-"""Times the open mean square error that the sealed one may be, and still nothing be missing."""
+"""Of the ceiling that has to be reached."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """An effect that was added, with what spoke for it.
+
+    Attributes
+    ----------
+    term : Term
+        Effect and parameters.
+    interpretation : str
+        What it means to a maintainer.
+    gain, t_value, p_value : float
+        Share of the held-out error of all the others that it takes away, over its standard error
+        over parts of the data, and the probability of such a ratio by chance.
+    decoy_gain : float
+        What the same regressors take off a residual whose signs were drawn at random.
+    ties : tuple of str
+        Effects that explain the data as well.
+    experiment : str or None
+        What would tell them apart.
+    fit_of_name : float
+        Share of its domain's curve that the named form holds.
+    rmse_before_a, rmse_after_a : float
+        Error of the open data when the steps are added in order.
+    curve : Curve
+        Partial residual.
+    """
+
+    term: Term
+    interpretation: str
+    gain: float
+    t_value: float
+    p_value: float
+    decoy_gain: float
+    ties: tuple[str, ...]
+    experiment: str | None
+    fit_of_name: float
+    rmse_before_a: float
+    rmse_after_a: float
+    curve: Curve
+
+    @property
+    def approximate(self) -> bool:
+        """Whether the form holds less than nine tenths of the curve."""
+        return self.fit_of_name < EXACT
+
+    @property
+    def named(self) -> bool:
+        """Whether the step is an effect of the library."""
+        return not self.term.effect.unnamed
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """The best form of an effect that was not added, and why."""
+
+    effect: str
+    domain: str
+    parameters: Parameters
+    gain: float
+    p_value: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Untestable:
+    """An effect that the recordings cannot show, and why."""
+
+    effect: str
+    why: str
 
 
 @dataclass(frozen=True)
@@ -40,28 +101,34 @@ class Loop:
     before, after : Fit
         The declared and the extended model, fitted to the open groups.
     steps : tuple of Step
-        Effects added, in order.
-    candidates : tuple of Candidate
-        Every candidate of every round with its round, for the table.
+        Effects added, largest first; functions without a name are among them.
+    tried : tuple of (int, Trial)
+        What was asked beside the final model, with the step in whose place it was tried.
     rejected, untestable : tuples
         What was not added, and what could not be tried.
-    remains : tuple of Structure
-        Domains in which the final residual is structured.
-    ceiling_before, ceiling_after : Ceiling
-        Reproducible share of the residual's mean square.
+    ceiling : Ceiling
+        What can be explained of the sealed data without a name.
     verdict : str
         "nothing-missing", "closed", "partial" or "not-in-library".
+    rmse_before_a, rmse_after_a, r2_before, r2_after : float
+        On the sealed data.
+    floor_a : float
+        Sealed error that the ceiling leaves.
+    explained_share : float
+        Share of the ceiling that named effects reach, 0 to 1.
+    remaining_domain : str or None
+        Where something without a name is left.
+    orders_note : str
+        What the recordings can tell of orders.
     """
 
     before: Fit
     after: Fit
     steps: tuple[Step, ...]
-    candidates: tuple[tuple[int, Candidate], ...]
+    tried: tuple[tuple[int, Trial], ...]
     rejected: tuple[Rejected, ...]
     untestable: tuple[Untestable, ...]
-    remains: tuple[Structure, ...]
-    ceiling_before: Ceiling
-    ceiling_after: Ceiling
+    ceiling: Ceiling
     verdict: str
     rmse_before_a: float
     rmse_after_a: float
@@ -74,164 +141,168 @@ class Loop:
 
 
 def close_loop(
-    before: Fit,
-    library: Library,
-    seed: int = 0,
-    gate: Gate | None = None,
-    most_steps: int = MOST_STEPS,
+    before: Fit, library: Library, seed: int = 0, without_rules: Collection[str] = ()
 ) -> Loop:
-    """Find, trace and add what the declared model lacks, until the gate stays shut.
+    """Find, name and add what the declared model lacks.
 
     Parameters
     ----------
     before : Fit
         The declared model, fitted to the open groups; the sealed ones are looked at once, at the
         end.
-    library : Library
+    library : dict of str to Effect
         Effects that may be added.
     seed : int
-        For the decoys.
-    gate : Gate, optional
-        What a candidate must show.
-    most_steps : int
-        Effects added at most.
+        Of the decoys.
+    without_rules : collection of str
+        Rules of `opamc_cli.joint.name.rules` to switch off, for the ablation.
 
     Returns
     -------
     Loop
     """
-    gate = gate or Gate()
-    seen_before = structures(before)
-    progress = Progress()
-    imitations: dict[str, str] = {}
-    first = Round(before, Rules(library, gate, np.random.default_rng(seed)))
-    for _ in range(ATTEMPTS):
-        progress.steps.clear()
-        progress.nameless = None
-        last: Round = first
-        while len(progress.steps) < most_steps:
-            following = _taken(last, imitations, progress)
-            if following is None:
-                break
-            last = following
-        fitted = last.fitted
-        fitted, steps = pruned(fitted, before, progress)
-        found = {step.term.effect.name for step in steps}
-        fitted, steps = without_disagreement(before, fitted, steps, progress)
-        remains = structures(fitted)
-        fitted, steps, remains = without_imitations(before, fitted, steps, remains, progress, seed)
-        wrong = found - {step.term.effect.name for step in steps}
-        if not wrong:
-            break
-        # What has the wrong form may have kept the right one out.
-        imitations |= {name: progress.rejected[name].why for name in wrong}
-    fitted, steps, remains = without_trifles(before, fitted, steps, remains, progress)
+    start = chain_of(before, 0)
+    session = before.session
+    unnamed = Pool.of(session, unnamed_library(), without=without_rules)
+    explained = saturated(start, unnamed)
+    pool = Pool.of(session, library, without=without_rules)
+    best, named = settled(beam(start, pool), pool, unnamed)
+    best, named, shares = _with_true_names(best, named, pool, unnamed)
+    only_named = best
+    for place in reversed(range(best.added)):
+        if best.terms[place].effect.unnamed:
+            only_named = without(only_named, place)
+    final = beam(best, unnamed, width=1)
+    steps = _steps(start, final, named, shares, seed)
+    tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial, *one.others)]
+    last = trials(best, pool)
+    tried += [(len(named), trial) for trial in last]
     # Only now, and only once, are the sealed groups looked at.
-    fitted, steps, remains = confirmed(before, fitted, steps, remains, progress, gate)
-    return _summary(before, fitted, tuple(steps), progress, seen_before, remains, seed)
+    return _opened(before, only_named.fit, final.fit, explained.fit, steps, tried, library)
 
 
-def _taken(current: Round, imitations: Mapping[str, str], progress: Progress) -> Round | None:
-    """Add the best candidate that passes the gate; return the round that follows, if any does."""
-    traced = current.traced(imitations)
-    checked, fitted = traced.candidates, current.fitted
-    progress.untestable |= {entry.effect: entry for entry in traced.untestable}
-    number = len(progress.steps)
-    try:
-        for i in _by_merit(checked, current):
-            candidate = current.beside_decoys(checked[i])
-            if candidate.why_not is not None:
-                checked[i] = candidate
-                continue
-            following = current.following(candidate)
-            extended = following.fitted
-            effect = candidate.term.effect
-            if not effect.plausible(extended.coefficients[-1], candidate.term.parameters):
-                checked[i] = replace(candidate, why_not="fitted jointly, its sign is not physical")
-                continue
-            ties = ties_of(candidate, checked)
-            track = fitted.session.fine.track
-            progress.steps.append(
-                Step(
-                    term=candidate.term,
-                    interpretation=effect.interpretation(candidate.term.parameters, track),
-                    gain=candidate.gain,
-                    p_value=candidate.p_value,
-                    decoy_gain=candidate.decoy_gain,
-                    t_value=candidate.t_value,
-                    consistency=candidate.consistency,
-                    ties=ties,
-                    experiment=separating_experiment(effect.name, ties),
-                    rmse_before_a=fitted.rmse(sealed=False),
-                    rmse_after_a=extended.rmse(sealed=False),
-                )
-            )
-            checked[i] = candidate
-            _collect(progress, number, checked, candidate)
-            return following
-        for candidate in checked:
-            if candidate.imitates is not None:
-                tested = replace(candidate, why_not=None)
-                if current.beside_decoys(tested).why_not is None:
-                    progress.nameless = candidate
-                break
-        _collect(progress, number, checked, None)
-        return None
-    finally:
-        current.rest()
-
-
-def _by_merit(checked: list[Candidate], current: Round) -> list[int]:
-    """Places of the candidates that pass, best first.
-
-    The likelihood leads; but a candidate that explains twice as much of what was held out, at no
-    less than half the likelihood, comes before: the whitened fit alone may hang on a detail. A
-    fast and a slow candidate are compared where the fast one was searched.
-    """
-    places = [i for i, candidate in enumerate(checked) if candidate.why_not is None]
-    for k in range(1, len(places)):
-        first, other = checked[places[0]], checked[places[k]]
-        least, likelihood = 0.5 * first.likelihood, other.likelihood
-        if first.fine and not other.fine:
-            likelihood = current.likelihood_among_fast(other)
-            if likelihood > first.likelihood:
-                least = 0.0
-        better = other.gain > 2 * first.gain or (least == 0.0 and other.gain > first.gain)
-        if better and likelihood > least:
-            places.insert(0, places.pop(k))
-    return places
-
-
-def _collect(
-    progress: Progress, number: int, checked: list[Candidate], added: Candidate | None
-) -> None:
-    for candidate in checked:
-        effect = candidate.term.effect
-        # A contribution is as long as the grid; what is compared with others has been.
-        slim = replace(candidate, contribution=np.zeros(0))
-        progress.candidates.append((number, slim))
-        if candidate is added:
-            progress.rejected.pop(effect.name, None)
+def _with_true_names(
+    best: Chain, named: list[Named], pool: Pool, unnamed: Pool
+) -> tuple[Chain, list[Named], dict[int, float]]:
+    """Take the name off effects whose form holds less than half of their domain's curve."""
+    shares: dict[int, float] = {}
+    for one in named:
+        drop = float((one.trial.parent.error - one.trial.chain.error).sum())
+        share = share_of_form(best, drop, one.term, unnamed)
+        if share >= APPROXIMATE or "unnamed" in pool.without:
+            shares[id(one.term)] = share
             continue
-        why = candidate.why_not or "another effect explains the residual better"
-        progress.rejected[effect.name] = Rejected(
-            effect.name,
-            effect.domain,
-            candidate.term.parameters,
-            candidate.gain,
-            candidate.p_value,
-            why,
+        place = [term is one.term for term in best.terms].index(True)
+        best, named = settled(without(best, place), replace(pool, library={}), unnamed)
+        return best, named, {id(other.term): 1.0 for other in named}
+    return best, named, shares
+
+
+def _steps(
+    start: Chain, final: Chain, named: list[Named], shares: dict[int, float], seed: int
+) -> list[Step]:
+    by_term = {id(one.term): one for one in named}
+    steps: list[Step] = []
+    chain = start
+    track = final.fit.session.fine.track
+    first = len(final.fit.terms) - final.added
+    for place, term in enumerate(final.terms):
+        following = extended(chain, term)
+        known = by_term.get(id(term))
+        gain, t_value = following.gain_over(chain)
+        trial = Trial(chain, following, gain, t_value, None) if known is None else known.trial
+        ties = () if known is None else known.ties
+        steps.append(
+            Step(
+                term=term,
+                interpretation=term.effect.interpretation(term.parameters, track),
+                gain=trial.gain,
+                t_value=trial.t_value,
+                p_value=trial.p_value,
+                decoy_gain=decoy_gain(trial.parent, term, seed),
+                ties=ties,
+                experiment=separating_experiment(term.effect.name, ties),
+                fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,
+                rmse_before_a=chain.fit.rmse(sealed=False),
+                rmse_after_a=following.fit.rmse(sealed=False),
+                curve=curve_of(final.fit, first + place),
+            )
         )
+        chain = following
+    return steps
 
 
-def _confirmed_nameless(before: Fit, progress: Progress) -> str | None:
-    """Domain of something without a name, if the sealed data bear out that it is there."""
-    candidate = progress.nameless
-    if candidate is None:
-        return None
-    imitation = fit_terms(before.session, (*before.terms, candidate.term))
-    fall = sealed_fall(before, imitation)
-    return candidate.imitates if fall.plain > 0 or fall.likelihood > 0 else None
+def _opened(
+    before: Fit,
+    named: Fit,
+    after: Fit,
+    explained: Fit,
+    steps: list[Step],
+    tried: list[tuple[int, Trial]],
+    library: Library,
+) -> Loop:
+    found = ceiling(before, explained)
+    rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
+    reach = rmse_before**2 * found.share
+    reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
+    has_name = any(step.named for step in steps)
+    without_name = [step for step in steps if not step.named]
+    if has_name:
+        verdict = "closed" if reached >= CLOSED_SHARE else "partial"
+    else:
+        verdict = "not-in-library" if found.certain or steps else "nothing-missing"
+        reached = 0.0 if verdict == "not-in-library" else 1.0
+    domain = None
+    if verdict in ("partial", "not-in-library"):
+        left = without_name or [step for step in steps if step.approximate]
+        unexplained = [term.effect.domain for term in explained.terms if term.effect.unnamed]
+        domain = left[0].term.effect.domain if left else next(iter(unexplained), None)
+    track = after.session.fine.track
+    return Loop(
+        before=before,
+        after=after,
+        steps=tuple(steps),
+        tried=tuple(tried),
+        rejected=_rejected(tried, steps),
+        untestable=untestable(before, library),
+        ceiling=found,
+        verdict=verdict,
+        rmse_before_a=rmse_before,
+        rmse_after_a=rmse_after,
+        r2_before=_r2(before),
+        r2_after=_r2(after),
+        floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
+        explained_share=float(np.clip(reached, 0.0, 1.0)),
+        remaining_domain=domain,
+        orders_note=(
+            f"orders count per {track.angle_kind} revolution; orders closer than "
+            f"{order_resolution(track):.3g} cannot be told apart, and above "
+            f"{highest_order(track):.4g} they fold at the median speed"
+        ),
+    )
+
+
+def _rejected(tried: list[tuple[int, Trial]], steps: list[Step]) -> tuple[Rejected, ...]:
+    added = {step.term.effect.name for step in steps}
+    found: dict[str, Rejected] = {}
+    for _, trial in tried:
+        effect = trial.term.effect
+        if effect.name in added:
+            continue
+        why = trial.why_not or "another effect explains the residual better"
+        known = found.get(effect.name)
+        if known is None or trial.gain > known.gain:
+            found[effect.name] = Rejected(
+                effect.name, effect.domain, trial.term.parameters, trial.gain, trial.p_value, why
+            )
+    return tuple(sorted(found.values(), key=lambda one: -one.gain))
+
+
+def untestable(before: Fit, library: Library) -> tuple[Untestable, ...]:
+    """List the effects that the recordings cannot show."""
+    track = before.session.fine.track
+    reasons = ((name, effect.untestable(track)) for name, effect in library.items())
+    return tuple(Untestable(name, why) for name, why in reasons if why is not None)
 
 
 def _r2(fitted: Fit) -> float:
@@ -241,77 +312,3 @@ def _r2(fitted: Fit) -> float:
     power = float(np.sum((current - current.mean()) ** 2))
     rest = float(np.sum(opened.residual_a[grid.sealed] ** 2))
     return 1.0 - rest / power if power > 0 else 0.0
-
-
-def _summary(
-    before: Fit,
-    after: Fit,
-    steps: tuple[Step, ...],
-    progress: Progress,
-    seen_before: list[Structure],
-    remains: list[Structure],
-    seed: int,
-) -> Loop:
-    first, last = ceiling(before, seen_before), ceiling(after, remains)
-    structured = [structure for structure in remains if structure.significant]
-    rest = last.significant
-    nameless = None if steps else _confirmed_nameless(before, progress)
-    if not steps and not structured and not rest and nameless is None:
-        slow = slow_misfit(after, seed)
-        if slow is not None:
-            share = slow.excess / slow.basis.shape[0]
-            remains = [Structure(slow.domain, share, float(np.sqrt(slow.excess)), slow.p_value)]
-            structured = remains
-    rmse_before, rmse_after = before.rmse(sealed=True), after.rmse(sealed=True)
-    excess = rmse_after**2 / max(after.rmse(sealed=False) ** 2, 1e-300)
-    if not structured and not rest and excess > SEALED_EXCESS:
-        # What began after the open groups is nothing that they could show.
-        remains = [Structure("time", 1.0 - 1.0 / excess, float(np.sqrt(excess)), 0.0)]
-        structured = remains
-    floor = rmse_after * float(np.sqrt(max(1.0 - (last.share if rest else 0.0), 0.0)))
-    reach = rmse_before**2 - floor**2
-    explained = (rmse_before**2 - rmse_after**2) / reach if reach > 1e-3 * rmse_before**2 else 1.0
-    explained = float(np.clip(explained, 0.0, 1.0))
-    if not steps:
-        lacking = rest or bool(structured) or nameless is not None
-        verdict = "not-in-library" if lacking else "nothing-missing"
-        # Something is there, and none of it is explained, even where its share is too small to say.
-        explained = 0.0 if lacking else 1.0
-    elif (rest or structured) and explained < CLOSED_SHARE:
-        verdict = "partial"
-    else:
-        verdict = "closed"
-    domain = None
-    if verdict in ("partial", "not-in-library"):
-        domain = remains[0].domain if remains and (structured or nameless is None) else nameless
-    return Loop(
-        before=before,
-        after=after,
-        steps=steps,
-        candidates=tuple(progress.candidates),
-        rejected=tuple(progress.rejected.values()),
-        untestable=tuple(progress.untestable.values()),
-        remains=tuple(structured),
-        ceiling_before=first,
-        ceiling_after=last,
-        verdict=verdict,
-        rmse_before_a=rmse_before,
-        rmse_after_a=rmse_after,
-        r2_before=_r2(before),
-        r2_after=_r2(after),
-        floor_a=floor,
-        explained_share=explained,
-        remaining_domain=domain,
-        orders_note=_orders_note(after.session),
-    )
-
-
-def _orders_note(session: Session) -> str:
-    track = session.fine.track
-    if "position" not in track.channels:
-        return "no angle, so no orders"
-    return (
-        f"orders count per {track.angle_kind} revolution; orders closer than "
-        f"{order_resolution(track):.3g} cannot be told apart, and above "
-        f"{highest_order(track):.4g} they fold at the median speed"
-    )

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
-from opamc_cli.joint.kept import Kept
-from opamc_cli.joint.normal import Normal, normal_equations, solve
+from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.parts import Parts, Sums, parts_of
+from opamc_cli.joint.regressor_cache import RegressorCache
 from opamc_cli.joint.thinning import MOST_SAMPLES, cut, thinned, whole_groups
 from opamc_cli.joint.track import Bools, Floats, Track, averaged, block_mean, coarsen
 
@@ -37,11 +38,15 @@ class Term:
         columns = self.effect.columns(track, self.parameters)
         return columns if self.keep is None else columns[:, self.keep]
 
-    def updated(self, columns: Floats, track: Track) -> Floats:
-        """Regressors after the fitted model has changed, from those before."""
-        if self.keep is not None:
-            return self.columns(track)
-        return self.effect.updated(columns, track, self.parameters)
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """What makes two terms the same."""
+        return (self.effect.name, tuple(sorted(self.parameters.items())), self.keep)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the regressors stay the same whatever the fitted model is."""
+        return self.effect.is_constant(self.parameters)
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,8 @@ class Session:
     grouping : Grouping
     fit_groups : tuple of int
         Groups that may be looked at before the end.
-    kept : Kept
-        What fits share.
+    cache : RegressorCache
+        Regressors and products that fits share.
     """
 
     fine: Grid
@@ -95,7 +100,7 @@ class Session:
     grouping: Grouping
     fit_groups: tuple[int, ...]
     opened: "Session | None" = None
-    kept: Kept = field(default_factory=Kept, repr=False, compare=False)
+    cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
 
     @cached_property
     def sharp(self) -> Grid:
@@ -109,20 +114,51 @@ class Session:
         track = replace(track, moving=track.moving & track.clear)
         return _grid(track, self.fit_groups, self.grouping.sealed)
 
+    @cached_property
+    def parts(self) -> tuple[Parts, Parts]:
+        """Open samples of the fine and of the coarse grid, in parts."""
+        if "parts" not in self.cache.shared:
+            fine = parts_of(self.fine, self.fine.track.clear)
+            coarse = parts_of(self.coarse, self.coarse.track.clear)
+            self.cache.shared["parts"] = (fine, coarse)
+        found: tuple[Parts, Parts] = self.cache.shared["parts"]
+        return found
+
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
         fine = fine or self.coarse is self.fine
-        follows = None if term.effect.is_constant(term.parameters) else self.fine.track
-        return self.kept.columns(term, fine, follows, lambda old: self._columns(term, fine, old))
+        if not term.is_constant:
+            return self._columns(term, fine)
+        return self.cache.columns((term.key, fine), lambda: self._columns(term, fine))
 
-    def _columns(self, term: Term, fine: bool, old: Floats | None) -> Floats:
+    def _columns(self, term: Term, fine: bool) -> Floats:
         track = self.fine.track
         if fine:
-            return term.columns(track) if old is None else term.updated(old, track)
+            return term.columns(track)
         if term.effect.fast:
-            smooth = averaged(self.columns(term, fine=True), track.bounds, track.kernel)
+            smooth = averaged(term.columns(track), track.bounds, track.kernel)
             return block_mean(smooth, track.bounds, self.factor)
         return term.columns(self.coarse.track)
+
+    def sums(self, terms: "tuple[Term, ...]", fine: bool) -> Sums:
+        """Products of the terms' regressors with one another and the current, over each part."""
+        blocks = [self.columns(term, fine) for term in terms]
+        return self.sums_of(blocks, fine)
+
+    def sums_of(self, blocks: list[Floats], fine: bool) -> Sums:
+        """Likewise, of regressors that are at hand."""
+        fine = fine or self.coarse is self.fine
+        parts = self.parts[0 if fine else 1]
+        current = (self.fine if fine else self.coarse).track.current_a
+        return self.cache.sums(blocks, current, parts, fine)
+
+    def computed(self, term: Term, fine: bool) -> Floats:
+        """Regressors of a guess, which nobody will ask for again."""
+        return self._columns(term, fine or self.coarse is self.fine)
+
+    def grid_of(self, fine: bool) -> Grid:
+        """The fine or the coarse grid."""
+        return self.fine if fine else self.coarse
 
     def grid(self, fine: bool) -> Grid:
         """Return the grid on which fast effects are searched, or the coarse one."""
@@ -160,7 +196,7 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     pieces = thinned(track, grouping, groups)
     sealed = whole_groups(track, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
-    opened = Session(grid, grid, 1, grouping, groups, kept=Kept(storing=False))
+    opened = Session(grid, grid, 1, grouping, groups)
     session = _session(cut(track, pieces), grouping, groups, COARSE_OF_LONG)
     return replace(session, opened=opened)
 
@@ -171,9 +207,6 @@ def _session(
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
     factor = max(min(by_rate, inside // coarse_samples), 1)
-    # With shorter blocks the whitening would amplify what the average has taken away.
-    width = 1.0 / float(np.sum(track.kernel**2))
-    factor = max(factor, int(0.8 * width), track.quiet)
     coarse_track = coarsen(track, factor)
     fine = _grid(track, groups, grouping.sealed)
     coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
@@ -205,15 +238,50 @@ class Fit:
         With the fitted load and model currents.
     residual_a : array of shape (n,)
         Current less model on the whole fine grid (it means something where samples move).
-    normal : Normal
-        Sums per open group.
+    sums : Sums
+        Of the fine grid's open samples.
     """
 
     terms: tuple[Term, ...]
     coefficients: tuple[Floats, ...]
     session: Session
     residual_a: Floats
-    normal: Normal
+    sums: Sums
+
+    def coarse_sums(self) -> tuple[Sums, list[Floats]]:
+        """Sums of the slow terms on the coarse grid, and their regressors there.
+
+        What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
+        left in the averages of the coarse grid, by which nobody could fit it.
+        """
+        session = self.session
+        blocks = [session.columns(term, fine=False) for term in self.terms]
+        sums = session.sums_of(blocks, fine=False)
+        widths = np.cumsum([0, *(block.shape[1] for block in blocks)])
+        fast = [i for i, term in enumerate(self.terms) if term.effect.fast]
+        known = [k for i in fast for k in range(widths[i], widths[i + 1])]
+        values = np.concatenate([np.zeros(0), *(self.coefficients[i] for i in fast)])
+        slow = [block for i, block in enumerate(blocks) if i not in fast]
+        return sums.given(known, values), slow
+
+    @cached_property
+    def drift_free_error(self) -> Floats:
+        """Held-out error of each part, where every part has an offset of its own."""
+        session = self.session
+        shared = session.cache.shared
+        if "ones" not in shared:
+            shared["ones"] = np.ones((session.fine.track.size, 1))
+        blocks = [session.columns(term, fine=True) for term in self.terms]
+        error: Floats = session.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
+        return error
+
+    def fast_part(self, fine: bool) -> Floats:
+        """Current of the fast terms on one of the grids."""
+        part = np.zeros(self.session.grid_of(fine).track.size)
+        for term, values in zip(self.terms, self.coefficients, strict=True):
+            if term.effect.fast:
+                part += self.session.columns(term, fine) @ values
+        return part
 
     @cached_property
     def opened(self) -> "Fit":
@@ -225,8 +293,8 @@ class Fit:
         session = self.session.opened
         if session is None:
             return self
-        # This is the end: what the loop has kept would only take memory from here on.
-        self.session.kept.clear()
+        # This is the end: what is kept would only take memory from here on.
+        self.session.cache.clear()
         return fit_terms(session, self.terms)
 
     def rmse(self, sealed: bool) -> float:
@@ -251,10 +319,9 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
     -------
     Fit
     """
-    circular = not all(term.effect.is_constant(term.parameters) for term in terms)
+    circular = not all(term.is_constant for term in terms)
     plain = not np.any(session.fine.track.model_a)
     fewest = 3 if plain else 2
-    session.kept.keep(terms)
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
         fitted = _fit_once(session, terms)
@@ -269,15 +336,16 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
     grid = session.fine
     current = grid.track.current_a
-    normal, widths = _products(session, terms)
-    solution = solve(normal.gram.sum(axis=0), normal.moment.sum(axis=0))
+    blocks = [session.columns(term, fine=True) for term in terms]
+    widths = [block.shape[1] for block in blocks]
+    sums = session.sums_of(blocks, fine=True)
+    solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     total = np.zeros(grid.track.size)
     model = np.zeros(grid.track.size)
     load = np.zeros(grid.track.size)
     static = []
-    for term, values in zip(terms, coefficients, strict=True):
-        block = session.columns(term, fine=True)
+    for term, block, values in zip(terms, blocks, coefficients, strict=True):
         part = block @ values
         total += part
         if term.effect.static and not term.effect.fast:
@@ -286,21 +354,4 @@ def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
         if term.effect.carries_load:
             load += part
     session = session.with_model(load, model, tuple(static))
-    return Fit(terms, coefficients, session, current - total, normal)
-
-
-def _products(session: Session, terms: tuple[Term, ...]) -> tuple[Normal, list[int]]:
-    """Sum products of the current and all regressors on the open samples; count each term's."""
-    grid = session.fine
-    current = grid.track.current_a
-    if session.kept.storing:
-        columns = [session.columns(term, fine=True) for term in terms]
-        widths = [block.shape[1] for block in columns]
-        return session.kept.products(columns, current, grid.rows), widths
-    blocks = [session.columns(term, fine=True)[grid.fit] for term in terms]
-    widths = [block.shape[1] for block in blocks]
-    design = np.empty((int(grid.fit.sum()), sum(widths)))
-    for stop in np.cumsum(widths)[::-1]:
-        block = blocks.pop()
-        design[:, stop - block.shape[1] : stop] = block
-    return normal_equations(design, current[grid.fit], grid.slices), widths
+    return Fit(terms, coefficients, session, current - total, sums)

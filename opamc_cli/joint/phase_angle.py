@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.normal import solve
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.track import Bools, Floats
 
 LONGEST_LAG_S = 0.06

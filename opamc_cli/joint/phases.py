@@ -15,7 +15,7 @@ from opamc_cli.joint.angle_filter import (
     widest_bandwidth,
 )
 from opamc_cli.joint.half_turns import bridged
-from opamc_cli.joint.normal import solve
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.phase_angle import PhaseAngle
 from opamc_cli.joint.smoothing import derivatives
 from opamc_cli.joint.track import Bools, Floats

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.groups import Grouping, cycle_length, group_samples
-from opamc_cli.joint.kinematics import Recording, build_track
+from opamc_cli.joint.kinematics import Recording, Smoothing, build_track
 from opamc_cli.joint.track import Joint, Track
 
 SHORTEST_TRAVEL_RAD = 1e-4
@@ -13,7 +13,9 @@ FEWEST_MOVING_SAMPLES = 50
 SHORTEST_PATH = 3.0
 
 
-def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
+def grouped_track(
+    recordings: list[Recording], joint: Joint, smoothing: Smoothing | None = None
+) -> tuple[Track, Grouping | None]:
     """Lay recordings on one grid and split them into groups.
 
     Parameters
@@ -22,6 +24,8 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
         In time order, all at one rate.
     joint : Joint
         Gear ratio and pole pairs, where known.
+    smoothing : Smoothing, optional
+        Another window than the noise of each path asks for.
 
     Returns
     -------
@@ -30,7 +34,7 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     grouping : Grouping or None
         None where too little moves to seal anything off.
     """
-    track = build_track(recordings, joint)
+    track = build_track(recordings, joint, smoothing)
     lengths = [
         cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
     ]

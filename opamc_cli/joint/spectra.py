@@ -2,7 +2,6 @@
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
-from scipy.stats import gamma
 
 from opamc_cli.joint.track import Floats, Track
 
@@ -12,7 +11,8 @@ MOST_TIME = 8
 """Pieces of a recording are put on its clock if it is at most so many times as long."""
 NYQUIST_SHARE = 0.9
 LOWEST_ORDER = {"motor": 0.4, "joint": 8.0, "electrical": 0.05}
-FALSE_PEAK = 1e-3
+LEAST_LINE = 0.02
+"""Share of the residual's power: less than half of what an effect must hold to be added."""
 
 
 def highest_order(track: Track) -> float:
@@ -115,17 +115,17 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     -------
     list of (float, float)
         Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
-        and their power in units of white noise's. White noise alone gives one in a thousand times.
+        and their power in units of white noise's, where they hold 2 % of the residual's power.
     """
-    orders, power, classes = order_spectrum(track, residual)
+    orders, power, _ = order_spectrum(track, residual)
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
     first = int(np.searchsorted(orders, lowest))
     if orders.size - first < 8:
         return []
     power = power.copy()
     power[:first] = 0
-    trials = max((orders.size - first) / OVERSAMPLING, 1.0)
-    threshold = float(gamma.isf(FALSE_PEAK / trials, classes))
+    # A sine that holds a share s of the power shows with half of s times the samples.
+    threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
     peaks: list[tuple[float, float]] = []

@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.half_turns import stretches
-from opamc_cli.joint.normal import solve
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.phase_angle import PhaseAngle
 from opamc_cli.joint.phases import current_vector
 from opamc_cli.joint.track import Floats

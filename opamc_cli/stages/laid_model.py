@@ -7,7 +7,7 @@ import numpy as np
 
 from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
-from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.declared import Declared, best_fit
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import (
     Library,
@@ -15,7 +15,8 @@ from opamc_cli.joint.effects.library import (
     effect_named,
     load_user_effects,
 )
-from opamc_cli.joint.model import Fit, Session, open_session
+from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.model import Fit, Session
 from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint
 from opamc_cli.stages.axis_recording import read_recording
@@ -31,18 +32,23 @@ class AxisModel:
     ----------
     axis : int
         Counted from 1.
-    session : Session
-        Recordings, groups, sealed ones.
-    declared : tuple of Term
-        Model as declared; parameters that were not given are still open.
+    fit : Fit
+        The declared model, fitted to the open data; parameters that were not given are found.
+    declared : tuple of (Effect, DeclaredEffect)
+        Model as declared.
     library : Library
         Effects that may be added.
     """
 
     axis: int
-    session: Session
+    fit: Fit
     declared: tuple[tuple[Effect, DeclaredEffect], ...]
     library: Library
+
+    @property
+    def session(self) -> Session:
+        """Recordings, groups, sealed ones."""
+        return self.fit.session
 
 
 def library_of(model: JointModelConfig) -> Library:
@@ -90,10 +96,32 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
         if recording.size < 64:
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
-    track, grouping = grouped_track(
-        recordings, Joint(model.joint.gear_ratio, model.joint.pole_pairs)
-    )
+    joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
+    _check_motion(recordings, joint, axis, named)
+
+    def on(session: Session) -> Declared:
+        for effect, _ in declared:
+            why = None if effect.name == "load_friction" else effect.untestable(session.fine.track)
+            if why is not None:
+                msg = (
+                    f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show "
+                    f"it: {why}; log the channel or drop the effect from the model"
+                )
+                raise ConfigError(msg)
+        track = session.coarse.track
+        return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
+
+    fit = best_fit(recordings, joint, on)
+    if fit is None:
+        msg = f"{named}: axis {axis} moves too little to seal a part off; record more motion"
+        raise NotEnoughDataError(msg)
+    allowed = {name: effect for name, effect in library.items() if name not in model.without}
+    return AxisModel(axis, fit, declared, allowed)
+
+
+def _check_motion(recordings: list[Recording], joint: Joint, axis: int, named: str) -> None:
+    track, grouping = grouped_track(recordings, joint)
     if not is_moving(track):
         msg = (
             f"{named}: axis {axis} does not move (travel {np.ptp(track.position_rad):.2g} rad); "
@@ -107,23 +135,3 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
             "record at least two cycles, or 3 s of motion"
         )
         raise NotEnoughDataError(msg)
-    session = open_session(track, grouping)
-    for effect, _ in declared:
-        why = None if effect.name == "load_friction" else effect.untestable(session.fine.track)
-        if why is not None:
-            msg = (
-                f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show it: "
-                f"{why}; log the channel or drop the effect from the model"
-            )
-            raise ConfigError(msg)
-    allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, session, declared, allowed)
-
-
-def fitted(laid: AxisModel) -> Fit:
-    """Fit the declared model; parameters that were not given are searched."""
-    track = laid.session.coarse.track
-    return declared_fit(
-        laid.session,
-        tuple((effect, declared_term(effect, entry, track)) for effect, entry in laid.declared),
-    )

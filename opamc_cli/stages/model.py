@@ -11,17 +11,17 @@ import yaml
 
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
-from opamc_cli.joint.domains import ceiling, structures
+from opamc_cli.joint.explain.saturated import saturated, unnamed_library
 from opamc_cli.joint.intervals import certainty
-from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.trace import trace_residual
+from opamc_cli.joint.loop import close_loop, untestable
+from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.search import Pool, trials
 from opamc_cli.stages.axis_recording import axes_of
-from opamc_cli.stages.laid_model import AxisModel, fitted, lay
+from opamc_cli.stages.laid_model import AxisModel, lay
 from opamc_cli.stages.model_tables import (
     CANDIDATES,
     FIT,
     candidate_row,
-    ceiling_entry,
     extended_model,
     fit_rows,
     fit_summary,
@@ -29,7 +29,7 @@ from opamc_cli.stages.model_tables import (
     residual_table,
     shown_parameters,
     spectrum_table,
-    structure_entry,
+    explained_entry,
 )
 from opamc_cli.stages.parallel import Watch, unwatched
 from opamc_cli.storage.atomic import atomic_path, ensure_directory
@@ -81,7 +81,7 @@ def fit(
     rows: list[dict[str, Any]] = []
 
     def one(laid: AxisModel) -> dict[str, Any]:
-        result = fitted(laid)
+        result = laid.fit
         known = certainty(result)
         rows.extend(fit_rows(laid.axis, result, known))
         return fit_summary(laid, result, known)
@@ -103,29 +103,29 @@ def trace(
     rows: list[dict[str, Any]] = []
 
     def one(laid: AxisModel) -> dict[str, Any]:
-        base = fitted(laid)
-        seen = structures(base)
-        traced = trace_residual(base, laid.library)
-        rows.extend(
-            candidate_row(laid.axis, 0, candidate, False) for candidate in traced.candidates
-        )
+        base = laid.fit
+        start = chain_of(base, 0)
+        explained = saturated(start, Pool.of(base.session, unnamed_library()))
+        tried = trials(start, Pool.of(base.session, laid.library))
+        rows.extend(candidate_row(laid.axis, 0, trial, False) for trial in tried)
         return {
             "axis": laid.axis,
             "declared": [term.effect.name for term in base.terms],
-            "domains": [structure_entry(structure) for structure in seen],
-            "ceiling": ceiling_entry(ceiling(base, seen)),
+            "explained": explained_entry(start, explained),
             "candidates": [
                 {
-                    "effect": candidate.term.effect.name,
-                    "domain": candidate.term.effect.domain,
-                    "parameters": shown_parameters(candidate.term),
-                    "gain": candidate.gain,
-                    "p_value": candidate.p_value,
-                    "why_not": candidate.why_not,
+                    "effect": trial.term.effect.name,
+                    "domain": trial.term.effect.domain,
+                    "parameters": shown_parameters(trial.term),
+                    "gain": trial.gain,
+                    "p_value": trial.p_value,
+                    "why_not": trial.why_not,
                 }
-                for candidate in traced.candidates
+                for trial in tried
             ],
-            "untestable": [{"effect": u.effect, "why": u.why} for u in traced.untestable],
+            "untestable": [
+                {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
+            ],
         }
 
     results, errors, inputs = _each_axis(model, paths, axes, one, watch)
@@ -166,11 +166,11 @@ def close(
     extended: dict[int, dict[str, Any]] = {}
 
     def one(laid: AxisModel) -> dict[str, Any]:
-        loop = close_loop(fitted(laid), laid.library, seed)
+        loop = close_loop(laid.fit, laid.library, seed)
         added = {id(step.term) for step in loop.steps}
         candidates.extend(
-            candidate_row(laid.axis, number, candidate, id(candidate.term) in added)
-            for number, candidate in loop.candidates
+            candidate_row(laid.axis, number, trial, id(trial.term) in added)
+            for number, trial in loop.tried
         )
         fits.extend(fit_rows(laid.axis, loop.after, certainty(loop.after)))
         residuals.append(residual_table(laid.axis, loop))

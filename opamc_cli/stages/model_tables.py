@@ -7,11 +7,11 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
-from opamc_cli.joint.domains import Ceiling, Structure
 from opamc_cli.joint.intervals import Certainty
-from opamc_cli.joint.loop import Loop
+from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.model import Fit, Session, Term
-from opamc_cli.joint.search import Candidate
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.search import Trial
 from opamc_cli.joint.spectra import order_spectrum
 from opamc_cli.joint.track import Floats
 from opamc_cli.stages.laid_model import AxisModel
@@ -40,13 +40,10 @@ CANDIDATES = pa.schema(
         ("effect", pa.string()),
         ("domain", pa.string()),
         ("parameters", pa.string()),
-        ("likelihood", pa.float64()),
         ("score", pa.float64()),
         ("p_value", pa.float64()),
         ("gain", pa.float64()),
-        ("decoy_gain", pa.float64()),
         ("t_value", pa.float64()),
-        ("consistency", pa.float64()),
         ("added", pa.bool_()),
         ("why_not", pa.string()),
     ]
@@ -128,24 +125,21 @@ def _groups_entry(session: Session) -> dict[str, Any]:
     }
 
 
-def candidate_row(axis: int, number: int, candidate: Candidate, added: bool) -> dict[str, Any]:
+def candidate_row(axis: int, number: int, trial: Trial, added: bool) -> dict[str, Any]:
     """Row of candidates.parquet."""
-    term = candidate.term
+    term = trial.term
     return {
         "axis": axis,
         "round": number,
         "effect": term.effect.name,
         "domain": term.effect.domain,
         "parameters": json.dumps(shown_parameters(term), sort_keys=True),
-        "likelihood": candidate.likelihood,
-        "score": candidate.score,
-        "p_value": candidate.p_value,
-        "gain": candidate.gain,
-        "decoy_gain": candidate.decoy_gain,
-        "t_value": candidate.t_value,
-        "consistency": candidate.consistency,
+        "score": trial.chain.score - trial.parent.score,
+        "p_value": trial.p_value,
+        "gain": trial.gain,
+        "t_value": trial.t_value,
         "added": added,
-        "why_not": candidate.why_not,
+        "why_not": trial.why_not,
     }
 
 
@@ -154,18 +148,42 @@ def shown_parameters(term: Term) -> dict[str, float]:
     return {name: float(f"{value:.6g}") for name, value in term.parameters.items()}
 
 
-def structure_entry(structure: Structure) -> dict[str, Any]:
-    """One entry of `domains` and `remains`."""
+def explained_entry(start: Chain, explained: Chain) -> dict[str, Any]:
+    """What functions without a name take off the held-out error, and in which domains."""
+    share, t_value = explained.gain_over(start)
     return {
-        "domain": structure.domain,
-        "gain": structure.gain,
-        "t_value": structure.t_value,
+        "share": share,
+        "t_value": t_value if explained.added else 0.0,
+        "domains": [term.effect.domain for term in explained.terms],
     }
 
 
-def ceiling_entry(found: Ceiling) -> dict[str, Any]:
-    """Make the entry `ceiling`."""
-    return {"share": found.share, "t_value": found.t_value, "how": found.how}
+def step_entry(step: Step) -> dict[str, Any]:
+    """One entry of `steps`."""
+    curve = step.curve
+    return {
+        "effect": step.term.effect.name,
+        "domain": step.term.effect.domain,
+        "parameters": shown_parameters(step.term),
+        "interpretation": step.interpretation,
+        "gain": step.gain,
+        "t_value": step.t_value,
+        "p_value": step.p_value,
+        "decoy_gain": step.decoy_gain,
+        "ties": list(step.ties),
+        "separating_experiment": step.experiment,
+        "fit_of_name": step.fit_of_name,
+        "approximate": step.approximate,
+        "rmse_before_a": step.rmse_before_a,
+        "rmse_after_a": step.rmse_after_a,
+        "curve": {
+            "covariate": curve.covariate,
+            "unit": curve.unit,
+            "x": [float(f"{x:.6g}") for x in curve.x],
+            "residual_a": [float(f"{y:.6g}") for y in curve.residual_a],
+            "named_a": [float(f"{y:.6g}") for y in curve.named_a],
+        },
+    }
 
 
 def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
@@ -176,22 +194,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "declared": [effect.name for effect, _ in laid.declared],
         "sealed": [grouping.names[g] for g in grouping.sealed],
         "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
-        "steps": [
-            {
-                "effect": step.term.effect.name,
-                "domain": step.term.effect.domain,
-                "parameters": shown_parameters(step.term),
-                "interpretation": step.interpretation,
-                "gain": step.gain,
-                "p_value": step.p_value,
-                "decoy_gain": step.decoy_gain,
-                "ties": list(step.ties),
-                "separating_experiment": step.experiment,
-                "rmse_before_a": step.rmse_before_a,
-                "rmse_after_a": step.rmse_after_a,
-            }
-            for step in loop.steps
-        ],
+        "steps": [step_entry(step) for step in loop.steps],
         "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
         "floor_a": loop.floor_a,
         "explained_share": loop.explained_share,
@@ -209,10 +212,9 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "untestable": [{"effect": u.effect, "why": u.why} for u in loop.untestable],
         "verdict": loop.verdict,
         "domain": loop.remaining_domain,
-        "remains": [structure_entry(structure) for structure in loop.remains],
         "ceiling": {
-            "before": ceiling_entry(loop.ceiling_before),
-            "after": ceiling_entry(loop.ceiling_after),
+            "share": loop.ceiling.share,
+            "standard_error": loop.ceiling.standard_error,
         },
         "groups": grouping.kind,
         "orders": loop.orders_note,

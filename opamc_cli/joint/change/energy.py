@@ -7,7 +7,6 @@ import numpy as np
 from opamc_cli.joint.change.lines import strokes
 from opamc_cli.joint.change.slow import Population, Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
-from opamc_cli.joint.domains import hats
 from opamc_cli.joint.spectra import highest_order
 from opamc_cli.joint.track import Floats
 
@@ -127,3 +126,31 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
                 total += float(moment @ np.linalg.lstsq(gram, moment, rcond=1e-9)[0])
         held[unit.after].append(total / count)
     return max(float(np.median(held[True]) - np.median(held[False])), 0.0)
+
+
+def hats(values: Floats, knots: Floats) -> Floats:
+    """Linear interpolation weights of values on knots.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+        Covariate.
+    knots : array of shape (k,)
+        Ascending; values beyond the ends take the end's weight.
+
+    Returns
+    -------
+    array of shape (n, k)
+        Rows sum to one.
+    """
+    weights = np.zeros((values.size, knots.size))
+    if knots.size == 1:
+        weights[:, 0] = 1.0
+        return weights
+    inside = np.clip(values, knots[0], knots[-1])
+    left = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
+    share = (inside - knots[left]) / (knots[left + 1] - knots[left])
+    rows = np.arange(values.size)
+    weights[rows, left] = 1 - share
+    weights[rows, left + 1] = share
+    return weights

@@ -38,6 +38,12 @@ class Effect:
     """True where a joint can have the effect more than once (several ripple orders)."""
     static: bool = True
     """True where the effect takes part in the load or friction that other effects scale."""
+    unnamed: bool = False
+    """True for functions that claim nothing but their domain."""
+    changes_in_time: bool = False
+    """True where the effect is a change while the joint goes on as before: slow noise is, too."""
+    searches: tuple[str, ...] = ()
+    """Parameters that the data decide."""
     forms: tuple[str, ...] = ()
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
     open_limits: tuple[str, ...] = ()
@@ -98,6 +104,19 @@ class Effect:
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Bounds of the non-linear parameters that may be refined."""
         return {}
+
+    def searched(self, parameters: Parameters) -> int:
+        """Count the parameters that were searched: each costs as much as a coefficient."""
+        return len([name for name in self.searches if name in parameters])
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """How far from a guess the search first looks: half a decade of the limits, or less."""
+        steps = {}
+        for name, (low, high) in self.limits(track).items():
+            value = parameters.get(name, low)
+            ratio = high / low if low > 0 else 0.0
+            steps[name] = value * 0.4 if ratio > 5 else 0.05 * (high - low)
+        return steps
 
     def is_constant(self, parameters: Parameters) -> bool:
         """Tell whether the regressors stay the same whatever the fitted model is."""

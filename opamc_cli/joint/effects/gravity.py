@@ -20,6 +20,7 @@ class Gravity(Effect):
     name = "gravity"
     domain = "joint-angle"
     origin = "load"
+    searches = ("joint_rad_per_rad",)
     meaning = "weight of the links; not a fault in itself"
     needs = ("position",)
     carries_load = True

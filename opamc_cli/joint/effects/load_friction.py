@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.normal import solve
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.track import Floats, Track
 
 

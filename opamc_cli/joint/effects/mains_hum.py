@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.spectra import line_power, standing_views
+from opamc_cli.joint.spectra import LEAST_LINE, line_power, standing_views
 from opamc_cli.joint.track import Floats, Track
 
 MAINS_HZ = (50.0, 60.0)
@@ -49,6 +49,7 @@ class MainsHum(Effect):
     name = "mains_hum"
     domain = "frequency"
     origin = "measurement"
+    searches = ("frequency_hz",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"
     dense_guesses = True
     from_motion = True
@@ -68,6 +69,7 @@ class MainsHum(Effect):
                 if last > first:
                     best = first + int(np.argmax(power[first:last]))
                     found.append((float(power[best]), float(frequencies[best]), float(turning)))
+        found = [one for one in found if one[0] > 0.5 * LEAST_LINE * np.count_nonzero(residual)]
         found.sort(reverse=True)
         return [
             {"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found[:2]
@@ -78,6 +80,10 @@ class MainsHum(Effect):
         resolution_hz = 1.0 / max(float(np.ptp(track.time_s)), 1e-9)
         widths = [2 * _reach_hz(line) / resolution_hz for line in _mains_lines(track.rate_hz)]
         return max(0.5 * sum(max(width, 1.0) for width in widths), 1.0)
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half of what two frequencies have to differ by."""
+        return {"frequency_hz": 0.5 / max(float(np.ptp(track.time_s)), 1e-9)}
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to the highest frequency that the rate can show."""

@@ -19,6 +19,8 @@ class PayloadChange(Effect):
     name = "payload_change"
     domain = "load"
     origin = "load"
+    changes_in_time = True
+    searches = ("since_s",)
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True

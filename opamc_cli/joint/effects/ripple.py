@@ -52,6 +52,7 @@ class Ripple(Effect):
 
     name = "ripple"
     domain = "motor-angle"
+    searches = ("order",)
     meaning = "torque ripple"
     needs = ("position",)
     free_refinement = False
@@ -88,6 +89,10 @@ class Ripple(Effect):
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anything above joint-angle orders."""
         return {"order": (0.0, 1e6)}
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half of what two orders have to differ by."""
+        return {"order": 0.5 * order_resolution(track)}
 
     def is_constant(self, parameters: Parameters) -> bool:
         """Only the load's sign and the current follow the model."""

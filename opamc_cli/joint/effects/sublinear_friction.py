@@ -11,6 +11,7 @@ class SublinearFriction(Effect):
 
     name = "sublinear_friction"
     domain = "velocity"
+    searches = ("exponent",)
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     needs = ("position",)
     dense_guesses = True

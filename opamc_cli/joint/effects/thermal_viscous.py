@@ -14,6 +14,8 @@ class ThermalViscous(Effect):
     name = "thermal_viscous"
     domain = "temperature"
     origin = "environment"
+    changes_in_time = True
+    searches = ("rate_per_c",)
     meaning = "grease is stiffer when cold: not a fault"
     needs = ("position", "temperature")
     dense_guesses = True

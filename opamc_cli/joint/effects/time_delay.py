@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.normal import solve
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.track import Floats, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
@@ -17,6 +17,7 @@ class TimeDelay(Effect):
     name = "time_delay"
     domain = "time"
     origin = "measurement"
+    searches = ("delay_s",)
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False
@@ -26,12 +27,11 @@ class TimeDelay(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """From half a millisecond to 64 ms either way, filters to 8 ms.
 
-        Each is a quarter more than the last: at a step of the acceleration what half as long a
-        delay does again is three times as small, and not a whole shift any more.
+        Each is half as long again as the last; the refinement finds what lies between.
         """
-        delays = geometric(SHORTEST_GUESS_S, LONGEST_GUESS_S, 22)
+        delays = geometric(SHORTEST_GUESS_S, LONGEST_GUESS_S, 12)
         shifts = [{"delay_s": sign * delay} for sign in (-1.0, 1.0) for delay in delays]
-        filters = geometric(SHORTEST_GUESS_S, LONGEST_FILTER_S, 5)
+        filters = geometric(SHORTEST_GUESS_S, LONGEST_FILTER_S, 4)
         return [*shifts, *({"delay_s": delay, "filtered": 1.0} for delay in filters)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:

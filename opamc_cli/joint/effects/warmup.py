@@ -12,6 +12,8 @@ class Warmup(Effect):
     name = "warmup"
     domain = "time"
     origin = "environment"
+    changes_in_time = True
+    searches = ("time_constant_s",)
     meaning = "friction falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
     dense_guesses = True

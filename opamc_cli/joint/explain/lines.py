@@ -1,0 +1,79 @@
+"""Lines over an angle or over time, whatever they come from."""
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines, order_resolution
+from opamc_cli.joint.track import Floats, Track
+
+LOWEST_HZ = 1.0
+HIGHEST_SHARE = 0.48
+
+
+class AngleLine(Effect):
+    """A line over the motor's angle, which may follow speed, direction and the model's current."""
+
+    unnamed = True
+    name = "unnamed_order"
+    domain = "motor-angle"
+    meaning = "a line over the angle"
+    needs = ("position",)
+    searches = ("order",)
+    fast = True
+    several = True
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Strongest orders of the residual."""
+        return [{"order": order} for order, _ in order_lines(track, residual, count=2)]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Any order."""
+        return {"order": (0.0, 1e6)}
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half of what two orders have to differ by."""
+        return {"order": 0.5 * order_resolution(track)}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Cosine and sine, times one, speed, direction and the model's current."""
+        angle = parameters["order"] * track.machine_angle_rad
+        speed = np.abs(track.velocity) / track.speed_scale - 0.5
+        parts = (np.ones(track.size), speed, track.direction, track.model_a)
+        waves = (np.cos(angle), np.sin(angle))
+        return stack(*(part * wave for part in parts for wave in waves))
+
+
+class Tone(Effect):
+    """A line over time of any frequency."""
+
+    unnamed = True
+    name = "unnamed_tone"
+    domain = "frequency"
+    meaning = "a line over time"
+    searches = ("frequency_hz",)
+    from_motion = True
+    fast = True
+    several = True
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Strongest frequency of the residual."""
+        frequencies, power = line_power(track, [residual])
+        inside = (frequencies > LOWEST_HZ) & (frequencies < HIGHEST_SHARE * track.rate_hz)
+        power = np.where(inside, power, 0.0)
+        best = int(np.argmax(power))
+        if power[best] < 0.5 * LEAST_LINE * np.count_nonzero(residual):
+            return []
+        return [{"frequency_hz": float(frequencies[best])}]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Up to what the rate can show."""
+        return {"frequency_hz": (0.5 * LOWEST_HZ, 0.49 * track.rate_hz)}
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half of what two frequencies have to differ by."""
+        return {"frequency_hz": 0.5 / max(float(np.ptp(track.time_s)), 1e-9)}
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Cosine and sine of time."""
+        angle = 2 * np.pi * parameters["frequency_hz"] * track.time_s
+        return stack(np.cos(angle), np.sin(angle))

@@ -1,0 +1,81 @@
+"""How much of a residual can be explained at all, before anything has a name."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.explain.lines import AngleLine, Tone
+from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
+from opamc_cli.joint.model import Fit
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.search import Pool, beam
+from opamc_cli.joint.parts import PARTS_PER_UNIT
+from opamc_cli.joint.track import Floats
+
+LEAST_SHARE = 0.02
+"""Of the held-out error: without a name, less than half of what a name has to take away counts."""
+SEALED_PARTS = 12
+
+
+@dataclass(frozen=True)
+class Ceiling:
+    """Share of the sealed mean square error that can be explained without a name.
+
+    Attributes
+    ----------
+    share : float
+        At least 0.
+    standard_error : float
+        Over parts of the sealed data.
+    """
+
+    share: float
+    standard_error: float
+
+    @property
+    def certain(self) -> bool:
+        """Whether there is anything to explain."""
+        return self.share > 2 * self.standard_error and self.share > LEAST_SHARE
+
+
+def unnamed_library() -> dict[str, Effect]:
+    """Everything that a residual can be explained by without a name."""
+    effects = (*SMOOTH, Response(), Shift(), AngleLine(), Tone())
+    return {effect.name: effect for effect in effects}
+
+
+def saturated(start: Chain, pool: Pool) -> Chain:
+    """Explain what a model leaves by unnamed functions, largest first.
+
+    Parameters
+    ----------
+    start : Chain
+        Declared model, fitted to the open data.
+    pool : Pool
+        Of unnamed effects.
+    """
+    return beam(start, replace(pool, least_share=LEAST_SHARE), width=1)
+
+
+def ceiling(before: Fit, explained: Fit) -> Ceiling:
+    """Hold an unnamed model against the sealed data, once.
+
+    Parameters
+    ----------
+    before, explained : Fit
+        Declared and saturated model, fitted to the open data.
+    """
+    first, last = sealed_parts(before), sealed_parts(explained)
+    total = max(float(first.sum()), 1e-300)
+    drop = first - last
+    spread = float(np.std(drop, ddof=1)) * np.sqrt(drop.size) if drop.size > 1 else 0.0
+    return Ceiling(max(float(drop.sum()) / total, 0.0), spread / total)
+
+
+def sealed_parts(fit: Fit) -> Floats:
+    """Sum of squared errors over each of the parts that the sealed samples are cut into."""
+    opened = fit.opened
+    values = opened.residual_a[opened.session.sharp.sealed]
+    pieces = np.array_split(values, min(SEALED_PARTS, max(values.size, 1)))
+    return np.array([float(piece @ piece) for piece in pieces])

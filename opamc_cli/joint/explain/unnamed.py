@@ -1,0 +1,176 @@
+"""Smooth functions of what was recorded, which claim nothing but their domain."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from scipy.signal import lfilter
+
+from opamc_cli.joint.effects.base import CHANNEL_REASONS, Effect, Parameters, geometric, stack
+from opamc_cli.joint.second_order import at_rest, discrete
+from opamc_cli.joint.track import Floats, Track, block_mean
+
+DEGREES = (2.0, 4.0, 8.0, 16.0)
+"""Cosines over a covariate's range: from a bend to sixteen half waves."""
+QUANTILES = 65
+RESPONSE_DAMPING = 0.3
+
+Covariate = Callable[[Track], Floats]
+Modifier = Callable[[Track], Sequence[Floats]]
+
+
+class Smooth(Effect):
+    """A function of one covariate, times what it may change: a cosine series.
+
+    The covariate is stretched half-way towards its ranks, so that every stretch of the function
+    is seen by enough samples and none is flattened.
+    """
+
+    unnamed = True
+
+    def __init__(
+        self,
+        name: str,
+        domain: str,
+        covariate: Covariate,
+        modifier: Modifier,
+        needs: tuple[str, ...] = ("position",),
+        follows_model: bool = False,
+        constant: bool = True,
+    ) -> None:
+        self.name = f"unnamed_{name}"
+        self.domain = domain
+        self.needs = needs
+        self.meaning = f"a function of {name.replace('_', ' ')}; no effect of the library has its form"
+        self.from_motion = not follows_model
+        self._covariate = covariate
+        self._modifier = modifier
+        self._first = 0 if constant else 1
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """From a bend to sixteen half waves."""
+        return [{"degree": degree} for degree in DEGREES]
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Cosines of the stretched covariate times each modifier."""
+        place = np.pi * stretched(self._covariate(track), track.moving)
+        waves = [np.cos(k * place) for k in range(self._first, int(parameters["degree"]) + 1)]
+        return stack(*(part * wave for part in self._modifier(track) for wave in waves))
+
+
+class Response(Effect):
+    """What resonances of the joint and of the drive would make of the acceleration."""
+
+    unnamed = True
+    name = "unnamed_response"
+    domain = "acceleration"
+    meaning = "a response to the acceleration; no effect of the library has its form"
+    needs = ("position", "logged")
+    from_motion = True
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Filters per decade."""
+        return [{"filters": count} for count in (3.0, 6.0, 12.0)]
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Low-passes and band-passes of second order, from 1.5 to 60 Hz."""
+        full = track.full or track
+        factor = round(full.rate_hz / track.rate_hz)
+        highest = min(60.0, full.rate_hz / 3)
+        columns = []
+        for frequency in geometric(1.5, highest, int(parameters["filters"])):
+            w = 2 * full.rate_hz * np.tan(np.pi * frequency / full.rate_hz)
+            below = (1.0, 2 * RESPONSE_DAMPING * w, w * w)
+            for above in ((0.0, 0.0, w * w), (0.0, w, 0.0)):
+                zeros, poles = discrete(above, below, full.rate_hz)
+                filtered = np.empty(full.size)
+                for start, stop in full.bounds:
+                    part = full.acceleration[start:stop]
+                    rest = at_rest(zeros, poles) * part[0]
+                    filtered[start:stop] = lfilter(zeros, poles, part, zi=rest)[0]
+                columns.append(block_mean(filtered, full.bounds, factor))
+        return stack(*columns)
+
+
+class Shift(Effect):
+    """What a delay or a lag makes of the model: its rates of change."""
+
+    unnamed = True
+    name = "unnamed_shift"
+    domain = "time"
+    meaning = "a response of the model's own current; no effect of the library has its form"
+    needs = ("position", "logged")
+    static = False
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """First and second rate of change of the fitted current."""
+        first = np.gradient(track.model_a)
+        return stack(first, np.gradient(first))
+
+
+def stretched(values: Floats, members: Floats) -> Floats:
+    """Put a covariate on 0..1, half-way between its value and its rank among some samples."""
+    known = values[members]
+    if not known.size:
+        return np.zeros_like(values)
+    levels = np.quantile(known, np.linspace(0, 1, QUANTILES))
+    span = max(float(levels[-1] - levels[0]), 1e-300)
+    rank = np.interp(values, levels, np.linspace(0, 1, QUANTILES))
+    linear = np.clip((values - levels[0]) / span, 0, 1)
+    place: Floats = 0.5 * (rank + linear)
+    return place
+
+
+def travel_since_reversal(track: Track) -> Floats:
+    """Path since the direction last changed, in radians."""
+    path = np.cumsum(np.abs(np.diff(track.position_rad, prepend=track.position_rad[:1])))
+    direction = np.where(track.direction != 0, track.direction, np.nan)
+    known = np.where(np.isnan(direction), 0, np.arange(track.size))
+    direction = direction[np.maximum.accumulate(known)]
+    turned = np.concatenate([[True], direction[1:] != direction[:-1]])
+    last = np.maximum.accumulate(np.where(turned, np.arange(track.size), 0))
+    since: Floats = path - path[last]
+    return since
+
+
+def _direction(track: Track) -> list[Floats]:
+    return [track.direction]
+
+
+def _one(track: Track) -> list[Floats]:
+    return [np.ones(track.size)]
+
+
+def _friction(track: Track) -> list[Floats]:
+    return [track.direction, track.velocity]
+
+
+def _load(track: Track) -> list[Floats]:
+    return [np.sin(track.position_rad), np.cos(track.position_rad), track.acceleration]
+
+
+def _temperature(track: Track) -> Floats:
+    assert track.temperature_c is not None
+    return track.temperature_c
+
+
+SMOOTH: tuple[Smooth, ...] = (
+    Smooth("speed", "velocity", lambda t: np.abs(t.velocity), _direction),
+    Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
+    Smooth("angle", "joint-angle", lambda t: t.position_rad, _one),
+    Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, _direction),
+    Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, _direction),
+    Smooth("load", "load", lambda t: np.abs(t.load_a), _direction, follows_model=True),
+    Smooth("acceleration", "acceleration", lambda t: t.acceleration, _one, constant=False),
+    Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),
+    Smooth("time_and_speed", "time", lambda t: t.time_s, _friction, needs=("position", "revisits")),
+    Smooth("time_and_load", "load", lambda t: t.time_s, _load, needs=("scale", "revisits")),
+    Smooth("temperature", "temperature", _temperature, _friction, needs=("position", "temperature")),
+)
+
+
+def missing_channel(effect: Effect, track: Track) -> str | None:
+    """Why a track cannot show an effect, or None."""
+    for channel in effect.needs:
+        if channel not in track.channels:
+            return CHANNEL_REASONS.get(channel, f"no {channel}")
+    return None

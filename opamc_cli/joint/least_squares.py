@@ -1,0 +1,81 @@
+"""Least squares of scaled sums of products, for regressors of any size and any likeness."""
+
+import numpy as np
+from scipy.linalg import eigh
+
+from opamc_cli.joint.track import Floats
+
+SINGULAR_BELOW = 1e-9
+"""Of the largest eigenvalue: directions below are rounding."""
+
+
+def solve(gram: Floats, moment: Floats) -> Floats:
+    """Minimum-norm least squares of scaled normal equations.
+
+    Parameters
+    ----------
+    gram : array of shape (k, k) or (groups, k, k)
+        Products of regressors.
+    moment : array of shape (k,) or (groups, k)
+        Regressors times the signal.
+
+    Returns
+    -------
+    array of shape (k,) or (groups, k)
+        Coefficients; directions below 1e-9 of the largest get none.
+    """
+    if moment.shape[-1] == 0:
+        return moment
+    if moment.shape == (1,):
+        alone: Floats = moment / np.maximum(gram[0], 1e-200)
+        return alone
+    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
+    scaled = gram / (scale[..., :, None] * scale[..., None, :])
+    solution: Floats = np.einsum("...ij,...j->...i", _inverse(scaled), moment / scale) / scale
+    return solution
+
+
+def inverse(gram: Floats) -> Floats:
+    """Pseudo-inverses of stacked matrices of products, shape (..., k, k)."""
+    if gram.shape[-1] == 0:
+        return gram
+    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
+    both = scale[..., :, None] * scale[..., None, :]
+    found: Floats = _inverse(gram / both) / both
+    return found
+
+
+def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues, ascending, and eigenvectors of symmetric matrices.
+
+    LAPACK's divide and conquer, which is numpy's and the fastest, gives up on a rare matrix that
+    has nothing wrong with it; plain QR iteration then takes its place.
+
+    Parameters
+    ----------
+    symmetric : array of shape (..., k, k)
+        Finite.
+
+    Returns
+    -------
+    values, vectors : arrays of shape (..., k) and (..., k, k)
+        Vectors are columns.
+    """
+    try:
+        values, vectors = np.linalg.eigh(symmetric)
+    except np.linalg.LinAlgError:
+        size = symmetric.shape[-1]
+        pairs = [eigh(one, driver="ev") for one in symmetric.reshape(-1, size, size)]
+        values = np.stack([pair[0] for pair in pairs]).reshape(symmetric.shape[:-1])
+        vectors = np.stack([pair[1] for pair in pairs]).reshape(symmetric.shape)
+    return values, vectors
+
+
+def _inverse(gram: Floats) -> Floats:
+    """Pseudo-inverse of symmetric matrices, shape (..., k, k), by their eigenvectors."""
+    values, vectors = eigenvectors(gram)
+    sizes = np.abs(values)
+    large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
+    factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
+    inverse: Floats = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return inverse

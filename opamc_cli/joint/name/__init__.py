@@ -1,0 +1,1 @@
+"""Name what the residual holds: a beam of chains, each scored by what it predicts of held-out data."""

@@ -1,0 +1,204 @@
+"""Every effect on a coarse grid of its parameters, and what each would take off a chain's error."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from opamc_cli.joint.model import Session, Term
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.price import price_of
+from opamc_cli.joint.least_squares import inverse
+from opamc_cli.joint.parts import Parts, Sums
+from opamc_cli.joint.track import Floats
+
+LEAST_LEFT = 1e-6
+"""Share of the error that is left at least: a coarse grid may promise more than there is."""
+RIDGE = 1e-6
+"""Of a regressor's energy: one of which the model leaves less is the model's already."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """An effect with parameters, and the held-out sum of squares that it would take away."""
+
+    term: Term
+    drop: float
+    score: float
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Regressors of many guesses of equal width, on the parts' rows.
+
+    Attributes
+    ----------
+    terms : sequence of Term
+        K guesses.
+    columns : array of shape (m, K * w)
+        Guess after guess.
+    own : array of shape (p, K, w, w)
+        Products of each guess with itself.
+    moment : array of shape (p, K, w)
+        Products with the current.
+    """
+
+    terms: Sequence[Term]
+    columns: Floats
+    own: Floats
+    moment: Floats
+
+    @property
+    def width(self) -> int:
+        """Regressors of each guess."""
+        return int(self.own.shape[-1])
+
+
+def batches_of(session: Session, terms: Sequence[Term], fine: bool) -> list[Batch]:
+    """Compute the regressors of guesses and their products, by width."""
+    parts = session.parts[0 if fine else 1]
+    current = parts.taken(session.grid_of(fine).track.current_a)[:, None]
+    by_width: dict[int, list[tuple[Term, Floats]]] = {}
+    for term in terms:
+        columns = parts.taken(session.computed(term, fine))
+        by_width.setdefault(columns.shape[1], []).append((term, columns))
+    batches = []
+    for width, members in by_width.items():
+        count = len(members)
+        columns = np.concatenate([block for _, block in members], axis=1)
+        own = _own_products(columns, parts, count, width)
+        moment = parts.products(columns, current)[:, :, 0].reshape(-1, count, width)
+        batches.append(Batch([term for term, _ in members], columns, own, moment))
+    return batches
+
+
+def _own_products(columns: Floats, parts: Parts, count: int, width: int) -> Floats:
+    """Products of each guess's regressors with one another over each part, shape (p, K, w, w)."""
+    starts = [start for start, _ in parts.slices]
+    guesses = columns.reshape(-1, count, width)
+    own = np.empty((len(starts), count, width, width))
+    for i in range(width):
+        for j in range(i + 1):
+            own[:, :, i, j] = np.add.reduceat(guesses[:, :, i] * guesses[:, :, j], starts, axis=0)
+            own[:, :, j, i] = own[:, :, i, j]
+    return own
+
+
+def judged(term: Term, drop: float, width: int, reference: float) -> Candidate:
+    """Turn a drop of the held-out sum of squares into a candidate's score."""
+    left = max(reference - drop, LEAST_LEFT * reference)
+    return Candidate(term, drop, float(np.log(left / reference)) + price_of(term, width))
+
+
+def best_form(session: Session, beside: "Beside", full: Term, reference: float) -> Candidate:
+    """Choose among the smaller forms of an effect the one that is worth its price."""
+    effect = full.effect
+    (batch,) = batches_of(session, [full], fine=True)
+    cross = beside.parts.products(beside.columns, batch.columns)[:, None]
+    best = None
+    forms = [(full, tuple(range(batch.width)))]
+    for form, keep in effect.variants(full.parameters):
+        forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
+    for term, keep in forms:
+        index = np.asarray(keep)
+        own = batch.own[:, :, index[:, None], index]
+        drop = float(beside.drops_of(cross[..., index], own, batch.moment[..., index])[0])
+        found = judged(term, drop, index.size, reference)
+        if best is None or found.score < best.score:
+            best = found
+    assert best is not None
+    return best
+
+
+class Beside:
+    """A chain's own regressors on one grid, made ready to have candidates put beside them."""
+
+    def __init__(self, chain: Chain, fine: bool) -> None:
+        session = chain.fit.session
+        self.fine = fine or session.coarse is session.fine
+        self.parts: Parts = session.parts[0 if self.fine else 1]
+        self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
+        self.fast_part: Floats | None = None
+        if self.fine:
+            blocks = [session.columns(term, True) for term in chain.fit.terms]
+            self.sums: Sums = session.sums_of(blocks, True)
+        else:
+            self.sums, blocks = chain.fit.coarse_sums()
+            self.fast_part = self.parts.taken(chain.fit.fast_part(False))
+        rows = [self.parts.taken(block) for block in blocks]
+        self.columns = np.concatenate([np.zeros((self.parts.rows.size, 0)), *rows], axis=1)
+        current = session.grid_of(self.fine).track.current_a
+        self.current = self.parts.taken(current)
+        if self.fast_part is not None:
+            self.current = self.current - self.fast_part
+        self.weight = 1.0 if self.fine else float(session.factor)
+        units, width = self.parts.units, self.columns.shape[1]
+        gram = np.zeros((units, width, width))
+        moment = np.zeros((units, width))
+        np.add.at(gram, self.parts.unit, self.sums.gram)
+        np.add.at(moment, self.parts.unit, self.sums.moment)
+        self.inverse = inverse(self.parts.elsewhere(gram))
+        self.rest_moment = self.parts.elsewhere(moment)
+        self.alone = np.einsum("uij,uj->ui", self.inverse, self.rest_moment)
+        self.before = self.sums.held_out()
+
+    def drops(self, batch: Batch) -> Floats:
+        """Held-out sum of squares that each guess takes away beside the chain; shape (K,)."""
+        count, width = len(batch.terms), batch.width
+        base = self.columns.shape[1]
+        cross = self.parts.products(self.columns, batch.columns)
+        cross = cross.reshape(-1, base, count, width).transpose(0, 2, 1, 3)
+        moment = batch.moment
+        if self.fast_part is not None:
+            fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
+            moment = moment - fast.reshape(moment.shape)
+        return self.drops_of(cross, batch.own, moment)
+
+    def drops_of(self, cross: Floats, own: Floats, moment: Floats) -> Floats:
+        """Likewise, from products: cross (p, K, b, w), own (p, K, w, w), moment (p, K, w)."""
+        unit = self.parts.unit
+        rest_cross, rest_own, rest_moment = (self._rest(one) for one in (cross, own, moment))
+        projected = self.inverse[:, None] @ rest_cross
+        left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
+        energy = np.einsum("ukii->uki", rest_own)
+        width = own.shape[-1]
+        left = left + (RIDGE * energy + 1e-200)[..., None] * np.eye(width)
+        asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, self.alone)
+        gamma = np.linalg.solve(left, asked[..., None])[..., 0]
+        beta = self.alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
+        gamma, beta = gamma[unit], beta[unit]
+        sums = self.sums
+        error = (
+            sums.power[:, None]
+            - 2 * np.einsum("pki,pi->pk", beta, sums.moment)
+            - 2 * np.einsum("pki,pki->pk", gamma, moment)
+            + np.einsum("pki,pij,pkj->pk", beta, sums.gram, beta, optimize=True)
+            + 2 * np.einsum("pki,pkij,pkj->pk", beta, cross, gamma, optimize=True)
+            + np.einsum("pki,pkij,pkj->pk", gamma, own, gamma, optimize=True)
+        )
+        drop: Floats = self.weight * (self.before[:, None] - error)[self.counted].sum(axis=0)
+        return drop
+
+    def fitted_drop(self, columns: Floats) -> float:
+        """Sum of squares that columns on the parts' rows take away beside the chain, when fitted.
+
+        Smooth in the effect's parameters, so that these can be refined.
+        """
+        gram, moment = self._whole
+        cross = self.columns.T @ columns
+        projected = gram @ cross
+        left = columns.T @ columns - cross.T @ projected
+        left += RIDGE * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
+        asked = columns.T @ self.current - projected.T @ moment
+        return float(self.weight * asked @ np.linalg.solve(left, asked))
+
+    @cached_property
+    def _whole(self) -> tuple[Floats, Floats]:
+        return inverse(self.sums.gram.sum(axis=0)[None])[0], self.sums.moment.sum(axis=0)
+
+    def _rest(self, parts: Floats) -> Floats:
+        units = np.zeros((self.parts.units, *parts.shape[1:]))
+        np.add.at(units, self.parts.unit, parts)
+        return self.parts.elsewhere(units)
+

@@ -1,0 +1,133 @@
+"""A chain of effects: a fit with what it predicts of data that it was not fitted to."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from opamc_cli.joint.model import Fit, Term, fit_terms
+from opamc_cli.joint.name.price import price_of
+from opamc_cli.joint.parts import Sums
+from opamc_cli.joint.track import Bools, Floats
+
+
+Signature = frozenset[tuple[object, ...]]
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A fitted model and its held-out error.
+
+    Attributes
+    ----------
+    fit : Fit
+        All terms, the declared ones first.
+    added : int
+        Number of terms at the end that were not declared.
+    error : array of shape (p,)
+        Sum of squares of each judged part, of the fit to all other units. Every moving sample is
+        judged once: at the full rate where it is clear of corners of the motion, else on the
+        coarse grid, where the current is as smooth as the motion.
+    samples : float
+        Samples that are judged.
+    """
+
+    fit: Fit
+    added: int
+    error: Floats
+    samples: float
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """Terms that were not declared."""
+        return self.fit.terms[len(self.fit.terms) - self.added :]
+
+    @property
+    def mean_square(self) -> float:
+        """Held-out mean square error, in A^2."""
+        return float(self.error.sum()) / self.samples
+
+    @cached_property
+    def price(self) -> float:
+        """Logarithm of the mean square error by which the added terms have to pay."""
+        return sum(price_of(term, values.size) for term, values in self._added_values)
+
+    @property
+    def score(self) -> float:
+        """Logarithm of the held-out mean square error, and the price."""
+        return float(np.log(max(self.mean_square, 1e-300))) + self.price
+
+    @property
+    def _added_values(self) -> list[tuple[Term, Floats]]:
+        pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
+        return pairs[len(pairs) - self.added :]
+
+    @property
+    def plausible(self) -> bool:
+        """Whether every added term's coefficients have the sign that physics gives it."""
+        return all(
+            term.effect.plausible(values, term.parameters) for term, values in self._added_values
+        )
+
+    @cached_property
+    def signature(self) -> Signature:
+        """What makes two chains the same."""
+        return signature_of(self.terms)
+
+    def gain_over(self, other: "Chain") -> tuple[float, float]:
+        """Share of the other's held-out error that this chain takes away, and its t over parts."""
+        return _gain(other.error, self.error)
+
+    def gain_beside_drift(self, other: "Chain") -> tuple[float, float]:
+        """Likewise, where the current may drift: every part has an offset of its own."""
+        return _gain(other.fit.drift_free_error, self.fit.drift_free_error)
+
+
+def chain_of(fit: Fit, added: int) -> Chain:
+    """Judge a fit by its held-out errors."""
+    session = fit.session
+    fine, coarse = session.parts
+    error = fit.sums.held_out()[fine.judged]
+    samples = float(sum(b - a for (a, b), j in zip(fine.slices, fine.judged, strict=True) if j))
+    if not fine.judged.all() and not coarse.judged.all() and session.coarse is not session.fine:
+        sums, _ = fit.coarse_sums()
+        rest, count = _unclear(sums, coarse.judged)
+        error = np.concatenate([error, session.factor * rest])
+        samples += session.factor * count
+    return Chain(fit, added, error, samples)
+
+
+def _unclear(sums: Sums, clear: Bools) -> tuple[Floats, float]:
+    slices = sums.parts.slices
+    count = sum(b - a for (a, b), judged in zip(slices, clear, strict=True) if not judged)
+    return sums.held_out()[~clear], float(count)
+
+
+def extended(chain: Chain, *terms: Term) -> Chain:
+    """Add terms to a chain and fit all of it anew."""
+    fit = fit_terms(chain.fit.session, (*chain.fit.terms, *terms))
+    return chain_of(fit, chain.added + len(terms))
+
+
+def without(chain: Chain, place: int) -> Chain:
+    """Take one of the added terms out, and fit the rest anew."""
+    declared = len(chain.fit.terms) - chain.added
+    terms = [term for i, term in enumerate(chain.fit.terms) if i != declared + place]
+    return chain_of(fit_terms(chain.fit.session, tuple(terms)), chain.added - 1)
+
+
+def signature_of(terms: tuple[Term, ...]) -> Signature:
+    """Effects, and their parameters to two digits."""
+    return frozenset(
+        (
+            term.effect.name,
+            tuple(sorted((k, float(f"{v:.2g}")) for k, v in term.parameters.items())),
+        )
+        for term in terms
+    )
+
+
+def _gain(before: Floats, after: Floats) -> tuple[float, float]:
+    drop = before - after
+    spread = float(np.std(drop, ddof=1)) * np.sqrt(drop.size)
+    return float(drop.sum() / max(before.sum(), 1e-300)), float(drop.sum()) / max(spread, 1e-300)

@@ -1,0 +1,140 @@
+"""How much of what can be explained in an effect's domain its form holds, and the curve beside it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opamc_cli.joint.model import Fit, Term
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.search import LEAST_T, Pool, trials
+from opamc_cli.joint.track import Floats, Track
+
+EXACT, APPROXIMATE = 0.9, 0.5
+"""Shares of its domain's curve that a form holds: from the first on it has the name, from the second
+on approximately; below, the curve has none."""
+POINTS = 40
+"""Of a curve: what a plot of some hundred pixels shows."""
+
+COVARIATES = {
+    "velocity": ("speed", "rad/s"),
+    "acceleration": ("acceleration", "rad/s²"),
+    "joint-angle": ("joint angle", "rad"),
+    "load": ("load", "A"),
+    "temperature": ("temperature", "°C"),
+    "time": ("time", "s"),
+    "motor-angle": ("angle within the period", "turns"),
+    "electrical": ("electrical angle", "turns"),
+    "frequency": ("time within the period", "periods"),
+}
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A partial residual over its own covariate.
+
+    Attributes
+    ----------
+    covariate, unit : str
+        What it is drawn over.
+    x, residual_a, named_a : arrays of shape (k,)
+        Bins of equally many samples: the covariate's mean, the mean of what the effect and the
+        final residual hold together, and of what the effect holds. Where friction resists, both are
+        taken times the direction.
+    """
+
+    covariate: str
+    unit: str
+    x: Floats
+    residual_a: Floats
+    named_a: Floats
+
+
+def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
+    """Share of its domain's curve that an effect's form holds.
+
+    Parameters
+    ----------
+    best : Chain
+        With the effect.
+    drop : float
+        Sum of squares that the effect takes off the held-out error.
+    term : Term
+        The effect.
+    unnamed : Pool
+        Functions that have no name.
+
+    Returns
+    -------
+    float
+        1 where no function of the domain explains more beside it.
+    """
+    if term.effect.fast:
+        # A line's forms are all that a line can have.
+        return 1.0
+    library = {
+        name: effect
+        for name, effect in unnamed.library.items()
+        if effect.domain == term.effect.domain and not effect.fast
+    }
+    slow = [
+        batch for batch in unnamed.slow if all(one.effect.name in library for one in batch.terms)
+    ]
+    more = 0.0
+    for trial in trials(best, replace(unnamed, library=library, slow=slow, least_share=0.0)):
+        gained = float((best.error - trial.chain.error).sum())
+        if trial.t_value > LEAST_T and trial.chain.score < best.score:
+            more = max(more, gained)
+    return max(drop, 0.0) / max(drop + more, 1e-300)
+
+
+def curve_of(fit: Fit, place: int) -> Curve:
+    """Draw an effect and the residual over the effect's covariate.
+
+    Parameters
+    ----------
+    fit : Fit
+        Final model.
+    place : int
+        Of the term in the fit.
+    """
+    session = fit.session
+    grid = session.sharp
+    term, values = fit.terms[place], fit.coefficients[place]
+    rows = np.flatnonzero(grid.fit)
+    named = (session.columns(term, fine=True) @ values)[rows]
+    both = named + fit.residual_a[rows]
+    over, side = _covariate(grid.track, term)
+    over, side = over[rows], side[rows]
+    order = np.argsort(over, kind="stable")
+    bins = [piece for piece in np.array_split(order, POINTS) if piece.size]
+    name, unit = COVARIATES[term.effect.domain]
+    return Curve(
+        name,
+        unit,
+        np.array([over[piece].mean() for piece in bins]),
+        np.array([(side * both)[piece].mean() for piece in bins]),
+        np.array([(side * named)[piece].mean() for piece in bins]),
+    )
+
+
+def _covariate(track: Track, term: Term) -> tuple[Floats, Floats]:
+    one = np.ones(track.size)
+    turn = 2 * np.pi
+    domain = term.effect.domain
+    if domain == "velocity":
+        return np.abs(track.velocity), track.direction
+    if domain == "acceleration":
+        return track.acceleration, one
+    if domain == "load":
+        return np.abs(track.load_a), track.direction
+    if domain == "temperature" and track.temperature_c is not None:
+        return track.temperature_c, track.direction
+    if domain == "time":
+        return track.time_s, track.direction
+    if domain == "motor-angle":
+        return (next(iter(term.parameters.values())) * track.machine_angle_rad / turn) % 1.0, one
+    if domain == "electrical" and track.electrical_rad is not None:
+        return (track.electrical_rad / turn) % 1.0, one
+    if domain == "frequency":
+        return (next(iter(term.parameters.values())) * track.time_s) % 1.0, one
+    return track.position_rad, track.direction

@@ -1,0 +1,254 @@
+"""Follow several chains of effects side by side, and keep the one that is worth its price."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.stats import t as student
+
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.effects.library import Library
+from opamc_cli.joint.model import Session, Term
+from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
+from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
+from opamc_cli.joint.name.refine import refined
+from opamc_cli.joint.track import Floats
+
+CHAINS = 4
+"""Followed side by side: a bump that imitates a spring shows itself only beside the spring."""
+LEAST_SHARE = 0.05
+"""Of the held-out mean square error: what a user would care about."""
+LEAST_T = 2.0
+"""A drop over its standard error, over parts of the open data."""
+MOST_STEPS = 16
+"""Effects added at most; a measured joint has six lines."""
+REFINED, TRIED = 6, 4
+"""Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
+PROMISING = 0.25
+"""Share of the best candidate's fall in the score below which none is refined."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """What may be added, with the regressors that do not follow the model computed once.
+
+    Attributes
+    ----------
+    slow : list of Batch
+        Guesses of effects that do not follow the model, on the coarse grid.
+    library : dict of str to Effect
+        Everything that may be added.
+    least_share : float
+        Of the held-out error, that an effect has to take away.
+    without : collection of str
+        Rules that are switched off.
+    """
+
+    slow: list[Batch]
+    library: Library
+    least_share: float = LEAST_SHARE
+    without: Collection[str] = field(default=())
+
+    @classmethod
+    def of(
+        cls,
+        session: Session,
+        library: Library,
+        least_share: float = LEAST_SHARE,
+        without: Collection[str] = (),
+    ) -> "Pool":
+        """Lay every effect's grid of parameters on a session's coarse grid."""
+        track = session.coarse.track
+        terms = [
+            term
+            for effect in library.values()
+            if not effect.fast and effect.from_motion and not effect.untestable(track)
+            for term in guessed(effect, session)
+        ]
+        share = 0.0 if "share" in without else least_share
+        return cls(batches_of(session, terms, fine=False), library, share, without)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A chain with one effect more, and why it is none, if it is not.
+
+    Attributes
+    ----------
+    parent, chain : Chain
+        Without and with the effect.
+    gain, t_value : float
+        Share of the parent's held-out error, and over its standard error.
+    why_not : str or None
+        None where the effect may be added.
+    """
+
+    parent: Chain
+    chain: Chain
+    gain: float
+    t_value: float
+    why_not: str | None
+
+    @property
+    def term(self) -> Term:
+        """The effect."""
+        return self.chain.fit.terms[-1]
+
+    @property
+    def p_value(self) -> float:
+        """Probability of such a t where the effect does nothing."""
+        return float(student.sf(self.t_value, max(self.chain.error.size - 1, 1)))
+
+
+def guessed(effect: Effect, session: Session) -> list[Term]:
+    """Every guess of a slow effect, and the smaller forms of each."""
+    track = session.coarse.track
+    terms = []
+    for parameters in effect.guesses(track, np.zeros(track.size)):
+        terms.append(Term(effect, parameters))
+        terms += [Term(effect, form, keep) for form, keep in effect.variants(parameters)]
+    return terms
+
+
+def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]:
+    """Best guess of every effect beside a chain, refined.
+
+    Parameters
+    ----------
+    chain : Chain
+        What is known.
+    pool : Pool
+        What may be added.
+    every : bool
+        Refine and return the hopeless ones as well.
+
+    Returns
+    -------
+    list of Candidate
+        Best first.
+    """
+    session = chain.fit.session
+    present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
+    reference = float(chain.error.sum())
+    found: dict[tuple[str, float], Candidate] = {}
+
+    def note(candidate: Candidate) -> None:
+        effect, key = candidate.term.effect, 0.0
+        if effect.several:
+            # Two lines of one kind are two candidates.
+            key = float(f"{next(iter(candidate.term.parameters.values())):.3g}")
+        known = found.get((effect.name, key))
+        if known is None or candidate.score < known.score:
+            found[effect.name, key] = candidate
+
+    slow = Beside(chain, fine=False)
+    free = [effect for effect in pool.library.values() if effect.name not in present]
+    following = [
+        term
+        for effect in free
+        if not effect.fast
+        and not effect.from_motion
+        and not effect.untestable(session.coarse.track)
+        for term in guessed(effect, session)
+    ]
+    for batch in (*pool.slow, *batches_of(session, following, fine=False)):
+        for term, drop in zip(batch.terms, slow.drops(batch), strict=True):
+            if term.effect.name not in present:
+                note(judged(term, float(drop), batch.width, reference))
+    fast = Beside(chain, fine=True)
+    residual = np.where(session.sharp.fit, chain.fit.residual_a, 0.0)
+    for effect in free:
+        if effect.fast and not effect.untestable(session.fine.track):
+            for parameters in effect.guesses(session.fine.track, residual):
+                note(best_form(session, fast, Term(effect, parameters), reference))
+    ordered = sorted(found.values(), key=lambda candidate: candidate.score)
+    least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
+    better = []
+    for candidate in [one for one in ordered if one.score < least][:REFINED]:
+        beside = fast if candidate.term.effect.fast else slow
+        term = refined(session, candidate.term, beside)
+        (batch,) = batches_of(session, [term], beside.fine)
+        trial = judged(term, float(beside.drops(batch)[0]), batch.width, reference)
+        better.append(min(trial, candidate, key=lambda one: one.score))
+    return sorted(better, key=lambda candidate: candidate.score)
+
+
+def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
+    """Fit the most promising candidates of a chain jointly, and say of each whether it may be added.
+
+    Parameters
+    ----------
+    chain : Chain
+        What is known.
+    pool : Pool
+        What may be added.
+    known : set, optional
+        Chains that were tried; they are not tried again, and new ones are added.
+    """
+    found = []
+    for candidate in candidates(chain, pool)[:TRIED]:
+        signature = chain.signature | signature_of((candidate.term,))
+        if known is not None:
+            if signature in known:
+                continue
+            known.add(signature)
+        child = extended(chain, candidate.term)
+        share, t_value = child.gain_over(chain)
+        found.append(Trial(chain, child, share, t_value, objection(child, chain, pool)))
+    return found
+
+
+def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
+    """Say why the last effect of a chain is not worth adding, or None where it is."""
+    share, t_value = child.gain_over(parent)
+    if share < pool.least_share:
+        return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
+    if t_value < LEAST_T and "certain" not in pool.without:
+        return "takes something off the held-out error here and there, not everywhere"
+    if "sign" not in pool.without and not child.plausible:
+        return "its sign, or its size, is not physical"
+    if child.terms[-1].effect.changes_in_time and "drift" not in pool.without:
+        share, t_value = child.gain_beside_drift(parent)
+        if share < pool.least_share or t_value < LEAST_T:
+            return "slow noise explains it as well: within parts of the data nothing speaks for it"
+    return None
+
+
+def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
+    """Follow chains; return the one that is worth its price.
+
+    Parameters
+    ----------
+    start : Chain
+        What is known.
+    pool : Pool
+        What may be added.
+    width : int
+        Chains that are followed side by side.
+    """
+    width = 1 if "beam" in pool.without else width
+    chains = [start]
+    reached = [start]
+    known: set[Signature] = set()
+    for _ in range(MOST_STEPS):
+        following = [
+            trial.chain
+            for chain in chains
+            for trial in trials(chain, pool, known)
+            if trial.why_not is None
+        ]
+        if not following:
+            break
+        chains = sorted(following, key=lambda chain: _score(chain, pool))[:width]
+        reached += chains
+    return min(reached, key=lambda chain: _score(chain, pool))
+
+
+def _score(chain: Chain, pool: Pool) -> float:
+    return chain.score - (chain.price if "price" in pool.without else 0.0)
+
+
+def paired(before: Floats, after: Floats) -> tuple[float, float]:
+    """Difference of two chains' held-out errors, and its standard error over the parts."""
+    difference = after - before
+    return float(difference.sum()), float(np.std(difference, ddof=1)) * np.sqrt(difference.size)

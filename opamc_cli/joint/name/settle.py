@@ -1,0 +1,119 @@
+"""What a chain keeps when each effect is asked again, beside all the others; and what ties with it."""
+
+from dataclasses import dataclass, replace
+
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.name.chain import Chain, extended, without
+from opamc_cli.joint.name.search import LEAST_T, Pool, Trial, objection, paired, trials
+
+CLEARLY = 0.05
+"""Of the score: where an effect stands against another or a function without a name, a difference
+of less is none."""
+MOST_ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class Named:
+    """An added effect, beside all the others.
+
+    Attributes
+    ----------
+    trial : Trial
+        What it takes off the error that all the others leave.
+    others : tuple of Trial
+        What else was tried in its place.
+    ties : tuple of str
+        Effects that explain the data as well.
+    """
+
+    trial: Trial
+    others: tuple[Trial, ...]
+    ties: tuple[str, ...]
+
+    @property
+    def term(self) -> Term:
+        """The effect."""
+        return self.trial.term
+
+
+def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]:
+    """Drop what is not worth its price, exchange what another effect explains better.
+
+    Parameters
+    ----------
+    best : Chain
+        From the beam.
+    pool, unnamed : Pool
+        Effects, and functions that have no name.
+
+    Returns
+    -------
+    Chain
+        Changed a few times at most.
+    list of Named
+        Its named effects with their ties.
+    """
+    for _ in range(MOST_ROUNDS):
+        named: list[Named] = []
+        changed: Chain | None = None
+        for place in range(best.added):
+            changed, found = _asked_again(best, place, pool, unnamed)
+            if changed is not None:
+                break
+            named += found
+        if changed is None:
+            return best, named
+        best = changed
+    named = []
+    for place in range(best.added):
+        term = best.terms[place]
+        if not term.effect.unnamed:
+            parent = without(best, place)
+            named.append(Named(_trial(parent, best, term, pool), (), ()))
+    return best, named
+
+
+def _asked_again(
+    best: Chain, place: int, pool: Pool, unnamed: Pool
+) -> tuple[Chain | None, list[Named]]:
+    """A better chain without, or with another effect in the place of one; else the effect's ties."""
+    term = best.terms[place]
+    parent = without(best, place)
+    if parent.score <= best.score:
+        return parent, []
+    if term.effect.unnamed:
+        return None, []
+    if "unnamed" not in pool.without and not term.effect.fast:
+        for rival in trials(parent, _slow(unnamed)):
+            if rival.why_not is None and _clearly_better(rival.chain, best):
+                return rival.chain, []
+    others = trials(parent, pool)
+    for other in others:
+        better = other.chain.score < best.score - CLEARLY
+        if better and other.why_not is None and "exchange" not in pool.without:
+            return other.chain, []
+    ties = []
+    for other in others:
+        difference, error = paired(best.error, other.chain.error)
+        if other.why_not is None and difference <= LEAST_T * error:
+            ties.append(other.term.effect.name)
+    names = tuple(name for name in dict.fromkeys(ties) if name != term.effect.name)
+    trial = _trial(parent, best, term, pool)
+    return None, [Named(trial, tuple(others), names)]
+
+
+def _slow(pool: Pool) -> Pool:
+    slow = {name: effect for name, effect in pool.library.items() if not effect.fast}
+    return replace(pool, library=slow)
+
+
+def _clearly_better(rival: Chain, best: Chain) -> bool:
+    difference, error = paired(rival.error, best.error)
+    return rival.score < best.score - CLEARLY and difference > LEAST_T * error
+
+
+def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:
+    """The effect as the last one added: the same chain with its terms in another order."""
+    chain = extended(parent, term)
+    gain, t_value = chain.gain_over(parent)
+    return Trial(parent, chain, gain, t_value, objection(chain, parent, pool))
