@@ -1,15 +1,12 @@
 """The one place where the panel calls the package's loop."""
 
-import inspect
 from dataclasses import dataclass
 from typing import Any
 
-from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.model import open_session
-from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint
 from panel.case import Logged
 
@@ -57,20 +54,13 @@ def close(
         )
         for k, r in enumerate(recordings)
     ]
-    track, grouping = grouped_track(laid, Joint(*gear) if gear else Joint())
-    if grouping is None or not is_moving(track):
-        msg = "moves too little"
-        raise RefusedError(msg)
     library = built_in_library()
     terms = tuple((library[name], None) for name in declared)
-    options: dict[str, Any] = {}
-    if without_rules:
-        if "without_rules" not in inspect.signature(close_loop).parameters:
-            msg = "the loop has no rules that can be left out"
-            raise RefusedError(msg)
-        options["without_rules"] = without_rules
-    loop = close_loop(declared_fit(open_session(track, grouping), terms), library, seed, **options)
-    ceiling = loop.ceiling_before.share
+    fit = best_fit(laid, Joint(*gear) if gear else Joint(), lambda _: terms)
+    if fit is None:
+        msg = "moves too little"
+        raise RefusedError(msg)
+    loop = close_loop(fit, library, seed, without_rules)
     return Closed(
         loop.rmse_before_a,
         loop.rmse_after_a,
@@ -83,7 +73,8 @@ def close(
                 "parameters": dict(step.term.parameters),
             }
             for step in loop.steps
+            if step.named
         ],
         loop.verdict,
-        float(ceiling),
+        loop.ceiling.share,
     )

@@ -13,7 +13,8 @@ COARSE_REPEAT_ERROR = 0.3
 MOST_DIPS = 30
 SEALED_SHARE = 0.27
 BLOCKS_WITHOUT_CYCLES = 12
-SHORTEST_BLOCK_S = 0.2
+FEWEST_PER_BLOCK = 20
+"""Samples: some four per coefficient of the declared effects."""
 FEWEST_FIT_GROUPS = 4
 
 
@@ -139,7 +140,7 @@ def group_samples(
     needed = 0.1 * rate_hz
     pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
     if len(pieces) < 2:
-        return _blocks(moving, bounds, rate_hz, run_names)
+        return _blocks(moving, run_names)
     sealed_pieces = _sealed_pieces(pieces)
     fit = [i for i in range(len(pieces)) if i not in sealed_pieces]
     parts = -(-FEWEST_FIT_GROUPS // len(fit)) if len(fit) < FEWEST_FIT_GROUPS else 1
@@ -174,12 +175,10 @@ def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
 
 def _blocks(
     moving: Bools,
-    bounds: tuple[tuple[int, int], ...],
-    rate_hz: float,
     run_names: tuple[str, ...],
 ) -> Grouping | None:
     indices = np.flatnonzero(moving)
-    if indices.size < BLOCKS_WITHOUT_CYCLES * max(SHORTEST_BLOCK_S * rate_hz, 20):
+    if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None
     group = np.full(moving.size, -1, dtype=np.int64)
     chunks = np.array_split(indices, BLOCKS_WITHOUT_CYCLES)

@@ -180,8 +180,9 @@ def motion_from_position(
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         speed = velocity_rad_s
-        spread = float(np.std(velocity))
-        agrees = spread > 0 and float(np.std(speed - velocity)) < 0.1 * spread
+        # Of the speed itself, not of its changes: at constant speed those are nearly noise.
+        size = float(np.sqrt(np.mean(velocity**2)))
+        agrees = size > 0 and float(np.std(speed - velocity)) < 0.1 * size
         own = window if asked else smoothing_window(speed, rate_hz, derivative=1)
         if agrees and (asked or own < window):
             acceleration = derivatives(speed, rate_hz, own, 1)
