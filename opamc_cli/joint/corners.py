@@ -13,9 +13,8 @@ LARGEST_LACK = 0.3
 """Standard deviations of the current's noise that the smoothing may take from a sample."""
 CERTAIN = 3.0
 """Standard deviations of the acceleration's noise: less may not be lacking at all."""
-FEWEST_CLEAR = 0.5
-"""Share of the moving samples: where fewer would be left, the path is of that nature, and errors
-would be taken on a choice of samples."""
+FEWEST_CLEAR = 0.02
+"""Share of the moving samples: where fewer would be left, the path is of that nature."""
 
 
 def clear_of_corners(

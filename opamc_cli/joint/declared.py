@@ -1,16 +1,17 @@
 """Fit a declared model, parameters that are not given included."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.kinematics import Recording, smoothings
+from opamc_cli.joint.kinematics import Recording, build_track, smoothings
 from opamc_cli.joint.model import Fit, Session, Term, fit_terms, open_session
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
 from opamc_cli.joint.recordings import grouped_track, is_moving
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.track import Joint, Track
 
 BETTER = 0.97
 """Of the held-out mean square error: another window than the noise asks for must be worth it."""
@@ -38,17 +39,26 @@ def best_fit(
     Fit or None
         None where too little moves to seal anything off.
     """
-    best: tuple[float, Fit] | None = None
-    for smoothing in smoothings(recordings):
-        track, grouping = grouped_track(recordings, joint, smoothing)
-        if grouping is None or not is_moving(track):
-            continue
+    track, grouping = grouped_track(recordings, joint)
+    if grouping is None or not is_moving(track):
+        return None
+
+    def fitted(track: Track) -> tuple[float, Fit]:
         session = open_session(track, grouping)
         fit = declared_fit(session, declared(session))
-        error = float(fit.sums.held_out().sum()) / fit.sums.parts.rows.size
-        if best is None or error < BETTER * best[0]:
-            best = (error, fit)
-    return None if best is None else best[1]
+        parts = fit.sums.parts
+        samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
+        return float(fit.sums.held_out()[parts.judged].sum()) / max(samples, 1), fit
+
+    error, best = fitted(track)
+    for smoothing in smoothings(recordings):
+        other = build_track(recordings, joint, smoothing)
+        # All are judged where the first one takes nothing from the acceleration.
+        same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}
+        found, fit = fitted(replace(other, **same))
+        if found < BETTER * error:
+            error, best = found, fit
+    return best
 
 
 def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:

@@ -87,14 +87,14 @@ class Smoothing:
     from_velocity: bool
 
 
-def smoothings(recordings: Sequence[Recording]) -> list[Smoothing | None]:
-    """Ways to differentiate recordings; None leaves the choice to the noise of each path."""
+def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
+    """Ways to differentiate recordings beside the one that the noise of each path asks for."""
     if any(recording.position_rad is None for recording in recordings):
-        return [None]
+        return []
     speeds = all(recording.velocity_rad_s is not None for recording in recordings)
     windows = {max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window for window in WINDOWS_S}
     ways = [False, True] if speeds else [False]
-    return [None, *(Smoothing(window, way) for window in windows.values() for way in ways)]
+    return [Smoothing(window, way) for window in windows.values() for way in ways]
 
 
 @dataclass(frozen=True)

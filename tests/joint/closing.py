@@ -1,12 +1,13 @@
 """Simulate a joint and close the loop on it."""
 
+import numpy as np
 from simulator import DECLARED, simulate
 
-from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.model import open_session
+from opamc_cli.joint.model import Term, fit_terms, open_session
 from opamc_cli.joint.recordings import grouped_track
 from opamc_cli.joint.track import Joint
 
@@ -25,9 +26,76 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
         position_rad=made.position,
         temperature_c=made.temperature,
     )
-    track, grouping = grouped_track([recording], Joint(made.gear_ratio, made.pole_pairs))
-    library = built_in_library()
-    fitted = declared_fit(
-        open_session(track, grouping), tuple((library[name], None) for name in base)
-    )
+    fitted = fit_declared([recording], Joint(made.gear_ratio, made.pole_pairs), base)
+    assert fitted is not None
     return made, close_loop(fitted, built_in_library(without), seed)
+
+
+def fit_declared(recordings, joint=None, base=DECLARED):
+    library = built_in_library()
+    terms = tuple((library[name], None) for name in base)
+    return best_fit(recordings, joint or Joint(), lambda session: terms)
+
+
+def plain_fit(recording, base=DECLARED):
+    """Fit the declared model to a motion differentiated as its own noise asks for."""
+    track, grouping = grouped_track([recording], Joint())
+    library = built_in_library()
+    return fit_terms(open_session(track, grouping), tuple(Term(library[name], {}) for name in base))
+
+
+MODEL = {"coulomb": 0.5, "viscous": 0.3}
+"""Declared with an inertia of 0.2 A s² and a weight of 1 A, which `joint_of` adds as well."""
+
+MOTIONS = ("one stroke", "cyclic", "steps of torque")
+
+
+def moved(motion, rate=250.0, seconds=30.0, seed=40):
+    """Position, speed and acceleration of a motion, by formulas."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(seconds * rate)) / rate
+    if motion == "one stroke":
+        # Slower and slower over the whole travel: no place is passed twice.
+        w = np.pi / seconds
+        return 1.5 - 1.5 * np.cos(w * t), 1.5 * w * np.sin(w * t), 1.5 * w * w * np.cos(w * t)
+    if motion == "cyclic":
+        w, parts = 2 * np.pi / (seconds / 8), [(0.7, 1, 0.3), (0.4, 2, 1.0), (0.2, 3, 2.0)]
+        q = sum(a * np.sin(k * w * t + p) for a, k, p in parts)
+        v = sum(a * k * w * np.cos(k * w * t + p) for a, k, p in parts)
+        return q, v, -sum(a * (k * w) ** 2 * np.sin(k * w * t + p) for a, k, p in parts)
+    # Held between steps of the acceleration, of another size each time.
+    a, v = np.zeros(t.size), np.zeros(t.size)
+    pieces = np.array_split(np.arange(t.size), round(seconds / 0.5))
+    speed = 0.0
+    for piece in pieces:
+        wanted = rng.uniform(0.2, 1.2) * (-1) ** rng.integers(2)
+        a[piece] = (wanted - speed) / 0.5 if speed * wanted >= 0 else -2 * speed
+        speed += float(a[piece].sum()) / rate
+    v = np.cumsum(a) / rate
+    v -= np.mean(v)
+    return np.cumsum(v) / rate, v, a
+
+
+def joint_of(motion, effect, strength=15.0, noise_a=0.02, **options):
+    """Record a joint whose current lacks nothing, or one shape of `strength` times the noise.
+
+    Parameters
+    ----------
+    motion : str
+        Of `MOTIONS`.
+    effect : callable or None
+        Current of shape (n,) over position, speed, acceleration and time.
+    strength : float
+        Root mean square of what the declared model leaves of the effect, in units of the noise.
+    """
+    rate = options.pop("rate", 250.0)
+    q, v, a = moved(motion, rate, **options)
+    t = np.arange(q.size) / rate
+    columns = np.stack([a, np.sin(q), np.cos(q), np.sign(v), v], axis=1)
+    current = columns @ [0.2, 1.0, 0.4, MODEL["coulomb"], MODEL["viscous"]]
+    if effect is not None:
+        shape = effect(q, v, a, t)
+        left = shape - columns @ np.linalg.lstsq(columns, shape)[0]
+        current = current + strength * noise_a / np.std(left) * shape
+    noise = np.random.default_rng(7).normal(0, noise_a, q.size)
+    return Recording("run", rate, current_a=current + noise, position_rad=q)

@@ -8,11 +8,11 @@ from opamc_cli.joint import model, thinning
 from opamc_cli.joint.declared import declared_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.groups import group_samples
-from opamc_cli.joint.kept import Kept
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.model import Term, fit_terms, open_session
 from opamc_cli.joint.recordings import grouped_track
+from opamc_cli.joint.regressor_cache import RegressorCache
 from opamc_cli.joint.track import Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous")
@@ -107,7 +107,7 @@ def test_fits_that_share_regressors_are_those_that_compute_their_own():
     shared = own = fit_terms(open_session(track, grouping), everything[:4])
     for chosen in (everything[:5], everything[:6], everything, everything[:4] + everything[5:]):
         shared = fit_terms(shared.session, chosen)
-        own = fit_terms(replace(own.session, kept=Kept()), chosen)
+        own = fit_terms(replace(own.session, cache=RegressorCache()), chosen)
         for ours, theirs in zip(shared.coefficients, own.coefficients, strict=True):
             np.testing.assert_allclose(ours, theirs, rtol=1e-8)
         for term in chosen:
@@ -119,4 +119,4 @@ def test_fits_that_share_regressors_are_those_that_compute_their_own():
 
 
 def term_columns(session, term):
-    return replace(session, kept=Kept()).columns(term, fine=False)
+    return replace(session, cache=RegressorCache()).columns(term, fine=False)

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop
-from opamc_cli.joint.model import Fit, open_session
-from opamc_cli.joint.recordings import grouped_track
+from opamc_cli.joint.model import Fit
 from opamc_cli.joint.track import Floats, Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import AxisRecording, simulate
@@ -78,11 +77,11 @@ def declared_on_testbed(
         position_rad=None if sensing == "phases" else axis.position_rad,
         temperature_c=axis.temperature_c.astype(float),
     )
-    track, grouping = grouped_track([recording], joint)
-    assert grouping is not None
     library = built_in_library()
     terms = tuple((library[name], None) for name in DECLARED if name not in names)
-    return declared_fit(open_session(track, grouping), terms)
+    fitted = best_fit([recording], joint, lambda session: terms)
+    assert fitted is not None
+    return fitted
 
 
 def close_on_testbed(

@@ -1,0 +1,134 @@
+"""What a candidate would take off the held-out error, against fitting it."""
+
+import numpy as np
+import pytest
+from closing import joint_of, plain_fit
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
+from opamc_cli.joint.name.chain import chain_of, extended
+from opamc_cli.joint.name.price import PRICE, price_of
+from opamc_cli.joint.name.search import guessed
+
+LIBRARY = built_in_library()
+MOTION = ("offset", "spring", "stribeck", "quadratic_friction", "asymmetric_friction",
+          "position_drag", "hysteresis")  # fmt: skip
+
+
+def stribeck(q, v, a, t):
+    return np.sign(v) * np.exp(-((v / 0.15) ** 2))
+
+
+@pytest.fixture(scope="module")
+def slow_chain():
+    """One grid for all: 100 Hz."""
+    return chain_of(plain_fit(joint_of("cyclic", stribeck, rate=100.0)), 0)
+
+
+@pytest.fixture(scope="module")
+def fast_chain():
+    """Two grids, and an effect that is fast in the model."""
+    fit = plain_fit(joint_of("cyclic", stribeck, rate=2000.0, seconds=24.0))
+    forms = {"speed": 1.0, "direction": 1.0, "load": 0.0}
+    return extended(chain_of(fit, 0), Term(LIBRARY["ripple"], {"order": 20.0, **forms}))
+
+
+@pytest.mark.parametrize("name", MOTION)
+def test_the_drop_of_a_guess_is_that_of_the_chain_with_it(slow_chain, name):
+    session = slow_chain.fit.session
+    assert session.coarse is session.fine
+    terms = guessed(LIBRARY[name], session)
+    for fine in (True, False):
+        beside = Beside(slow_chain, fine)
+        for batch in batches_of(session, terms, fine):
+            drops = beside.drops(batch)
+            for place in range(0, len(batch.terms), 7):
+                longer = extended(slow_chain, batch.terms[place])
+                slow = float((slow_chain.error - longer.error).sum())
+                assert drops[place] == pytest.approx(slow, rel=2e-3, abs=1e-4 * slow_chain.error.sum())
+
+
+def slow_drop(chain, columns, fine):
+    """Leave units out one by one, with all regressors, by least squares."""
+    session = chain.fit.session
+    parts = session.parts[0 if fine else 1]
+    current = session.grid_of(fine).track.current_a
+    known = list(zip(chain.fit.terms, chain.fit.coefficients, strict=True))
+    blocks = []
+    for term, values in known:
+        block = session.columns(term, fine)
+        if term.effect.fast and not fine:
+            current = current - block @ values
+        else:
+            blocks.append(block)
+    base = np.concatenate(blocks, axis=1)[parts.rows]
+    both = np.concatenate([base, columns], axis=1)
+    target = current[parts.rows]
+    unit = np.repeat(parts.unit, [b - a for a, b in parts.slices])
+    judged = np.repeat(parts.judged | (not fine), [b - a for a, b in parts.slices])
+    drop = 0.0
+    for number in range(parts.units):
+        rest, mine = unit != number, (unit == number) & judged
+        for design, sign in ((base, 1), (both, -1)):
+            scale = np.linalg.norm(design[rest], axis=0)
+            values = np.linalg.lstsq(design[rest] / scale, target[rest], rcond=1e-6)[0] / scale
+            drop += sign * float(np.sum((target[mine] - design[mine] @ values) ** 2))
+    return drop * (1 if fine else session.factor)
+
+
+@pytest.mark.parametrize("fine", [True, False])
+@pytest.mark.parametrize("name", ["stribeck", "spring", "position_drag"])
+def test_the_drop_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chain, name, fine):
+    session = fast_chain.fit.session
+    assert session.factor > 1
+    terms = guessed(LIBRARY[name], session)[::9]
+    total = float(fast_chain.error.sum())
+    for batch in batches_of(session, terms, fine):
+        drops = Beside(fast_chain, fine).drops(batch)
+        for place, drop in enumerate(drops):
+            columns = batch.columns[:, place * batch.width : (place + 1) * batch.width]
+            slow = slow_drop(fast_chain, columns, fine)
+            assert drop == pytest.approx(slow, rel=2e-3, abs=1e-5 * total)
+
+
+def test_what_the_model_holds_already_takes_nothing(slow_chain):
+    session = slow_chain.fit.session
+    for name in ("coulomb", "inertia"):
+        (batch,) = batches_of(session, [Term(LIBRARY[name], {})], True)
+        assert abs(Beside(slow_chain, True).drops(batch)[0]) < 1e-3 * slow_chain.error.sum()
+
+
+def test_the_fitted_drop_is_the_fall_of_the_sum_of_squares(slow_chain):
+    session = slow_chain.fit.session
+    beside = Beside(slow_chain, True)
+    columns = beside.parts.taken(session.columns(Term(LIBRARY["spring"], {}), True))
+    both = np.concatenate([beside.columns, columns], axis=1)
+    left = [
+        np.linalg.lstsq(design, beside.current, rcond=1e-9)[1][0]
+        for design in (beside.columns, both)
+    ]
+    assert beside.fitted_drop(columns) == pytest.approx(left[0] - left[1], rel=1e-4)
+
+
+def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
+    session = slow_chain.fit.session
+    beside = Beside(slow_chain, True)
+    reference = float(slow_chain.error.sum())
+    full = Term(LIBRARY["asymmetric_friction"], LIBRARY["asymmetric_friction"].guesses(
+        session.fine.track, np.zeros(session.fine.track.size))[0])  # fmt: skip
+    found = best_form(session, beside, full, reference)
+    forms = [full] + [
+        Term(full.effect, parameters, keep)
+        for parameters, keep in full.effect.variants(full.parameters)
+    ]
+    scores = {}
+    for form in forms:
+        longer = extended(slow_chain, form)
+        width = longer.fit.coefficients[-1].size
+        error = np.log(longer.error.sum() / reference)
+        scores[form.key] = error + PRICE * (1 + width + form.effect.searched(form.parameters))
+        assert price_of(form, width) == pytest.approx(scores[form.key] - error)
+    assert len(scores) > 1
+    assert found.score == pytest.approx(min(scores.values()), abs=1e-4)
+    assert scores[found.term.key] == min(scores.values())

@@ -1,0 +1,66 @@
+"""Least squares from sums of products, for regressors of any size and any likeness."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.joint.least_squares import eigenvectors, inverse, solve
+
+
+def random_columns(seed=4, sets=3, rows=40, width=6):
+    rng = np.random.default_rng(seed)
+    columns = rng.normal(size=(sets, rows, width)) * 10.0 ** rng.integers(-6, 7, width)
+    return columns, rng.normal(size=(sets, rows))
+
+
+def test_solution_is_that_of_least_squares_whatever_the_units():
+    columns, signal = random_columns()
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    moment = np.einsum("gij,gi->gj", columns, signal)
+    for k in range(3):
+        expected = np.linalg.lstsq(columns[k] / np.linalg.norm(columns[k], axis=0), signal[k])[0]
+        expected /= np.linalg.norm(columns[k], axis=0)
+        np.testing.assert_allclose(solve(gram, moment)[k], expected, rtol=1e-8)
+        np.testing.assert_allclose(solve(gram[k], moment[k]), expected, rtol=1e-8)
+
+
+def test_equal_columns_share_the_coefficient():
+    column = np.arange(1.0, 9.0)
+    columns = np.stack([column, column], axis=1)
+    found = solve(columns.T @ columns, columns.T @ (4 * column))
+    np.testing.assert_allclose(found, [2, 2])
+
+
+def test_a_column_of_zeros_gets_nothing_and_breaks_nothing():
+    columns = np.stack([np.ones(20), np.zeros(20)], axis=1)
+    found = solve(columns.T @ columns, columns.T @ np.full(20, 3.0))
+    np.testing.assert_allclose(found, [3, 0], atol=1e-12)
+    assert solve(np.zeros((0, 0)), np.zeros(0)).size == 0
+    assert solve(np.zeros((1, 1)), np.zeros(1)) == pytest.approx([0.0])
+
+
+def test_inverse_is_the_inverse_and_of_a_singular_matrix_the_pseudo_inverse():
+    columns, _ = random_columns()
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    scale = np.sqrt(np.einsum("gii->gi", gram))
+    identity = (inverse(gram) @ gram) * scale[:, None, :] ** -1 * scale[:, :, None]
+    np.testing.assert_allclose(identity, np.broadcast_to(np.eye(6), gram.shape), atol=1e-8)
+    twice = np.ones((1, 2, 2))
+    np.testing.assert_allclose(twice @ inverse(twice) @ twice, twice, atol=1e-12)
+    assert inverse(np.zeros((3, 0, 0))).shape == (3, 0, 0)
+
+
+def test_a_matrix_that_divide_and_conquer_gives_up_on_is_solved_all_the_same(monkeypatch):
+    columns, signal = random_columns()
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    moment = np.einsum("gij,gi->gj", columns, signal)
+    expected = solve(gram, moment)
+
+    def gives_up(matrix):
+        msg = "Eigenvalues did not converge"
+        raise np.linalg.LinAlgError(msg)
+
+    monkeypatch.setattr(np.linalg, "eigh", gives_up)
+    plain = np.random.default_rng(0).normal(size=(5, 5))
+    values, vectors = eigenvectors(plain + plain.T)
+    np.testing.assert_allclose(vectors * values @ vectors.T, plain + plain.T, atol=1e-12)
+    np.testing.assert_allclose(solve(gram, moment), expected, rtol=1e-6)
