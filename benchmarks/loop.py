@@ -22,12 +22,10 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
-from opamc_cli.joint.declared import declared_fit
+from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.loop import Loop, close_loop
-from opamc_cli.joint.model import open_session
-from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Joint
 
 ROOT = Path(__file__).parents[1]
@@ -55,8 +53,8 @@ class Trial:
 
     @property
     def added(self) -> list[str]:
-        """Effects that were added."""
-        return [step.term.effect.name for step in self.loop.steps]
+        """Effects that were added; functions without a name are none."""
+        return [step.term.effect.name for step in self.loop.steps if step.named]
 
     @property
     def named(self) -> bool:
@@ -71,13 +69,13 @@ class Trial:
         return [
             step.term.effect.name
             for step in self.loop.steps
-            if self.name != step.term.effect.name and self.name not in step.ties
+            if step.named and self.name not in (step.term.effect.name, *step.ties)
         ]
 
     def oracle_share(self) -> float:
         """Fall of the sealed error, as a share of the fall for who knows the effect's shape."""
         loop = self.loop
-        session = loop.before.session
+        session = loop.before.opened.session
         track, grid = session.fine.track, session.fine
         known = self.simulated.effect
         declared = [term.columns(track) for term in loop.before.terms]
@@ -114,14 +112,13 @@ def run_trial(
         position_rad=None if phases else made.position,
         temperature_c=made.temperature,
     )
-    track, grouping = grouped_track([recording], joint)
-    if grouping is None or not is_moving(track):
+    full = built_in_library()
+    terms = tuple((full[name], None) for name in base)
+    before = best_fit([recording], joint, lambda _: terms)
+    if before is None:
         msg = f"seed {seed} moves too little"
         raise TooLittleError(msg)
-    library = built_in_library(without)
-    full = built_in_library()
-    before = declared_fit(open_session(track, grouping), tuple((full[name], None) for name in base))
-    return Trial("+".join(effects), made, close_loop(before, library, seed))
+    return Trial("+".join(effects), made, close_loop(before, built_in_library(without), seed))
 
 
 @dataclass(frozen=True)
@@ -233,10 +230,10 @@ def through_a_filter(study: Study) -> list[Share]:
         wrong = [
             step.term.effect.name
             for step in steps
-            if "time_delay" not in (step.term.effect.name, *step.ties)
+            if step.named and "time_delay" not in (step.term.effect.name, *step.ties)
         ]
         others += bool(wrong)
-        delays += bool(steps) and not wrong
+        delays += bool(trial.added) and not wrong
         if steps:
             study.say(f"filter {seed} at {trial.simulated.rate_hz} Hz: {trial.added}")
     return [

@@ -35,7 +35,7 @@ def close_one(effect: str, sensing: str, seed: int, healthy_a: Floats) -> Closin
     loop = close_on_testbed((effect,), sensing, seed)
     return Closing(
         named=any(effect in names for names in names_of(loop)),
-        added=tuple(step.term.effect.name for step in loop.steps),
+        added=tuple(step.term.effect.name for step in loop.steps if step.named),
         untestable=any(entry.effect == effect for entry in loop.untestable),
         verdict=loop.verdict,
         before_a=loop.rmse_before_a,
@@ -82,7 +82,7 @@ def run(seeds: range, removed_seeds: range, *, verbose: bool) -> None:
         for seed in seeds:
             loop = close_on_testbed((), sensing, seed)
             healthy[sensing, seed] = loop.before.residual_a
-            wrong += bool(loop.steps)
+            wrong += any(step.named for step in loop.steps)
             silent += loop.verdict == "nothing-missing"
             if verbose and loop.verdict != "nothing-missing":
                 print(f"  healthy {sensing} {seed}: {loop.verdict} {names_of(loop)}")
@@ -113,7 +113,9 @@ def run(seeds: range, removed_seeds: range, *, verbose: bool) -> None:
                 for seed in removed_seeds
             ]
             told = sum(loop.verdict == "not-in-library" for loop in loops)
-            others = sorted({step.term.effect.name for loop in loops for step in loop.steps})
+            others = sorted(
+                {step.term.effect.name for loop in loops for step in loop.steps if step.named}
+            )
             domains = sorted({loop.remaining_domain or "none" for loop in loops})
             print(
                 f"| `{effect}` | {sensing} | {told} of {len(loops)} | {', '.join(others)} "

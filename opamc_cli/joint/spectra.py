@@ -2,6 +2,7 @@
 
 import numpy as np
 from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.track import Floats, Track
 
@@ -11,6 +12,8 @@ MOST_TIME = 8
 """Pieces of a recording are put on its clock if it is at most so many times as long."""
 NYQUIST_SHARE = 0.9
 LOWEST_ORDER = {"motor": 0.4, "joint": 8.0, "electrical": 0.05}
+SURROUNDINGS = 20
+"""Resolutions on both sides of a line over which its surroundings are averaged."""
 LEAST_LINE = 0.02
 """Share of the residual's power: less than half of what an effect must hold to be added."""
 
@@ -109,7 +112,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     residual : array of shape (n,)
         Whitened residual; zero where samples do not count.
     count : int
-        Number of peaks at most.
+        Strongest peaks, and so many of those that stand out most of their surroundings.
 
     Returns
     -------
@@ -128,20 +131,33 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
+    # What repeats with the motion lifts whole stretches of the spectrum: a line stands out of its own.
+    around = uniform_filter1d(power, 2 * SURROUNDINGS * guard + 1, mode="nearest")
     peaks: list[tuple[float, float]] = []
-    for _ in range(count):
-        best = int(np.argmax(power))
-        if power[best] < threshold:
-            break
-        shift = 0.0
-        if 0 < best < power.size - 1:
-            left, middle, right = power[best - 1 : best + 2]
-            curvature = left - 2 * middle + right
-            shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
-        order = float(orders[best] + np.clip(shift, -1, 1) * spacing)
-        peaks.append((order, float(power[best])))
-        power[max(best - guard, 0) : best + guard + 1] = 0
+    for weighed in (power.copy(), power / np.maximum(around, 1e-300)):
+        for order, _ in peaks:
+            _mask(weighed, round(order / spacing), guard)
+        for _ in range(count):
+            best = int(np.argmax(np.where(power >= threshold, weighed, 0.0)))
+            if power[best] < threshold or weighed[best] <= 0:
+                break
+            peaks.append((_vertex(orders, power, best), float(power[best])))
+            _mask(weighed, best, guard)
     return peaks
+
+
+def _mask(power: Floats, place: int, guard: int) -> None:
+    power[max(place - guard, 0) : place + guard + 1] = 0
+
+
+def _vertex(orders: Floats, power: Floats, best: int) -> float:
+    """Place of a peak by the parabola through it and its neighbours."""
+    shift = 0.0
+    if 0 < best < power.size - 1:
+        left, middle, right = power[best - 1 : best + 2]
+        curvature = left - 2 * middle + right
+        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
+    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))
 
 
 def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floats]]]:

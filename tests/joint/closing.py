@@ -55,9 +55,11 @@ def moved(motion, rate=250.0, seconds=30.0, seed=40):
     rng = np.random.default_rng(seed)
     t = np.arange(round(seconds * rate)) / rate
     if motion == "one stroke":
-        # Slower and slower over the whole travel: no place is passed twice.
-        w = np.pi / seconds
-        return 1.5 - 1.5 * np.cos(w * t), 1.5 * w * np.sin(w * t), 1.5 * w * w * np.cos(w * t)
+        # Forwards all the time, at speeds that never repeat: no place is passed twice.
+        waves = [(0.6, 0.8, 0.0), (0.3, 1.93, 1.0)]
+        v = 0.15 * (1 + sum(a * np.sin(w * t + p) for a, w, p in waves))
+        a = 0.15 * sum(a * w * np.cos(w * t + p) for a, w, p in waves)
+        return 0.15 * (t - sum(a / w * np.cos(w * t + p) for a, w, p in waves)), v, a
     if motion == "cyclic":
         w, parts = 2 * np.pi / (seconds / 8), [(0.7, 1, 0.3), (0.4, 2, 1.0), (0.2, 3, 2.0)]
         q = sum(a * np.sin(k * w * t + p) for a, k, p in parts)

@@ -71,8 +71,24 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     step = loop["steps"][0]
     assert step["effect"] == "stribeck"
     assert step["domain"] == "velocity"
-    for key in ("parameters", "interpretation", "gain", "p_value", "decoy_gain", "ties"):
+    for key in ("parameters", "interpretation", "gain", "t_value", "p_value", "decoy_gain", "ties"):
         assert key in step
+    assert step["fit_of_name"] > 0.9
+    assert step["approximate"] is False
+    curve = step["curve"]
+    assert (curve["covariate"], curve["unit"]) == ("speed", "rad/s")
+    assert len(curve["x"]) == len(curve["residual_a"]) == len(curve["named_a"]) > 20
+    # The curve is the effect's: high at low speed, gone at high speed.
+    assert curve["named_a"][0] > 10 * abs(curve["named_a"][-1])
+    assert np.std(np.subtract(curve["residual_a"], curve["named_a"])) < 0.3 * np.std(curve["named_a"])
+    assert loop["ceiling"]["share"] > 2 * loop["ceiling"]["standard_error"] > 0
+    floor = loop["before"]["rmse_a"] * (1 - loop["ceiling"]["share"]) ** 0.5
+    assert loop["floor_a"] == pytest.approx(floor)
+    candidates = pq.read_table(folder / "out" / "candidates.parquet").to_pylist()
+    assert {"round", "effect", "score", "gain", "t_value", "p_value", "added", "why_not"} <= set(
+        candidates[0]
+    )
+    assert [row["effect"] for row in candidates if row["added"]] == ["stribeck"]
     assert loop["after"]["rmse_a"] < loop["before"]["rmse_a"]
     assert f"{loop['before']['rmse_a']:.4g} A" in shown
     assert f"{loop['after']['rmse_a']:.4g} A" in shown
@@ -218,14 +234,8 @@ DATA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 
 @pytest.mark.measured
 @pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not at ../shared/data")
-@pytest.mark.parametrize(
-    ("joint", "effects", "before", "after"),
-    [(5, "[inertia, offset, viscous]", 0.060, 0.037),
-     (6, "[inertia, gravity, offset, viscous]", 0.070, 0.046)],
-)  # fmt: skip
-def test_ripple_of_a_measured_arm_is_found_without_its_gear_ratio(
-    tmp_path, joint, effects, before, after
-):
+@pytest.mark.parametrize(("joint", "after"), [(5, 0.035), (6, 0.032)])
+def test_a_measured_arm_s_ripple_is_found_without_its_gear_ratio(tmp_path, joint, after):
     path = DATA / f"joint_{joint}_trapez.csv"
     with path.open() as file:
         names = file.readline().strip().split(",")
@@ -242,12 +252,8 @@ def test_ripple_of_a_measured_arm_is_found_without_its_gear_ratio(
         axis1_velocity=column("Velocity"),
         axis1_temperature=column("Temp"),
     )
-    assert close(tmp_path, model=f"effects: {effects}\n") == 0
+    model = "effects: [inertia, gravity, offset, coulomb, viscous]\n"
+    assert close(tmp_path, model=model) == 0
     loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
-    assert loop["before"]["rmse_a"] > before
-    assert loop["after"]["rmse_a"] < after
-    found = [s["parameters"]["order"] for s in loop["steps"] if s["effect"] == "ripple"]
-    for order in (200, 700, 1200, 1400, 2400, 2800):
-        near = [abs(order - other) for other in found]
-        # Joint 5 has hardly any of 200 and 2400.
-        assert min(near) < 4 or (joint == 5 and order in (200, 2400))
+    assert loop["after"]["rmse_a"] <= after < 0.6 * loop["before"]["rmse_a"]
+    assert "ripple" in {step["effect"] for step in loop["steps"]}

@@ -69,7 +69,7 @@ class Ripple(Effect):
         found: list[Parameters] = []
         for order, power in order_lines(track, residual, count=2):
             plain = {"order": order, **dict.fromkeys(SWITCHES, 1.0)}
-            if not found and (density := self._density(track, order, power)):
+            if density := self._density(track, order, power):
                 answered = plain | {"answer": density, "top_hz": _top_hz(track, order)}
                 del answered["speed"]
                 found += [answered | {"order": one} for one in (order, *_meant(track, order))]

@@ -42,6 +42,7 @@ class Smooth(Effect):
         self.needs = needs
         self.meaning = f"a function of {name.replace('_', ' ')}; no effect of the library has its form"
         self.from_motion = not follows_model
+        self.changes_in_time = domain in ("time", "temperature") or name.startswith("time")
         self._covariate = covariate
         self._modifier = modifier
         self._first = 0 if constant else 1

@@ -4,6 +4,9 @@ from opamc_cli.joint.model import Term
 
 PRICE = 0.02
 """Logarithm of the held-out mean square error per degree of freedom: 2 % of the error."""
+MOST_CHARGED = 8
+"""Coefficients of one effect that are charged: of a drive's answer in thirty, the held-out error
+itself charges for those that are of no use."""
 
 
 def price_of(term: Term, width: int) -> float:
@@ -16,4 +19,5 @@ def price_of(term: Term, width: int) -> float:
     width : int
         Coefficients.
     """
-    return PRICE * (1 + width + term.effect.searched(term.parameters))
+    charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
+    return PRICE * (1 + charged + term.effect.searched(term.parameters))

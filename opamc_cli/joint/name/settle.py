@@ -109,7 +109,11 @@ def _slow(pool: Pool) -> Pool:
 
 def _clearly_better(rival: Chain, best: Chain) -> bool:
     difference, error = paired(rival.error, best.error)
-    return rival.score < best.score - CLEARLY and difference > LEAST_T * error
+    if rival.score >= best.score - CLEARLY or difference <= LEAST_T * error:
+        return False
+    # What follows slow noise is no better form of an effect.
+    share, t_value = rival.gain_beside_drift(best)
+    return share > CLEARLY and t_value > LEAST_T
 
 
 def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:

@@ -29,7 +29,7 @@ def slow_chain():
 @pytest.fixture(scope="module")
 def fast_chain():
     """Two grids, and an effect that is fast in the model."""
-    fit = plain_fit(joint_of("cyclic", stribeck, rate=2000.0, seconds=24.0))
+    fit = plain_fit(joint_of("steps of torque", stribeck, rate=2000.0, seconds=24.0))
     forms = {"speed": 1.0, "direction": 1.0, "load": 0.0}
     return extended(chain_of(fit, 0), Term(LIBRARY["ripple"], {"order": 20.0, **forms}))
 
@@ -82,7 +82,8 @@ def slow_drop(chain, columns, fine):
 def test_the_drop_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chain, name, fine):
     session = fast_chain.fit.session
     assert session.factor > 1
-    terms = guessed(LIBRARY[name], session)[::9]
+    assert 0 < np.count_nonzero(session.parts[0].judged) < session.parts[0].judged.size
+    terms = guessed(LIBRARY[name], session)[:: 40 if name == "position_drag" else 9]
     total = float(fast_chain.error.sum())
     for batch in batches_of(session, terms, fine):
         drops = Beside(fast_chain, fine).drops(batch)

@@ -1,0 +1,64 @@
+"""What a chain keeps when each effect is asked again beside all the others, and what ties with it."""
+
+import numpy as np
+from closing import joint_of, plain_fit
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.explain.saturated import unnamed_library
+from opamc_cli.joint.model import Term
+from opamc_cli.joint.name.chain import chain_of, extended
+from opamc_cli.joint.name.search import Pool
+from opamc_cli.joint.name.settle import settled
+
+LIBRARY = built_in_library()
+SPEED = {"stribeck_speed": 0.1, "exponent": 2.0}
+
+
+def stribeck(q, v, a, t):
+    return np.sign(v) * np.exp(-((v / 0.1) ** 2))
+
+
+def settle(effect, *terms, names=None, without=(), strength=5.0):
+    recording = joint_of("cyclic", effect, strength=strength, rate=100.0)
+    start = chain_of(plain_fit(recording), 0)
+    session = start.fit.session
+    library = LIBRARY if names is None else {name: LIBRARY[name] for name in names}
+    pool = Pool.of(session, library, without=without)
+    unnamed = Pool.of(session, unnamed_library(), without=without)
+    return settled(extended(start, *terms), pool, unnamed)
+
+
+def term(name, **parameters):
+    return Term(LIBRARY[name], parameters)
+
+
+def test_what_adds_nothing_is_dropped():
+    for place in (0, 1):
+        terms = [term("stribeck", **SPEED)]
+        terms.insert(place, term("quadratic_friction"))
+        chain, named = settle(stribeck, *terms, names=("stribeck", "quadratic_friction"))
+        assert [one.effect.name for one in chain.terms] == ["stribeck"]
+        assert [one.term for one in named] == [terms[1 - place]]
+        assert named[0].trial.why_not is None
+
+
+def test_two_imitators_give_way_to_the_effect_that_is_there():
+    terms = (term("quadratic_friction"), term("sublinear_friction", exponent=0.3))
+    names = ("stribeck", "quadratic_friction", "sublinear_friction")
+    chain, _ = settle(stribeck, *terms, names=names)
+    assert [one.effect.name for one in chain.terms] == ["stribeck"]
+    kept, _ = settle(stribeck, terms[0], names=names, without=("exchange", "unnamed"))
+    assert [one.effect.name for one in kept.terms] == ["quadratic_friction"]
+
+
+def test_of_two_names_for_one_regressor_each_tells_the_other():
+    def constant(q, v, a, t):
+        return np.ones(t.size)
+
+    for mine, other in (("offset", "spring"), ("spring", "offset")):
+        added = term(mine) if mine == "offset" else Term(LIBRARY["spring"], {}, keep=(1,))
+        chain, named = settle(constant, added, names=("offset", "spring"))
+        assert [one.effect.name for one in chain.terms] == [mine]
+        assert named[0].ties == (other,)
+    chain, named = settle(constant, term("offset"), names=("offset",))
+    assert named[0].ties == ()
