@@ -56,7 +56,7 @@ def close(
     ]
     library = built_in_library()
     terms = tuple((library[name], None) for name in declared)
-    fit = best_fit(laid, Joint(*gear) if gear else Joint(), lambda _: terms)
+    fit = best_fit(laid, Joint(*gear) if gear else Joint(), lambda _: terms, without_rules)
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)

@@ -282,7 +282,8 @@ def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
     if result["domain"]:
         shown.append(f"what remains is structured in the {result['domain']} domain")
     shown += [
-        f"rejected {entry['effect']}: {entry['why']}" for entry in result["rejected"][:MOST_REJECTED]
+        f"rejected {entry['effect']}: {entry['why']}"
+        for entry in result["rejected"][:MOST_REJECTED]
     ]
     return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
 

@@ -1,6 +1,6 @@
 """Fit a declared model, parameters that are not given included."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -21,7 +21,10 @@ Declared = tuple[tuple[Effect, Term | None], ...]
 
 
 def best_fit(
-    recordings: list[Recording], joint: Joint, declared: Callable[[Session], Declared]
+    recordings: list[Recording],
+    joint: Joint,
+    declared: Callable[[Session], Declared],
+    without_rules: Collection[str] = (),
 ) -> Fit | None:
     """Fit a declared model to recordings, differentiated in the way that predicts best.
 
@@ -33,6 +36,8 @@ def best_fit(
         Gear ratio and pole pairs, where known.
     declared : callable
         Gives the model on a session.
+    without_rules : collection of str
+        Rules to switch off: "windows".
 
     Returns
     -------
@@ -51,7 +56,7 @@ def best_fit(
         return float(fit.sums.held_out()[parts.judged].sum()) / max(samples, 1), fit
 
     error, best = fitted(track)
-    for smoothing in smoothings(recordings):
+    for smoothing in () if "windows" in without_rules else smoothings(recordings):
         other = build_track(recordings, joint, smoothing)
         # All are judged where the first one takes nothing from the acceleration.
         same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}

@@ -13,6 +13,9 @@ COARSE_REPEAT_ERROR = 0.3
 MOST_DIPS = 30
 SEALED_SHARE = 0.27
 BLOCKS_WITHOUT_CYCLES = 12
+SEALED_BLOCKS = (2, 5, 9)
+"""Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
+run three times, every fourth block is the same motion, which nothing open would have shown."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
 FEWEST_FIT_GROUPS = 4
@@ -124,7 +127,7 @@ def group_samples(
     Grouping or None
         None where too little moves to seal anything off. With cycles, the last 27 % of them are
         sealed (of each recording that holds four or more, else of all); a motion that does not
-        repeat is cut into blocks of equal moving time, of which every fourth is sealed, since the
+        repeat is cut into blocks of equal moving time, of which a quarter is sealed, since the
         end of a single stroke would be a place that the fit has never seen.
     """
     group = np.full(moving.size, -1, dtype=np.int64)
@@ -185,4 +188,4 @@ def _blocks(
     for i, chunk in enumerate(chunks):
         group[chunk[0] : chunk[-1] + 1] = i
     names = tuple(f"{run_names[0]}:block{i}" for i in range(BLOCKS_WITHOUT_CYCLES))
-    return Grouping(group, names, tuple(range(2, BLOCKS_WITHOUT_CYCLES, 4)), "blocks")
+    return Grouping(group, names, SEALED_BLOCKS, "blocks")

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import t as student
 
-from opamc_cli.joint.model import Fit
 from opamc_cli.joint.least_squares import SINGULAR_BELOW, eigenvectors
+from opamc_cli.joint.model import Fit
 from opamc_cli.joint.track import Floats
 
 INSEPARABLE = 0.995

@@ -92,7 +92,10 @@ def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
     if any(recording.position_rad is None for recording in recordings):
         return []
     speeds = all(recording.velocity_rad_s is not None for recording in recordings)
-    windows = {max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window for window in WINDOWS_S}
+    windows = {
+        max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window
+        for window in WINDOWS_S
+    }
     ways = [False, True] if speeds else [False]
     return [Smoothing(window, way) for window in windows.values() for way in ways]
 

@@ -5,8 +5,9 @@ from scipy.linalg import eigh
 
 from opamc_cli.joint.track import Floats
 
-SINGULAR_BELOW = 1e-9
-"""Of the largest eigenvalue: directions below are rounding."""
+SINGULAR_BELOW = 1e-6
+"""Of the largest eigenvalue: regressors that differ by less than a thousandth of their size are
+not told apart; what noise makes of the difference would be extrapolated."""
 
 
 def solve(gram: Floats, moment: Floats) -> Floats:
@@ -22,7 +23,7 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     Returns
     -------
     array of shape (k,) or (groups, k)
-        Coefficients; directions below 1e-9 of the largest get none.
+        Coefficients; directions below 1e-6 of the largest get none.
     """
     if moment.shape[-1] == 0:
         return moment

@@ -243,6 +243,11 @@ def _opened(
 ) -> Loop:
     found = ceiling(before, explained)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
+    refused: list[Rejected] = []
+    if rmse_after > rmse_before:
+        # As a whole, or not at all: steps are never chosen among by the sealed data.
+        refused = [_refused(step) for step in steps]
+        steps, after, rmse_named, rmse_after = [], before, rmse_before, rmse_before
     reach = rmse_before**2 * found.share
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
     has_name = any(step.named for step in steps)
@@ -263,7 +268,7 @@ def _opened(
         after=after,
         steps=tuple(steps),
         tried=tuple(tried),
-        rejected=_rejected(tried, steps),
+        rejected=(*refused, *_rejected(tried, steps, refused)),
         untestable=untestable(before, library),
         ceiling=found,
         verdict=verdict,
@@ -282,8 +287,16 @@ def _opened(
     )
 
 
-def _rejected(tried: list[tuple[int, Trial]], steps: list[Step]) -> tuple[Rejected, ...]:
-    added = {step.term.effect.name for step in steps}
+def _refused(step: Step) -> Rejected:
+    effect = step.term.effect
+    why = "does not hold on the sealed data"
+    return Rejected(effect.name, effect.domain, step.term.parameters, step.gain, step.p_value, why)
+
+
+def _rejected(
+    tried: list[tuple[int, Trial]], steps: list[Step], refused: list[Rejected]
+) -> tuple[Rejected, ...]:
+    added = {step.term.effect.name for step in steps} | {one.effect for one in refused}
     found: dict[str, Rejected] = {}
     for _, trial in tried:
         effect = trial.term.effect

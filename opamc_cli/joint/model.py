@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.joint.corners import widened
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.groups import Grouping
 from opamc_cli.joint.least_squares import solve
@@ -157,7 +158,7 @@ class Session:
         return self._columns(term, fine or self.coarse is self.fine)
 
     def grid_of(self, fine: bool) -> Grid:
-        """The fine or the coarse grid."""
+        """Return the fine or the coarse grid."""
         return self.fine if fine else self.coarse
 
     def grid(self, fine: bool) -> Grid:
@@ -210,6 +211,11 @@ def _session(
     coarse_track = coarsen(track, factor)
     fine = _grid(track, groups, grouping.sealed)
     coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
+    if coarse is not fine:
+        # The moving average must not carry sealed samples into open ones.
+        sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
+        touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
+        coarse = _grid(replace(coarse_track, moving=coarse_track.moving & ~touched), groups, ())
     return Session(fine, coarse, factor, grouping, groups)
 
 
@@ -249,7 +255,7 @@ class Fit:
     sums: Sums
 
     def coarse_sums(self) -> tuple[Sums, list[Floats]]:
-        """Sums of the slow terms on the coarse grid, and their regressors there.
+        """Sum products of the slow terms on the coarse grid; return their regressors beside them.
 
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
@@ -276,7 +282,7 @@ class Fit:
         return error
 
     def fast_part(self, fine: bool) -> Floats:
-        """Current of the fast terms on one of the grids."""
+        """Compute the current of the fast terms on one of the grids."""
         part = np.zeros(self.session.grid_of(fine).track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:

@@ -131,7 +131,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
-    # What repeats with the motion lifts whole stretches of the spectrum: a line stands out of its own.
+    # What repeats with the motion lifts whole stretches of the spectrum: a line stands out.
     around = uniform_filter1d(power, 2 * SURROUNDINGS * guard + 1, mode="nearest")
     peaks: list[tuple[float, float]] = []
     for weighed in (power.copy(), power / np.maximum(around, 1e-300)):

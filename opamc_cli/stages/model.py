@@ -22,6 +22,7 @@ from opamc_cli.stages.model_tables import (
     CANDIDATES,
     FIT,
     candidate_row,
+    explained_entry,
     extended_model,
     fit_rows,
     fit_summary,
@@ -29,7 +30,6 @@ from opamc_cli.stages.model_tables import (
     residual_table,
     shown_parameters,
     spectrum_table,
-    explained_entry,
 )
 from opamc_cli.stages.parallel import Watch, unwatched
 from opamc_cli.storage.atomic import atomic_path, ensure_directory

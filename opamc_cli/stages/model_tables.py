@@ -149,7 +149,7 @@ def shown_parameters(term: Term) -> dict[str, float]:
 
 
 def explained_entry(start: Chain, explained: Chain) -> dict[str, Any]:
-    """What functions without a name take off the held-out error, and in which domains."""
+    """Say what functions without a name take off the held-out error, and in which domains."""
     share, t_value = explained.gain_over(start)
     return {
         "share": share,

@@ -65,17 +65,15 @@ def moved(motion, rate=250.0, seconds=30.0, seed=40):
         q = sum(a * np.sin(k * w * t + p) for a, k, p in parts)
         v = sum(a * k * w * np.cos(k * w * t + p) for a, k, p in parts)
         return q, v, -sum(a * (k * w) ** 2 * np.sin(k * w * t + p) for a, k, p in parts)
-    # Held between steps of the acceleration, of another size each time.
-    a, v = np.zeros(t.size), np.zeros(t.size)
-    pieces = np.array_split(np.arange(t.size), round(seconds / 0.5))
-    speed = 0.0
-    for piece in pieces:
-        wanted = rng.uniform(0.2, 1.2) * (-1) ** rng.integers(2)
-        a[piece] = (wanted - speed) / 0.5 if speed * wanted >= 0 else -2 * speed
+    # Steps of the acceleration: every speed is reached in a second, or in half of one.
+    step_s, top = (0.5, 1.2) if motion == "hard reversals" else (1.0, 0.6)
+    a, speed = np.zeros(t.size), 0.0
+    for piece in np.array_split(np.arange(t.size), round(seconds / step_s)):
+        wanted = rng.uniform(top / 6, top) * (-1) ** rng.integers(2)
+        a[piece] = (wanted - speed) / step_s
         speed += float(a[piece].sum()) / rate
-    v = np.cumsum(a) / rate
-    v -= np.mean(v)
-    return np.cumsum(v) / rate, v, a
+    v = np.cumsum(a) / rate - a / rate
+    return np.cumsum(v + 0.5 * a / rate) / rate - (v[0] + 0.5 * a[0] / rate) / rate, v, a
 
 
 def joint_of(motion, effect, strength=15.0, noise_a=0.02, **options):

@@ -7,7 +7,6 @@ anything was run on it.
 
 import pytest
 from testbed_closing import (
-    EFFECTS,
     SENSING,
     close_on_testbed,
     declared_on_testbed,

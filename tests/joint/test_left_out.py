@@ -85,7 +85,7 @@ def test_leaving_units_out_equals_refitting(seed, width, units):
 @settings(max_examples=30, deadline=None)
 @given(*SIZES)
 def test_collinear_columns_and_empty_ones_change_no_error(seed, width, units):
-    rng, parts, columns, signal = drawn(seed, width, units)
+    _, parts, columns, signal = drawn(seed, width, units)
     twice = np.concatenate([columns, 3 * columns[:, :1], np.zeros_like(columns[:, :1])], axis=1)
     fast = sums_of(twice, signal, parts).held_out()
     np.testing.assert_allclose(fast, slow_held_out(columns, signal, parts), rtol=1e-5, atol=1e-9)

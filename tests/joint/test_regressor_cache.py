@@ -51,7 +51,10 @@ def test_sums_are_right_after_anything_was_forgotten(monkeypatch, most_bytes):
 def test_after_clearing_everything_is_computed_again():
     rng = np.random.default_rng(3)
     parts = random_parts(rng, 8)
-    block, current = rng.normal(size=(parts.rows.max() + 1, 2)), rng.normal(size=parts.rows.max() + 1)
+    block, current = (
+        rng.normal(size=(parts.rows.max() + 1, 2)),
+        rng.normal(size=parts.rows.max() + 1),
+    )
     cache = RegressorCache()
     check(cache.sums([block], current, parts, True), [block], current, parts)
     cache.clear()

@@ -7,8 +7,8 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.model import Term
 from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.model import Term
 from opamc_cli.joint.recordings import grouped_track, is_moving
 from opamc_cli.joint.track import Bools, Floats, Joint, Track, averaged, block_mean, coarsen
 

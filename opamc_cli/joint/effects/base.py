@@ -46,23 +46,10 @@ class Effect:
     """Parameters that the data decide."""
     forms: tuple[str, ...] = ()
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
-    open_limits: tuple[str, ...] = ()
-    """Parameters whose limits only bound the search: beyond them the effect is still itself."""
-    firm_limits: tuple[str, ...] = ()
-    """Parameters at whose limits the effect is none, however well it fits there."""
-    free_refinement: bool = True
-    """True where the number of guesses counts the choice; False where refining the best one
-    chooses among many more, and its parameters count as coefficients do."""
     flags_choose_columns: bool = False
     """True where parameters say which columns `columns` returns."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
-    dense_guesses: bool = False
-    """True where no guess explains anything only if nothing near it does: a step in time, say,
-    hides between two guesses. A search does not refine what begins as nothing."""
-    same_for_all: bool = False
-    """True where the effect does the same to every fitted regressor: its one column is the sum of
-    its `parts`, and fitted one by one they must agree."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
@@ -91,16 +78,6 @@ class Effect:
         """
         return [{}]
 
-    def choices(self, track: Track) -> float:
-        """Count what each guess was chosen from, where the residual says where to guess.
-
-        Parameters
-        ----------
-        track : Track
-            As for the guesses.
-        """
-        return 1.0
-
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Bounds of the non-linear parameters that may be refined."""
         return {}
@@ -126,25 +103,9 @@ class Effect:
         """Regressors, shape (n, m), for given non-linear parameters."""
         raise NotImplementedError
 
-    def parts(self, track: Track, parameters: Parameters) -> Floats:
-        """Split what `same_for_all` does by fitted regressors, shape (n, k)."""
-        raise NotImplementedError
-
-    def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
-        """Regressors after the fitted model has changed, from those before; `columns` in short."""
-        return self.columns(track, parameters)
-
-    def in_one_group(self, track: Track, parameters: Parameters) -> bool:
-        """Tell whether one group alone knows of the effect, and is to be left out by halves."""
-        return False
-
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""
         return []
-
-    def simpler(self, parameters: Parameters) -> "Effect | None":
-        """Give the same effect with fewer freedoms, in case that these fit what does not repeat."""
-        return None
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Tell whether coefficients have the sign that physics gives this effect."""
@@ -152,10 +113,6 @@ class Effect:
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Parameters moved to a value with a meaning where the data cannot tell the difference."""
-        return parameters
-
-    def rescaled(self, parameters: Parameters, coefficients: Floats) -> Parameters:
-        """Parameters that do with coefficients of 1 what these do with others, where they can."""
         return parameters
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:

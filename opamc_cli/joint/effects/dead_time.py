@@ -20,7 +20,6 @@ class DeadTime(Effect):
     meaning = "dead time of the inverter is not compensated: check the drive's setting"
     needs = ("electrical",)
     fast = True
-    electrical_order = 6
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try the six-step wave itself, and its first harmonic as the current loop leaves it."""

@@ -22,11 +22,7 @@ class Elasticity(Effect):
     searches = ("resonance_hz", "damping")
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
     needs = ("position", "logged")
-    dense_guesses = True
     from_motion = True
-    free_refinement = False
-    # What hardly rings follows every error of the acceleration.
-    firm_limits = ("damping",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz up, three dampings."""

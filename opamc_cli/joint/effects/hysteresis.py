@@ -19,7 +19,6 @@ class Hysteresis(Effect):
     searches = ("length_rad",)
     meaning = "torque lags behind after reversals: check gear preload and backlash"
     needs = ("position",)
-    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

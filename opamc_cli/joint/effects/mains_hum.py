@@ -51,7 +51,6 @@ class MainsHum(Effect):
     origin = "measurement"
     searches = ("frequency_hz",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"
-    dense_guesses = True
     from_motion = True
     fast = True
     several = True
@@ -74,12 +73,6 @@ class MainsHum(Effect):
         return [
             {"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found[:2]
         ]
-
-    def choices(self, track: Track) -> float:
-        """Count the lines that the session's length can tell apart within the tolerance."""
-        resolution_hz = 1.0 / max(float(np.ptp(track.time_s)), 1e-9)
-        widths = [2 * _reach_hz(line) / resolution_hz for line in _mains_lines(track.rate_hz)]
-        return max(0.5 * sum(max(width, 1.0) for width in widths), 1.0)
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
         """Half of what two frequencies have to differ by."""

@@ -24,8 +24,6 @@ class PayloadChange(Effect):
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
-    free_refinement = False
-    open_limits = ("since_s",)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
@@ -58,16 +56,6 @@ class PayloadChange(Effect):
             return parameters
         widest = first + int(np.argmax(np.diff(times[first : last + 1])))
         return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
-
-    def in_one_group(self, track: Track, parameters: Parameters) -> bool:
-        """Whether what is open after the step, or before it, lies in one group, nearly all."""
-        rows = track.open_samples
-        if rows is None:
-            return False
-        after = track.time_s[rows] >= parameters["since_s"]
-        groups = track.group[rows]
-        counts = [np.bincount(groups[side], minlength=1) for side in (after, ~after)]
-        return any(bool(count.max() >= MOSTLY * count.sum()) for count in counts)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""

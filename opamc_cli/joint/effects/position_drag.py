@@ -14,10 +14,7 @@ class PositionDrag(Effect):
     searches = ("place_rad", "width_rad", "flatness")
     meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)
-    dense_guesses = True
     from_motion = True
-    free_refinement = False
-    open_limits = ("place_rad", "flatness")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Places over the whole travel, widths from a sixtieth to a fifth of it."""

@@ -22,13 +22,13 @@ velocity loop answers as if nothing moved; and the highest one as a share of the
 FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 """From which power of a line on, in units of white noise's: each of their columns must earn its
 keep. Every other filter, and every fourth, are the smaller forms."""
-SIDE_RESOLUTIONS = 3.0
-"""A resonance of the drive moves the strongest line so far from the order that it comes from."""
 LOWEST_ANSWERED = 2.0
 """Times the lowest order of all: what is slower than that, filtered, looks like friction."""
 MOST_ANSWERED = 90_000
 """Above so many moving samples lines are left plain: a hundred regressors of a recording of ten
 minutes would take gigabytes and minutes."""
+MOST_EXPANDED = 2
+"""Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
 
@@ -44,10 +44,6 @@ class Ripple(Effect):
     own. Beside that, a damaged mesh follows the sign of the load, and one that turns unevenly the
     current itself.
 
-    Parameters
-    ----------
-    densest : float
-        Filters per octave that an answer may have.
     """
 
     name = "ripple"
@@ -55,24 +51,22 @@ class Ripple(Effect):
     searches = ("order",)
     meaning = "torque ripple"
     needs = ("position",)
-    free_refinement = False
     fast = True
     several = True
     flags_choose_columns = True
     forms = (*SWITCHES, "answer", "top_hz")
 
-    def __init__(self, densest: float = math.inf) -> None:
-        self.densest = densest
-
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest orders of the whitened residual, with every dependence."""
         found: list[Parameters] = []
-        for order, power in order_lines(track, residual, count=2):
+        lines = order_lines(track, residual, count=2)
+        strongest = sorted(lines, key=lambda line: -line[1])[:MOST_EXPANDED]
+        for order, power in lines:
             plain = {"order": order, **dict.fromkeys(SWITCHES, 1.0)}
-            if density := self._density(track, order, power):
-                answered = plain | {"answer": density, "top_hz": _top_hz(track, order)}
-                del answered["speed"]
-                found += [answered | {"order": one} for one in (order, *_meant(track, order))]
+            density = self._density(track, order, power) if (order, power) in strongest else 0.0
+            if density:
+                answered = {"order": order, "direction": 1.0, "answer": density}
+                found.append(answered | {"top_hz": _top_hz(track, order)})
             found.append(plain)
         return found
 
@@ -83,8 +77,7 @@ class Ripple(Effect):
             return 0.0
         if np.count_nonzero(track.moving) > MOST_ANSWERED:
             return 0.0
-        density = next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
-        return min(density, self.densest)
+        return next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anything above joint-angle orders."""
@@ -112,13 +105,6 @@ class Ripple(Effect):
             pairs += [track.direction * column for column in (*waves, *answers)]
         return stack(*pairs, *_following_model(waves, track, parameters))
 
-    def updated(self, columns: Floats, track: Track, parameters: Parameters) -> Floats:
-        """Only the last pairs follow the model, and they are the first one times it."""
-        changed = _following_model([columns[:, 0], columns[:, 1]], track, parameters)
-        if not changed:
-            return columns
-        return np.concatenate([columns[:, : -len(changed)], stack(*changed)], axis=1)
-
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Without the dependences that the data do not ask for."""
         switches = [name for name in SWITCHES if parameters.get(name)]
@@ -135,11 +121,6 @@ class Ripple(Effect):
                 if form != parameters:
                     smaller.append((form, _kept(parameters, form)))
         return smaller
-
-    def simpler(self, parameters: Parameters) -> Effect | None:
-        """Answer through half as many filters, and at last through none."""
-        density = parameters.get("answer", 0.0)
-        return Ripple(density / 2 if density > COARSEST else 0.0) if density else None
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
@@ -223,13 +204,6 @@ def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
         for kept in columns
     ]
     return tuple(place for place, kept in enumerate(flags) if kept)
-
-
-def _meant(track: Track, order: float) -> list[float]:
-    """Orders with a meaning from which a resonance may have moved the strongest line."""
-    resolution = order_resolution(track)
-    named = {float(one) for one in named_orders(track, order)}
-    return [one for one in sorted(named) if 0.25 < abs(one - order) / resolution < SIDE_RESOLUTIONS]
 
 
 def _top_hz(track: Track, order: float) -> float:

@@ -15,7 +15,6 @@ class SensorGain(Effect):
     meaning = "gain error of a phase current sensor: recalibrate it"
     needs = ("electrical",)
     fast = True
-    electrical_order = 2
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Twice the electrical angle, times the model's current."""

@@ -16,7 +16,6 @@ class SensorOffset(Effect):
     needs = ("electrical",)
     from_motion = True
     fast = True
-    electrical_order = 1
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Sine and cosine of the electrical angle."""

@@ -19,7 +19,6 @@ class Stribeck(Effect):
     searches = ("stribeck_speed",)
     meaning = "mixed lubrication at low speed: check the grease film"
     needs = ("position",)
-    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -14,7 +14,6 @@ class SublinearFriction(Effect):
     searches = ("exponent",)
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     needs = ("position",)
-    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -18,7 +18,6 @@ class ThermalViscous(Effect):
     searches = ("rate_per_c",)
     meaning = "grease is stiffer when cold: not a fault"
     needs = ("position", "temperature")
-    dense_guesses = True
     from_motion = True
 
     def untestable(self, track: Track) -> str | None:

@@ -21,8 +21,6 @@ class TimeDelay(Effect):
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False
-    same_for_all = True
-    dense_guesses = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """From half a millisecond to 64 ms either way, filters to 8 ms.
@@ -71,14 +69,6 @@ class TimeDelay(Effect):
         that goes with it: hence the wide margin.
         """
         return bool(0.6 < coefficients[0] < 1.7)
-
-    def rescaled(self, parameters: Parameters, coefficients: Floats) -> Parameters:
-        """Lengthen the delay where more than a whole shift is asked for.
-
-        Short delays differ by their size alone. Less than a whole shift is another matter: then
-        something of the current is not delayed.
-        """
-        return parameters | {"delay_s": parameters["delay_s"] * max(float(coefficients[0]), 1.0)}
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Name the filter, where it is one."""

@@ -16,7 +16,6 @@ class Warmup(Effect):
     searches = ("time_constant_s",)
     meaning = "friction falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
-    dense_guesses = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -10,7 +10,6 @@ from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
 from opamc_cli.joint.model import Fit
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Pool, beam
-from opamc_cli.joint.parts import PARTS_PER_UNIT
 from opamc_cli.joint.track import Floats
 
 LEAST_SHARE = 0.02

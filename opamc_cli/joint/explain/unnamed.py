@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.signal import lfilter
 
-from opamc_cli.joint.effects.base import CHANNEL_REASONS, Effect, Parameters, geometric, stack
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.second_order import at_rest, discrete
-from opamc_cli.joint.track import Floats, Track, block_mean
+from opamc_cli.joint.track import Bools, Floats, Track, block_mean
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""
@@ -40,7 +40,9 @@ class Smooth(Effect):
         self.name = f"unnamed_{name}"
         self.domain = domain
         self.needs = needs
-        self.meaning = f"a function of {name.replace('_', ' ')}; no effect of the library has its form"
+        self.meaning = (
+            f"a function of {name.replace('_', ' ')}; no effect of the library has its form"
+        )
         self.from_motion = not follows_model
         self.changes_in_time = domain in ("time", "temperature") or name.startswith("time")
         self._covariate = covariate
@@ -69,7 +71,7 @@ class Response(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Filters per decade."""
+        """Try three, six and twelve filters."""
         return [{"filters": count} for count in (3.0, 6.0, 12.0)]
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
@@ -108,7 +110,7 @@ class Shift(Effect):
         return stack(first, np.gradient(first))
 
 
-def stretched(values: Floats, members: Floats) -> Floats:
+def stretched(values: Floats, members: Bools) -> Floats:
     """Put a covariate on 0..1, half-way between its value and its rank among some samples."""
     known = values[members]
     if not known.size:
@@ -165,13 +167,7 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),
     Smooth("time_and_speed", "time", lambda t: t.time_s, _friction, needs=("position", "revisits")),
     Smooth("time_and_load", "load", lambda t: t.time_s, _load, needs=("scale", "revisits")),
-    Smooth("temperature", "temperature", _temperature, _friction, needs=("position", "temperature")),
+    Smooth(
+        "temperature", "temperature", _temperature, _friction, needs=("position", "temperature")
+    ),
 )
-
-
-def missing_channel(effect: Effect, track: Track) -> str | None:
-    """Why a track cannot show an effect, or None."""
-    for channel in effect.needs:
-        if channel not in track.channels:
-            return CHANNEL_REASONS.get(channel, f"no {channel}")
-    return None

@@ -1,1 +1,1 @@
-"""Name what the residual holds: a beam of chains, each scored by what it predicts of held-out data."""
+"""Name what the residual holds: a beam of chains, scored by what they predict of held-out data."""

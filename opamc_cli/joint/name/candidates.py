@@ -6,10 +6,10 @@ from functools import cached_property
 
 import numpy as np
 
+from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.model import Session, Term
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.price import price_of
-from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.parts import Parts, Sums
 from opamc_cli.joint.track import Floats
 
@@ -201,4 +201,3 @@ class Beside:
         units = np.zeros((self.parts.units, *parts.shape[1:]))
         np.add.at(units, self.parts.unit, parts)
         return self.parts.elsewhere(units)
-

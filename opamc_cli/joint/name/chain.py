@@ -10,7 +10,6 @@ from opamc_cli.joint.name.price import price_of
 from opamc_cli.joint.parts import Sums
 from opamc_cli.joint.track import Bools, Floats
 
-
 Signature = frozenset[tuple[object, ...]]
 
 

@@ -1,4 +1,4 @@
-"""How much of what can be explained in an effect's domain its form holds, and the curve beside it."""
+"""How much of its domain's curve an effect's form holds, and the curve beside it."""
 
 from dataclasses import dataclass, replace
 
@@ -10,8 +10,8 @@ from opamc_cli.joint.name.search import LEAST_T, Pool, trials
 from opamc_cli.joint.track import Floats, Track
 
 EXACT, APPROXIMATE = 0.9, 0.5
-"""Shares of its domain's curve that a form holds: from the first on it has the name, from the second
-on approximately; below, the curve has none."""
+"""Shares of its domain's curve that a form holds: from the first on it has the name, from the
+second on approximately; below, the curve has none."""
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 

@@ -4,7 +4,7 @@ from opamc_cli.joint.model import Term
 
 PRICE = 0.02
 """Logarithm of the held-out mean square error per degree of freedom: 2 % of the error."""
-MOST_CHARGED = 8
+MOST_CHARGED = 16
 """Coefficients of one effect that are charged: of a drive's answer in thirty, the held-out error
 itself charges for those that are of no use."""
 

@@ -48,10 +48,18 @@ def refined(session: Session, term: Term, beside: Beside) -> Term:
         trial = Term(term.effect, outwards(np.atleast_1d(values)), term.keep)
         return -beside.fitted_drop(beside.parts.taken(session.computed(trial, beside.fine)))
 
-    start = np.array([np.log(max(term.parameters[n], limits[n][0])) if log else term.parameters[n]
-                      for n, log in zip(names, logs, strict=True)])
-    step = np.array([np.log1p(steps[n] / max(term.parameters[n], limits[n][0])) if log else steps[n]
-                     for n, log in zip(names, logs, strict=True)])
+    start = np.array(
+        [
+            np.log(max(term.parameters[n], limits[n][0])) if log else term.parameters[n]
+            for n, log in zip(names, logs, strict=True)
+        ]
+    )
+    step = np.array(
+        [
+            np.log1p(steps[n] / max(term.parameters[n], limits[n][0])) if log else steps[n]
+            for n, log in zip(names, logs, strict=True)
+        ]
+    )
     best = _one(lost, start, step) if len(names) == 1 else _several(lost, start, step)
     if lost(best) > lost(start):
         return term
@@ -61,12 +69,16 @@ def refined(session: Session, term: Term, beside: Beside) -> Term:
 
 def _one(lost: Callable[[Floats], float], start: Floats, step: Floats) -> Floats:
     bounds = (float(start[0] - step[0]), float(start[0] + step[0]))
-    found = minimize_scalar(lost, bounds=bounds, method="bounded", options={"maxiter": TRIALS_OF_ONE})
+    found = minimize_scalar(
+        lost, bounds=bounds, method="bounded", options={"maxiter": TRIALS_OF_ONE}
+    )
     return np.atleast_1d(found.x)
 
 
 def _several(lost: Callable[[Floats], float], start: Floats, step: Floats) -> Floats:
-    simplex = np.vstack([start, *(start + 0.5 * step[i] * np.eye(start.size)[i] for i in range(start.size))])
+    simplex = np.vstack(
+        [start, *(start + 0.5 * step[i] * np.eye(start.size)[i] for i in range(start.size))]
+    )
     options = {"maxfev": TRIALS_OF_MORE, "initial_simplex": simplex}
     found: Floats = minimize(lost, start, method="Nelder-Mead", options=options).x
     return found

@@ -174,7 +174,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
 
 
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
-    """Fit the most promising candidates of a chain jointly, and say of each whether it may be added.
+    """Fit the most promising candidates of a chain, and say of each whether it may be added.
 
     Parameters
     ----------
@@ -239,13 +239,9 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
         ]
         if not following:
             break
-        chains = sorted(following, key=lambda chain: _score(chain, pool))[:width]
+        chains = sorted(following, key=lambda chain: chain.score)[:width]
         reached += chains
-    return min(reached, key=lambda chain: _score(chain, pool))
-
-
-def _score(chain: Chain, pool: Pool) -> float:
-    return chain.score - (chain.price if "price" in pool.without else 0.0)
+    return min(reached, key=lambda chain: chain.score)
 
 
 def paired(before: Floats, after: Floats) -> tuple[float, float]:

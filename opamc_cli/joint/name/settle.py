@@ -1,4 +1,4 @@
-"""What a chain keeps when each effect is asked again, beside all the others; and what ties with it."""
+"""What a chain keeps when each effect is asked again beside the others; what ties with it."""
 
 from dataclasses import dataclass, replace
 
@@ -76,16 +76,19 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
 def _asked_again(
     best: Chain, place: int, pool: Pool, unnamed: Pool
 ) -> tuple[Chain | None, list[Named]]:
-    """A better chain without, or with another effect in the place of one; else the effect's ties."""
+    """Return a better chain without one effect, or with another in its place; else its ties."""
     term = best.terms[place]
     parent = without(best, place)
     if parent.score <= best.score:
         return parent, []
     if term.effect.unnamed:
         return None, []
-    if "unnamed" not in pool.without and not term.effect.fast:
+    trial = _trial(parent, best, term, pool)
+    if trial.why_not is not None:
+        return parent, []
+    if "unnamed" not in pool.without:
         for rival in trials(parent, _slow(unnamed)):
-            if rival.why_not is None and _clearly_better(rival.chain, best):
+            if rival.why_not is None and _takes_the_name(rival.chain, best, term):
                 return rival.chain, []
     others = trials(parent, pool)
     for other in others:
@@ -98,7 +101,6 @@ def _asked_again(
         if other.why_not is None and difference <= LEAST_T * error:
             ties.append(other.term.effect.name)
     names = tuple(name for name in dict.fromkeys(ties) if name != term.effect.name)
-    trial = _trial(parent, best, term, pool)
     return None, [Named(trial, tuple(others), names)]
 
 
@@ -107,8 +109,14 @@ def _slow(pool: Pool) -> Pool:
     return replace(pool, library=slow)
 
 
-def _clearly_better(rival: Chain, best: Chain) -> bool:
+def _takes_the_name(rival: Chain, best: Chain, term: Term) -> bool:
+    """Whether a smooth function without a name stands in the place of an effect.
+
+    Where a smooth function does as well as a line, it is no line.
+    """
     difference, error = paired(rival.error, best.error)
+    if term.effect.fast:
+        return rival.score < best.score + CLEARLY and difference > -LEAST_T * error
     if rival.score >= best.score - CLEARLY or difference <= LEAST_T * error:
         return False
     # What follows slow noise is no better form of an effect.
@@ -117,7 +125,7 @@ def _clearly_better(rival: Chain, best: Chain) -> bool:
 
 
 def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:
-    """The effect as the last one added: the same chain with its terms in another order."""
+    """Judge an effect as if it were added last: the same chain in another order."""
     chain = extended(parent, term)
     gain, t_value = chain.gain_over(parent)
     return Trial(parent, chain, gain, t_value, objection(chain, parent, pool))

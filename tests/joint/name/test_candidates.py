@@ -46,7 +46,9 @@ def test_the_drop_of_a_guess_is_that_of_the_chain_with_it(slow_chain, name):
             for place in range(0, len(batch.terms), 7):
                 longer = extended(slow_chain, batch.terms[place])
                 slow = float((slow_chain.error - longer.error).sum())
-                assert drops[place] == pytest.approx(slow, rel=2e-3, abs=1e-4 * slow_chain.error.sum())
+                assert drops[place] == pytest.approx(
+                    slow, rel=2e-3, abs=1e-4 * slow_chain.error.sum()
+                )
 
 
 def slow_drop(chain, columns, fine):

@@ -1,4 +1,4 @@
-"""What a chain keeps when each effect is asked again beside all the others, and what ties with it."""
+"""What a chain keeps when each effect is asked again beside all others, and what ties with it."""
 
 import numpy as np
 from closing import joint_of, plain_fit
