@@ -68,7 +68,7 @@ studies: $(STAMP)  ## The studies behind the documentation's figures; takes hour
 	$(BIN)/python benchmarks/boundaries.py --write
 	$(BIN)/python benchmarks/decision.py
 	$(BIN)/python benchmarks/loop.py
-	$(BIN)/python benchmarks/other_joints.py
+	$(BIN)/python benchmarks/panel.py
 	$(BIN)/python benchmarks/cause.py --seeds 30 --write
 
 clean:  ## Remove the environment and every output

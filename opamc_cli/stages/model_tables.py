@@ -212,6 +212,11 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "untestable": [{"effect": u.effect, "why": u.why} for u in loop.untestable],
         "verdict": loop.verdict,
         "domain": loop.remaining_domain,
+        "remains": [
+            {"domain": step.term.effect.domain, "gain": step.gain, "t_value": step.t_value}
+            for step in loop.steps
+            if not step.named
+        ],
         "ceiling": {
             "share": loop.ceiling.share,
             "standard_error": loop.ceiling.standard_error,

@@ -69,7 +69,7 @@ def ceiling(before: Fit, explained: Fit) -> Ceiling:
     total = max(float(first.sum()), 1e-300)
     drop = first - last
     spread = float(np.std(drop, ddof=1)) * np.sqrt(drop.size) if drop.size > 1 else 0.0
-    return Ceiling(max(float(drop.sum()) / total, 0.0), spread / total)
+    return Ceiling(max(float(drop.sum()) / total, 0.0), float(spread) / total)
 
 
 def sealed_parts(fit: Fit) -> Floats:

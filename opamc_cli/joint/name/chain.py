@@ -128,5 +128,5 @@ def signature_of(terms: tuple[Term, ...]) -> Signature:
 
 def _gain(before: Floats, after: Floats) -> tuple[float, float]:
     drop = before - after
-    spread = float(np.std(drop, ddof=1)) * np.sqrt(drop.size)
-    return float(drop.sum() / max(before.sum(), 1e-300)), float(drop.sum()) / max(spread, 1e-300)
+    spread = max(float(np.std(drop, ddof=1) * np.sqrt(drop.size)), 1e-300)
+    return float(drop.sum() / max(before.sum(), 1e-300)), float(drop.sum()) / spread
