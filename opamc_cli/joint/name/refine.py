@@ -61,8 +61,7 @@ def refined(session: Session, term: Term, beside: Beside) -> Term:
         ]
     )
     best = _one(lost, start, step) if len(names) == 1 else _several(lost, start, step)
-    if lost(best) > lost(start):
-        return term
+    best = min(best, start, key=lost)
     parameters = term.effect.settled(outwards(best), track)
     return Term(term.effect, parameters, term.keep)
 

@@ -84,7 +84,6 @@ def slow_drop(chain, columns, fine):
 def test_the_drop_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chain, name, fine):
     session = fast_chain.fit.session
     assert session.factor > 1
-    assert 0 < np.count_nonzero(session.parts[0].judged) < session.parts[0].judged.size
     terms = guessed(LIBRARY[name], session)[:: 40 if name == "position_drag" else 9]
     total = float(fast_chain.error.sum())
     for batch in batches_of(session, terms, fine):
