@@ -236,7 +236,7 @@ def _headline(result: dict[str, Any]) -> str:
     before, after = result["before"]["rmse_a"], result["after"]["rmse_a"]
     named = [step for step in result["steps"] if not step["effect"].startswith("unnamed")]
     words = [
-        step["interpretation"].split(":")[0]
+        step["interpretation"].split(":")[0].split(" (")[0]
         + (f" ({step['effect']}, approximately)" if step["approximate"] else f" ({step['effect']})")
         for step in named
     ]
@@ -268,7 +268,7 @@ def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
                 step["effect"] + ties,
                 _parameters(step["parameters"]),
                 f"{step['gain']:.1%}",
-                f"{step['fit_of_name']:.0%}",
+                f"{step['fit_of_name']:.0%}" if step["fit_of_name"] else "–",
                 f"{step['rmse_before_a']:.4g}",
                 f"{step['rmse_after_a']:.4g}",
             )

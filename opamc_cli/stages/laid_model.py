@@ -15,6 +15,7 @@ from opamc_cli.joint.effects.library import (
     effect_named,
     load_user_effects,
 )
+from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.kinematics import Recording
 from opamc_cli.joint.model import Fit, Session
 from opamc_cli.joint.recordings import grouped_track, is_moving
@@ -81,7 +82,9 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
         If the axis does not move, or too little to seal anything off.
     """
     library = library_of(model)
-    declared = tuple((effect_named(library, d.effect), d) for d in model.declared())
+    # A closed model may hold functions without a name; the loop itself adds them only at its end.
+    known = {**unnamed_library(), **library}
+    declared = tuple((effect_named(known, d.effect), d) for d in model.declared())
     recordings = [read_recording(run, axis) for run in runs]
     rates = {recording.rate_hz for recording in recordings}
     if len(rates) > 1:
