@@ -24,7 +24,7 @@ MOST_LINES = 180
 
 def commands(text):
     """Return the `opamc` commands of the README's blocks, as a reader would copy them."""
-    blocks = re.findall(r"```\n(.*?)```", text, re.DOTALL)
+    blocks = re.findall(r"```\w*\n(.*?)```", text, re.DOTALL)
     lines = [
         line.removeprefix("$ ").split("   ")[0] for block in blocks for line in block.split("\n")
     ]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -59,8 +60,8 @@ def check_refusal(ended: Ended, code: ExitCode, *parts: str) -> None:
     assert "a bug" not in sentence
     assert "Traceback" not in ended.err
     assert ended.out == ""
-    # a sentence, not a paragraph
-    assert len(sentence) < 400
+    # a sentence, not a paragraph; how deep a folder lies is not the sentence's fault
+    assert len(re.sub(r"/\S*/", "", sentence)) < 400
 
 
 def check_nothing_half_written(folder: Path) -> None:
@@ -596,7 +597,7 @@ def test_models_of_too_little(opamc, tmp_path, model):
     file = bad_runs.moving_joint(tmp_path / "bad.parquet", n=50)
     ended = opamc("model", "fit", file, "--model", model, "--out", tmp_path / "out")
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, str(file), "50 samples")
-    file = bad_runs.moving_joint(tmp_path / "bad.parquet", n=900)
+    file = bad_runs.moving_joint(tmp_path / "bad.parquet", n=200)
     ended = opamc("model", "close", file, "--model", model, "--out", tmp_path / "out")
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, str(file))
 

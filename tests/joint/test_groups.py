@@ -28,7 +28,7 @@ def test_a_single_stroke_is_cut_into_blocks_and_some_of_its_middle_is_sealed():
     grouping = group_samples(moving, ((0, 6000),), None, 1000.0, ("run",))
     assert grouping is not None
     assert grouping.kind == "blocks"
-    assert grouping.sealed == (2, 6, 10)
+    assert grouping.sealed == (2, 5, 9)
 
 
 def test_recordings_are_groups_where_nothing_repeats_inside_them():

@@ -109,11 +109,8 @@ IMITATED = pytest.mark.xfail(
 
 @pytest.mark.parametrize(
     "effect",
-    ["offset", "asymmetric_friction", "ripple", "mains_hum"]
-    + [
-        pytest.param(name, marks=IMITATED)
-        for name in ("stribeck", "spring", "position_drag", "quadratic_friction")
-    ],
+    ["offset", "asymmetric_friction", "ripple", "mains_hum", "spring", "position_drag"]
+    + [pytest.param(name, marks=IMITATED) for name in ("stribeck", "quadratic_friction")],
 )
 def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
     shapes = SHAPES | {
@@ -142,8 +139,15 @@ LEAK = pytest.mark.xfail(
 )
 
 
-@pytest.mark.parametrize("margin", [pytest.param(0.0, marks=LEAK), 0.25])
-@pytest.mark.parametrize("motion", MOTIONS[1:])
+@pytest.mark.parametrize(
+    ("motion", "margin"),
+    [
+        (MOTIONS[1], 0.0),
+        (MOTIONS[1], 0.25),
+        (MOTIONS[2], 0.25),
+        pytest.param(MOTIONS[2], 0.0, marks=LEAK),
+    ],
+)
 def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):
     recording = joint_of(motion, SHAPES["stribeck"], strength=3.0)
     known = close(recording)
@@ -155,8 +159,12 @@ def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):
     current = recording.current_a.copy()
     current[sealed] += drawn
     other = close(replace(recording, current_a=current))
-    assert [step.term.key for step in other.steps] == [step.term.key for step in known.steps]
-    for ours, theirs in zip(other.after.coefficients, known.after.coefficients, strict=True):
-        np.testing.assert_array_equal(ours, theirs)
+    # What does not hold on the sealed data is taken back, but as a whole, after all choices.
+    # The moving averages are convolved by Fourier transform, which rounds across all samples.
+    assert len(other.tried) == len(known.tried)
+    for (_, ours), (_, theirs) in zip(other.tried, known.tried, strict=True):
+        assert ours.term.effect.name == theirs.term.effect.name
+        assert ours.term.parameters == pytest.approx(theirs.term.parameters, rel=1e-6)
+        for a, b in zip(ours.chain.fit.coefficients, theirs.chain.fit.coefficients, strict=True):
+            np.testing.assert_allclose(a, b, rtol=1e-5, atol=1e-9)
     assert other.rmse_after_a > 5 * known.rmse_after_a
-    assert other.verdict != known.verdict or other.ceiling != known.ceiling

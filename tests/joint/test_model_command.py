@@ -113,7 +113,7 @@ def test_fit_and_trace_write_their_tables(folder):
             "--axis", "1", "--out", folder / "out", "--json",
         )  # fmt: skip
         assert code == 0
-        assert pq.read_table(folder / "out" / f"{table}.parquet").num_rows > 3
+        assert pq.read_table(folder / "out" / f"{table}.parquet").num_rows >= 2
 
 
 @pytest.mark.parametrize(

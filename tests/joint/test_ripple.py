@@ -34,14 +34,6 @@ def test_smaller_forms_keep_the_columns_that_they_compute(track, full):
         np.testing.assert_array_equal(Ripple().columns(track, form), columns[:, keep])
 
 
-@pytest.mark.parametrize("full", [EVERYTHING, ANSWERED])
-def test_only_what_follows_the_model_changes_with_it(track, full):
-    columns = Ripple().columns(track, full)
-    other = track.with_model(track.load_a, np.cos(track.time_s), ())
-    expected = Ripple().columns(other, full)
-    np.testing.assert_allclose(Ripple().updated(columns, other, full), expected, atol=1e-12)
-
-
 def resonant(wave, rate_hz, resonance_hz=12.0, damping=0.2):
     """A velocity loop that overshoots."""
     w = 2 * np.pi * resonance_hz

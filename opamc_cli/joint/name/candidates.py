@@ -163,7 +163,9 @@ class Beside:
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
         width = own.shape[-1]
-        left = left + (RIDGE * energy + 1e-200)[..., None] * np.eye(width)
+        # What nothing outside a unit excites has no coefficient there.
+        floor = RIDGE * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
+        left = left + floor[..., None] * np.eye(width)
         asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, self.alone)
         gamma = np.linalg.solve(left, asked[..., None])[..., 0]
         beta = self.alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)

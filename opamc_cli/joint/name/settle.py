@@ -84,13 +84,14 @@ def _asked_again(
     if term.effect.unnamed:
         return None, []
     trial = _trial(parent, best, term, pool)
+    others = trials(parent, pool)
     if trial.why_not is not None:
-        return parent, []
+        passing = [other.chain for other in others if other.why_not is None]
+        return min(passing, key=lambda chain: chain.score, default=parent), []
     if "unnamed" not in pool.without:
         for rival in trials(parent, _slow(unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, term):
                 return rival.chain, []
-    others = trials(parent, pool)
     for other in others:
         better = other.chain.score < best.score - CLEARLY
         if better and other.why_not is None and "exchange" not in pool.without:
