@@ -15,8 +15,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "joint"))
 from simulator import simulate as simulate_joint
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import simulate as simulate_robot
 

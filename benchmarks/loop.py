@@ -22,11 +22,11 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
-from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.declared import best_fit
 from opamc_cli.joint.loop import Loop, close_loop
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
 
 ROOT = Path(__file__).parents[1]
 BEGIN, END = "<!-- loop: begin -->", "<!-- loop: end -->"

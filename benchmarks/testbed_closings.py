@@ -14,7 +14,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
 from testbed_closing import EFFECTS, SENSING, close_on_testbed, error_on, names_of, record
 
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.motion.track import Floats
 
 
 @dataclass(frozen=True)

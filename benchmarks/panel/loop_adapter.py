@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import Any
 
-from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.declared import best_fit
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
 from panel.case import Logged
 
 

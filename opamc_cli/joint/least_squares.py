@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.linalg import eigh
 
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.motion.track import Floats
 
 SINGULAR_BELOW = 1e-6
 """Of the largest eigenvalue: regressors that differ by less than a thousandth of their size are

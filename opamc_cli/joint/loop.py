@@ -7,15 +7,15 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.experiments import separating_experiment
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
-from opamc_cli.joint.model import Fit, Term
+from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.decoy import decoy_gain
+from opamc_cli.joint.name.experiments import separating_experiment
 from opamc_cli.joint.name.form import APPROXIMATE, EXACT, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import Pool, Trial, beam, trials
 from opamc_cli.joint.name.settle import Named, settled
-from opamc_cli.joint.spectra import highest_order, order_resolution
+from opamc_cli.joint.noise.spectra import highest_order, order_resolution
 
 CLOSED_SHARE = 0.9
 """Of the ceiling that has to be reached."""

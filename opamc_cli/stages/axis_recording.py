@@ -8,7 +8,7 @@ from datetime import datetime
 import numpy as np
 
 from opamc_cli.errors import InputError
-from opamc_cli.joint.kinematics import Recording, speed_ratio
+from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
 from opamc_cli.signal.reported import lacks_sign, signed_by_speed, velocity_from_position
 from opamc_cli.storage.runs import Array, Run
 

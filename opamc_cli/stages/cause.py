@@ -9,8 +9,8 @@ import pyarrow as pa
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Cause, Change, explain_change
-from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.axis_recording import interpolated, read_recording
 from opamc_cli.storage.sources import RunSource
 

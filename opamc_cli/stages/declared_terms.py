@@ -7,8 +7,8 @@ import numpy as np
 from opamc_cli.config.joint_model import DeclaredEffect
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.track import Track
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import Track
 
 
 def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Term | None:

@@ -7,7 +7,6 @@ import numpy as np
 
 from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
-from opamc_cli.joint.declared import Declared, best_fit
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import (
     Library,
@@ -16,10 +15,11 @@ from opamc_cli.joint.effects.library import (
     load_user_effects,
 )
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.model import Fit, Session
-from opamc_cli.joint.recordings import grouped_track, is_moving
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.fit.declared import Declared, best_fit
+from opamc_cli.joint.fit.model import Fit, Session
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.axis_recording import read_recording
 from opamc_cli.stages.declared_terms import declared_term
 from opamc_cli.storage.runs import Run

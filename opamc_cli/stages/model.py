@@ -12,7 +12,7 @@ import yaml
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library
-from opamc_cli.joint.intervals import certainty
+from opamc_cli.joint.fit.intervals import certainty
 from opamc_cli.joint.loop import close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials

@@ -7,13 +7,13 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
-from opamc_cli.joint.intervals import Certainty
+from opamc_cli.joint.fit.intervals import Certainty
+from opamc_cli.joint.fit.model import Fit, Session, Term
 from opamc_cli.joint.loop import Loop, Step
-from opamc_cli.joint.model import Fit, Session, Term
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Trial
-from opamc_cli.joint.spectra import order_spectrum
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.noise.spectra import order_spectrum
 from opamc_cli.stages.laid_model import AxisModel
 
 MOST_RESIDUALS = 20_000

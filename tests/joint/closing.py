@@ -3,13 +3,13 @@
 import numpy as np
 from simulator import DECLARED, simulate
 
-from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.fit.model import Term, fit_terms, open_session
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.model import Term, fit_terms, open_session
-from opamc_cli.joint.recordings import grouped_track
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import grouped_track
+from opamc_cli.joint.motion.track import Joint
 
 
 def close_on(seed, effects, ratio=0.8, without=(), **options):

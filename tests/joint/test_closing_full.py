@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.testbed.robot import simulate
 
 AXIS, RATE_HZ, SEED = 3, 2048.0, 1

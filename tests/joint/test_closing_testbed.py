@@ -15,7 +15,7 @@ from testbed_closing import (
 )
 
 from opamc_cli.joint.loop import Loop
-from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.joint.motion.track import Floats, Joint
 
 SEED = 100
 

@@ -13,12 +13,12 @@ from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
 from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.effects.second_order import discrete
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
-from opamc_cli.joint.kinematics import Recording, build_track
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.second_order import discrete
-from opamc_cli.joint.spectra import order_lines
-from opamc_cli.joint.track import Joint, averaged, block_mean, coarsen
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.kinematics import Recording, build_track
+from opamc_cli.joint.motion.track import Joint, averaged, block_mean, coarsen
+from opamc_cli.joint.noise.spectra import order_lines
 
 VOCABULARY = [
     "inertia",

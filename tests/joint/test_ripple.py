@@ -9,9 +9,9 @@ from scipy.signal import bilinear, lfilter
 from simulator import simulate
 
 from opamc_cli.joint.effects.ripple import Ripple
-from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.recordings import build_track
-from opamc_cli.joint.track import Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import build_track
+from opamc_cli.joint.motion.track import Joint
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
 ANSWERED = EVERYTHING | {"answer": 2.0, "top_hz": 60.0}

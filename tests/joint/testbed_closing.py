@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.joint.declared import best_fit
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop, close_loop
-from opamc_cli.joint.model import Fit
-from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Floats, Joint
 from opamc_cli.testbed.parameters import Effect
 from opamc_cli.testbed.robot import AxisRecording, simulate
 

@@ -13,8 +13,8 @@ from opamc_cli.joint.change.slow import Population, learn
 from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
-from opamc_cli.joint.kinematics import Recording
-from opamc_cli.joint.track import Floats, Joint
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Floats, Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 

@@ -10,10 +10,10 @@ from scipy.ndimage import uniform_filter1d
 from opamc_cli.joint.change.moderated import moderated_t
 from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.spectra import LOWEST_ORDER, highest_order
-from opamc_cli.joint.track import Bools, Floats, Track
-from opamc_cli.joint.whitening import autoregression, settled, whitened
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import Bools, Floats, Track
+from opamc_cli.joint.noise.spectra import LOWEST_ORDER, highest_order
+from opamc_cli.joint.noise.whitening import autoregression, settled, whitened
 
 OVERSAMPLING = 4
 MOST_BINS = 2**19

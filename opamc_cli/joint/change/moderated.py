@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.motion.track import Floats
 
 PRIOR_WEIGHT = 4.0
 """Degrees of freedom that the borrowed variance is worth."""

@@ -13,7 +13,7 @@ from opamc_cli.joint.change.lines import (
 )
 from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
 from opamc_cli.joint.change.units import Unit
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.motion.track import Floats
 
 STANDING = 0.7
 """A ripple that is turned back to the phases' frame keeps half of its line there at most; what one

@@ -9,7 +9,7 @@ from opamc_cli.joint.change.lines import Line
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.mains_hum import MAINS_HZ, MainsHum
 from opamc_cli.joint.effects.ripple import read_order
-from opamc_cli.joint.track import Track
+from opamc_cli.joint.motion.track import Track
 
 HARMONICS = 12
 SHORTEST_COMB = 3

@@ -15,8 +15,8 @@ from opamc_cli.joint.change.slow import (
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import Floats
 
 NO_CAUSE_OF_CHANGE = frozenset(
     {"inertia", "gravity", "elasticity", "time_delay", "thermal_viscous", "warmup", "stribeck"}

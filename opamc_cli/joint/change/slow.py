@@ -13,8 +13,8 @@ import numpy as np
 from opamc_cli.joint.change.moderated import moderated_covariance, shift_p
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import Floats
 
 LOAD_SPREAD, FRICTION_SPREAD, COMMON_SPREAD = 0.02, 0.05, 0.005
 """What is expected of healthy sessions: the load's coefficients differ by 2 % of themselves

@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.kinematics import Recording
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.model import Term
-from opamc_cli.joint.recordings import grouped_track, is_moving
-from opamc_cli.joint.track import Bools, Floats, Joint, Track, averaged, block_mean, coarsen
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, averaged, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 FEWEST_SAMPLES = 10

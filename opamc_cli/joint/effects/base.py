@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Track
 
 Parameters = dict[str, float]
 

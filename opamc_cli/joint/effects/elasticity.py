@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric
-from opamc_cli.joint.second_order import discrete
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.effects.second_order import discrete
+from opamc_cli.joint.motion.track import Floats, Track
 
 
 class Elasticity(Effect):

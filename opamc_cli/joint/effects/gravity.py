@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Track
 
 TRAVELS_RAD = (0.3, 0.8, 1.4, 2.0, 2.8, 3.8, 5.0, 6.3)
 SHORTEST_TRAVEL_RAD = 0.1

@@ -1,7 +1,7 @@
 """Torque that accelerates rotor and links."""
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Track
 
 
 class Inertia(Effect):

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.second_order import at_rest, discrete
-from opamc_cli.joint.spectra import LOWEST_ORDER, order_lines, order_resolution
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.effects.second_order import at_rest, discrete
+from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.noise.spectra import LOWEST_ORDER, order_lines, order_resolution
 
 SWITCHES = ("speed", "direction", "load", "current")
 DAMPING = 0.4

@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Track
 
 
 class SensorGain(Effect):

@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.track import Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3

@@ -7,10 +7,10 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.lines import AngleLine, Tone
 from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
-from opamc_cli.joint.model import Fit
+from opamc_cli.joint.fit.model import Fit
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Pool, beam
-from opamc_cli.joint.track import Floats
 
 LEAST_SHARE = 0.02
 """Of the held-out error: without a name, less than half of what a name has to take away counts."""

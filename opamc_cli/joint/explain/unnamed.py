@@ -6,8 +6,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.second_order import at_rest, discrete
-from opamc_cli.joint.track import Bools, Floats, Track, block_mean
+from opamc_cli.joint.effects.second_order import at_rest, discrete
+from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""

@@ -6,12 +6,11 @@ from functools import cached_property
 
 import numpy as np
 
+from opamc_cli.joint.fit.model import Session, Term
+from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.least_squares import inverse
-from opamc_cli.joint.model import Session, Term
-from opamc_cli.joint.name.chain import Chain
-from opamc_cli.joint.name.price import price_of
-from opamc_cli.joint.parts import Parts, Sums
-from opamc_cli.joint.track import Floats
+from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.name.chain import Chain, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""

@@ -5,12 +5,16 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.model import Fit, Term, fit_terms
-from opamc_cli.joint.name.price import price_of
-from opamc_cli.joint.parts import Sums
-from opamc_cli.joint.track import Bools, Floats
+from opamc_cli.joint.fit.model import Fit, Term, fit_terms
+from opamc_cli.joint.fit.parts import Sums
+from opamc_cli.joint.motion.track import Bools, Floats
 
 Signature = frozenset[tuple[object, ...]]
+PRICE = 0.02
+"""Logarithm of the held-out mean square error per degree of freedom: 2 % of the error."""
+MOST_CHARGED = 16
+"""Coefficients of one effect that are charged: of a drive's answer in thirty, the held-out error
+itself charges for those that are of no use."""
 
 
 @dataclass(frozen=True)
@@ -130,3 +134,17 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
     drop = before - after
     spread = max(float(np.std(drop, ddof=1) * np.sqrt(drop.size)), 1e-300)
     return float(drop.sum() / max(before.sum(), 1e-300)), float(drop.sum()) / spread
+
+
+def price_of(term: Term, width: int) -> float:
+    """Price of a term: the effect, its coefficients and its searched parameters, alike.
+
+    Parameters
+    ----------
+    term : Term
+        With its parameters.
+    width : int
+        Coefficients.
+    """
+    charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
+    return PRICE * (1 + charged + term.effect.searched(term.parameters))

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.name.chain import Chain
-from opamc_cli.joint.parts import Sums
 
 DECOYS = 5
 

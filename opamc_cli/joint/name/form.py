@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.model import Fit, Term
+from opamc_cli.joint.fit.model import Fit, Term
+from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import LEAST_T, Pool, trials
-from opamc_cli.joint.track import Floats, Track
 
 EXACT, APPROXIMATE = 0.9, 0.5
 """Shares of its domain's curve that a form holds: from the first on it has the name, from the

@@ -6,9 +6,9 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from opamc_cli.joint.effects.base import Parameters
-from opamc_cli.joint.model import Session, Term
+from opamc_cli.joint.fit.model import Session, Term
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Beside
-from opamc_cli.joint.track import Floats
 
 TRIALS_OF_ONE = 10
 TRIALS_OF_MORE = 30

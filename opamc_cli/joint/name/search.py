@@ -8,11 +8,11 @@ from scipy.stats import t as student
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.model import Session, Term
+from opamc_cli.joint.fit.model import Session, Term
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
 from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
 from opamc_cli.joint.name.refine import refined
-from opamc_cli.joint.track import Floats
 
 CHAINS = 4
 """Followed side by side: a bump that imitates a spring shows itself only beside the spring."""

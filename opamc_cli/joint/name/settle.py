@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import Chain, extended, without
 from opamc_cli.joint.name.search import LEAST_T, Pool, Trial, objection, paired, trials
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from opamc_cli.joint.explain.saturated import ceiling, saturated, unnamed_library
 from opamc_cli.joint.explain.unnamed import SMOOTH, stretched, travel_since_reversal
-from opamc_cli.joint.model import Term, fit_terms
+from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool
 

@@ -5,10 +5,9 @@ import pytest
 from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
-from opamc_cli.joint.name.chain import chain_of, extended
-from opamc_cli.joint.name.price import PRICE, price_of
+from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
 
 LIBRARY = built_in_library()

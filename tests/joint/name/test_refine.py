@@ -5,7 +5,7 @@ import pytest
 from closing import fit_declared, joint_of
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.candidates import Beside
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.refine import refined

@@ -8,7 +8,7 @@ import numpy as np
 from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.rules import RULES
 from opamc_cli.joint.name.search import Pool, beam, objection

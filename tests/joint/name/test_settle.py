@@ -5,7 +5,7 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.model import Term
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.search import Pool
 from opamc_cli.joint.name.settle import settled

@@ -1,0 +1,1 @@
+"""Least squares of a declared model, with units left out in turn."""

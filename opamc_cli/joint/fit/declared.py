@@ -1,0 +1,106 @@
+"""Fit a declared model, parameters that are not given included."""
+
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
+import numpy as np
+
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.fit.model import Fit, Session, Term, fit_terms, open_session
+from opamc_cli.joint.motion.kinematics import Recording, build_track, smoothings
+from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.track import Joint, Track
+from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.search import Pool, candidates
+
+BETTER = 0.97
+"""Of the held-out mean square error: another window than the noise asks for must be worth it."""
+
+
+Declared = tuple[tuple[Effect, Term | None], ...]
+
+
+def best_fit(
+    recordings: list[Recording],
+    joint: Joint,
+    declared: Callable[[Session], Declared],
+    without_rules: Collection[str] = (),
+) -> Fit | None:
+    """Fit a declared model to recordings, differentiated in the way that predicts best.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        In time order, all at one rate.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    declared : callable
+        Gives the model on a session.
+    without_rules : collection of str
+        Rules to switch off: "windows".
+
+    Returns
+    -------
+    Fit or None
+        None where too little moves to seal anything off.
+    """
+    track, grouping = grouped_track(recordings, joint)
+    if grouping is None or not is_moving(track):
+        return None
+
+    def fitted(track: Track) -> tuple[float, Fit]:
+        session = open_session(track, grouping)
+        fit = declared_fit(session, declared(session))
+        parts = fit.sums.parts
+        samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
+        return float(fit.sums.held_out()[parts.judged].sum()) / max(samples, 1), fit
+
+    error, best = fitted(track)
+    for smoothing in () if "windows" in without_rules else smoothings(recordings):
+        other = build_track(recordings, joint, smoothing)
+        # All are judged where the first one takes nothing from the acceleration.
+        same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}
+        found, fit = fitted(replace(other, **same))
+        if found < BETTER * error:
+            error, best = found, fit
+    return best
+
+
+def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
+    """Fit a declared model; non-linear parameters that are not given are searched first.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings.
+    declared : tuple of (Effect, Term or None)
+        Effects with their terms where parameters are given.
+
+    Returns
+    -------
+    Fit
+        Terms in the declared order.
+    """
+    terms: dict[int, Term] = {}
+    open_places = []
+    for place, (effect, term) in enumerate(declared):
+        if term is not None:
+            terms[place] = term
+            continue
+        track = session.coarse.track
+        fixed = not effect.limits(track) and not effect.several
+        guesses = effect.guesses(track, np.zeros(track.size)) if fixed else []
+        if len(guesses) == 1:
+            terms[place] = Term(effect, guesses[0])
+        else:
+            open_places.append(place)
+    fitted = fit_terms(session, tuple(terms[place] for place in sorted(terms)))
+    for place in open_places:
+        effect = declared[place][0]
+        chain = chain_of(fitted, 0)
+        found = candidates(chain, Pool.of(session, {effect.name: effect}), every=True)
+        if not found:
+            continue
+        terms[place] = found[0].term
+        fitted = fit_terms(fitted.session, tuple(terms[key] for key in sorted(terms)))
+    return fitted

@@ -1,0 +1,93 @@
+"""How certain a fit's coefficients are, and which of its terms the data cannot tell apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from opamc_cli.joint.fit.model import Fit
+from opamc_cli.joint.least_squares import SINGULAR_BELOW, eigenvectors
+from opamc_cli.joint.motion.track import Floats
+
+INSEPARABLE = 0.995
+"""Multiple correlation of a regressor with the others from which on it is not told apart."""
+
+
+@dataclass(frozen=True)
+class Certainty:
+    """Block-robust certainty of one fit.
+
+    Attributes
+    ----------
+    standard_errors : tuple of arrays
+        One array per term, in the coefficient's unit.
+    factor : float
+        Student factor of the 95 % interval (degrees of freedom: units less one).
+    condition_number : float
+        Of the regressors scaled to unit length.
+    inseparable : tuple of tuple of str
+        Sets of effects that can replace one another within the data.
+    """
+
+    standard_errors: tuple[Floats, ...]
+    factor: float
+    condition_number: float
+    inseparable: tuple[tuple[str, ...], ...]
+
+
+def certainty(fit: Fit) -> Certainty:
+    """Compute standard errors that allow for any correlation inside a unit, and collinear terms.
+
+    Parameters
+    ----------
+    fit : Fit
+        A joint fit with at least one term.
+
+    Returns
+    -------
+    Certainty
+
+    References
+    ----------
+    Liang and Zeger, Biometrika 73, 1986 (the cluster sandwich), with the factor units/(units-1).
+    """
+    sums = fit.sums
+    gram = sums.gram.sum(axis=0)
+    scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    scaled = gram / np.outer(scale, scale)
+    inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
+    flat = np.concatenate(fit.coefficients) if fit.coefficients else np.zeros(0)
+    units = sums.parts.units
+    scores = np.zeros((units, flat.size))
+    np.add.at(scores, sums.parts.unit, (sums.moment - sums.gram @ flat) / scale)
+    meat = scores.T @ scores * (units / max(units - 1, 1))
+    covariance = inverse @ meat @ inverse
+    errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale
+    widths = [values.size for values in fit.coefficients]
+    values = np.linalg.eigvalsh(scaled) if flat.size else np.ones(1)
+    condition = float(np.sqrt(values[-1] / max(values[0], 1e-16 * values[-1])))
+    return Certainty(
+        tuple(np.split(errors, np.cumsum(widths)[:-1])) if widths else (),
+        float(student.ppf(0.975, max(units - 1, 1))),
+        condition,
+        _inseparable(scaled, fit, widths),
+    )
+
+
+def _inseparable(scaled: Floats, fit: Fit, widths: list[int]) -> tuple[tuple[str, ...], ...]:
+    """Small eigenvectors of the scaled products name the terms that cancel in them."""
+    if not widths:
+        return ()
+    owner = np.repeat(np.arange(len(widths)), widths)
+    values, vectors = eigenvectors(scaled)
+    sets: list[tuple[str, ...]] = []
+    for value, vector in zip(values, vectors.T, strict=True):
+        if value > 1 - INSEPARABLE:
+            break
+        weights = vector**2
+        members = {
+            fit.terms[owner[i]].effect.name for i in np.flatnonzero(weights > 0.05 * weights.max())
+        }
+        if len(members) > 1:
+            sets.append(tuple(sorted(members)))
+    return tuple(dict.fromkeys(sets))

@@ -1,0 +1,363 @@
+"""A model of the current: terms, their regressors on both grids, and the joint fit."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opamc_cli.joint.effects.base import Effect, Parameters
+from opamc_cli.joint.fit.parts import Parts, Sums, parts_of
+from opamc_cli.joint.fit.regressor_cache import RegressorCache
+from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned, whole_groups
+from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.motion.corners import widened
+from opamc_cli.joint.motion.groups import Grouping
+from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged, block_mean, coarsen
+
+COARSE_RATE_HZ = 100.0
+COARSE_SAMPLES = 20_000
+COARSE_OF_LONG = 12_000
+"""Likewise of a long recording, of which a sample stands for all: every round costs as many."""
+MOST_ROUNDS = 12
+SETTLED = 1e-4
+"""Share of the error by which a fit of terms that follow the fitted load may still change."""
+SMALLEST_KERNEL = 5
+"""A moving average of up to 5 samples needs no counterpart."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """An effect with its non-linear parameters; `keep` names the columns of a smaller form."""
+
+    effect: Effect
+    parameters: Parameters
+    keep: tuple[int, ...] | None = None
+
+    def columns(self, track: Track) -> Floats:
+        """Regressors on the track's grid, shape (n, m)."""
+        columns = self.effect.columns(track, self.parameters)
+        return columns if self.keep is None else columns[:, self.keep]
+
+    @cached_property
+    def key(self) -> tuple[object, ...]:
+        """What makes two terms the same."""
+        return (self.effect.name, tuple(sorted(self.parameters.items())), self.keep)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the regressors stay the same whatever the fitted model is."""
+        return self.effect.is_constant(self.parameters)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A track with the samples that the fit may look at, group after group.
+
+    Attributes
+    ----------
+    track : Track
+        At this grid's rate.
+    fit, sealed : bool arrays of shape (n,)
+        Moving samples of the groups that are open, and of those that are sealed.
+    slices : tuple of (int, int)
+        Half-open ranges of the open groups among the `fit` samples.
+    """
+
+    track: Track
+    fit: Bools
+    sealed: Bools
+    slices: tuple[tuple[int, int], ...]
+
+    @property
+    def rows(self) -> list[NDArray[np.int64]]:
+        """Places of each open group's `fit` samples on the grid."""
+        places = np.flatnonzero(self.fit)
+        return [places[start:stop] for start, stop in self.slices]
+
+
+@dataclass(frozen=True)
+class Session:
+    """Everything the loop works on: the fine and the coarse grid of the same recordings.
+
+    Attributes
+    ----------
+    fine, coarse : Grid
+        At the full rate and averaged; of a long recording, a sample of the open groups.
+    opened : Session or None
+        The same open samples with all sealed groups beside them, where `fine` has none.
+    factor : int
+        Fine samples per coarse one.
+    grouping : Grouping
+    fit_groups : tuple of int
+        Groups that may be looked at before the end.
+    cache : RegressorCache
+        Regressors and products that fits share.
+    """
+
+    fine: Grid
+    coarse: Grid
+    factor: int
+    grouping: Grouping
+    fit_groups: tuple[int, ...]
+    opened: "Session | None" = None
+    cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
+
+    @cached_property
+    def sharp(self) -> Grid:
+        """The fine grid without the samples whose acceleration the smoothing has spoilt.
+
+        All samples are fitted, since some effects live there; residuals are looked at on these.
+        """
+        track = self.fine.track
+        if track.clear[self.fine.fit | self.fine.sealed].all():
+            return self.fine
+        track = replace(track, moving=track.moving & track.clear)
+        return _grid(track, self.fit_groups, self.grouping.sealed)
+
+    @cached_property
+    def parts(self) -> tuple[Parts, Parts]:
+        """Open samples of the fine and of the coarse grid, in parts."""
+        if "parts" not in self.cache.shared:
+            fine = parts_of(self.fine, self.fine.track.clear)
+            coarse = parts_of(self.coarse, self.coarse.track.clear)
+            self.cache.shared["parts"] = (fine, coarse)
+        found: tuple[Parts, Parts] = self.cache.shared["parts"]
+        return found
+
+    def columns(self, term: Term, fine: bool) -> Floats:
+        """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
+        fine = fine or self.coarse is self.fine
+        if not term.is_constant:
+            return self._columns(term, fine)
+        return self.cache.columns((term.key, fine), lambda: self._columns(term, fine))
+
+    def _columns(self, term: Term, fine: bool) -> Floats:
+        track = self.fine.track
+        if fine:
+            return term.columns(track)
+        if term.effect.fast:
+            smooth = averaged(term.columns(track), track.bounds, track.kernel)
+            return block_mean(smooth, track.bounds, self.factor)
+        return term.columns(self.coarse.track)
+
+    def sums(self, terms: "tuple[Term, ...]", fine: bool) -> Sums:
+        """Products of the terms' regressors with one another and the current, over each part."""
+        blocks = [self.columns(term, fine) for term in terms]
+        return self.sums_of(blocks, fine)
+
+    def sums_of(self, blocks: list[Floats], fine: bool) -> Sums:
+        """Likewise, of regressors that are at hand."""
+        fine = fine or self.coarse is self.fine
+        parts = self.parts[0 if fine else 1]
+        current = (self.fine if fine else self.coarse).track.current_a
+        return self.cache.sums(blocks, current, parts, fine)
+
+    def computed(self, term: Term, fine: bool) -> Floats:
+        """Regressors of a guess, which nobody will ask for again."""
+        return self._columns(term, fine or self.coarse is self.fine)
+
+    def grid_of(self, fine: bool) -> Grid:
+        """Return the fine or the coarse grid."""
+        return self.fine if fine else self.coarse
+
+    def grid(self, fine: bool) -> Grid:
+        """Return the grid on which fast effects are searched, or the coarse one."""
+        return self.sharp if fine else self.coarse
+
+    def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Session":
+        """Put the fitted load and model currents, given at the full rate, on both grids."""
+        fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
+        if self.coarse is self.fine:
+            return replace(self, fine=fine, coarse=fine)
+        coarse = replace(self.coarse, track=self.coarse.track.with_model(load, model, static))
+        return replace(self, fine=fine, coarse=coarse)
+
+
+def open_session(track: Track, grouping: Grouping) -> Session:
+    """Arrange a track for the loop.
+
+    Parameters
+    ----------
+    track : Track
+        At the full rate.
+    grouping : Grouping
+        Groups, and which are sealed.
+
+    Returns
+    -------
+    Session
+    """
+    track = replace(track, group=grouping.group)
+    if track.kernel.size <= SMALLEST_KERNEL:
+        track = replace(track, kernel=np.ones(1))
+    groups = tuple(g for g in range(len(grouping.names)) if g not in grouping.sealed)
+    if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
+        return _session(track, grouping, groups)
+    pieces = thinned(track, grouping, groups)
+    sealed = whole_groups(track, grouping.sealed)
+    grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
+    opened = Session(grid, grid, 1, grouping, groups)
+    session = _session(cut(track, pieces), grouping, groups, COARSE_OF_LONG)
+    return replace(session, opened=opened)
+
+
+def _session(
+    track: Track, grouping: Grouping, groups: tuple[int, ...], coarse_samples: int = COARSE_SAMPLES
+) -> Session:
+    inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
+    by_rate = int(track.rate_hz // COARSE_RATE_HZ)
+    factor = max(min(by_rate, inside // coarse_samples), 1)
+    coarse_track = coarsen(track, factor)
+    fine = _grid(track, groups, grouping.sealed)
+    coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
+    if coarse is not fine:
+        # The moving average must not carry sealed samples into open ones.
+        sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
+        touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
+        coarse = _grid(replace(coarse_track, moving=coarse_track.moving & ~touched), groups, ())
+    return Session(fine, coarse, factor, grouping, groups)
+
+
+def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
+    member = track.moving & (track.group >= 0)
+    fit = member & np.isin(track.group, groups)
+    counts = np.bincount(track.group[fit], minlength=max([*groups, 0]) + 1)
+    stops = np.cumsum([counts[g] for g in groups])
+    starts = np.concatenate([[0], stops[:-1]])
+    slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
+    track = replace(track, open_samples=fit)
+    return Grid(track, fit, member & np.isin(track.group, sealed), slices)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Joint least squares of all terms on the fine grid's open samples.
+
+    Attributes
+    ----------
+    terms : tuple of Term
+        What was fitted.
+    coefficients : tuple of arrays
+        One array per term.
+    session : Session
+        With the fitted load and model currents.
+    residual_a : array of shape (n,)
+        Current less model on the whole fine grid (it means something where samples move).
+    sums : Sums
+        Of the fine grid's open samples.
+    """
+
+    terms: tuple[Term, ...]
+    coefficients: tuple[Floats, ...]
+    session: Session
+    residual_a: Floats
+    sums: Sums
+
+    def coarse_sums(self) -> tuple[Sums, list[Floats]]:
+        """Sum products of the slow terms on the coarse grid; return their regressors beside them.
+
+        What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
+        left in the averages of the coarse grid, by which nobody could fit it.
+        """
+        session = self.session
+        blocks = [session.columns(term, fine=False) for term in self.terms]
+        sums = session.sums_of(blocks, fine=False)
+        widths = np.cumsum([0, *(block.shape[1] for block in blocks)])
+        fast = [i for i, term in enumerate(self.terms) if term.effect.fast]
+        known = [k for i in fast for k in range(widths[i], widths[i + 1])]
+        values = np.concatenate([np.zeros(0), *(self.coefficients[i] for i in fast)])
+        slow = [block for i, block in enumerate(blocks) if i not in fast]
+        return sums.given(known, values), slow
+
+    @cached_property
+    def drift_free_error(self) -> Floats:
+        """Held-out error of each part, where every part has an offset of its own."""
+        session = self.session
+        shared = session.cache.shared
+        if "ones" not in shared:
+            shared["ones"] = np.ones((session.fine.track.size, 1))
+        blocks = [session.columns(term, fine=True) for term in self.terms]
+        error: Floats = session.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
+        return error
+
+    def fast_part(self, fine: bool) -> Floats:
+        """Compute the current of the fast terms on one of the grids."""
+        part = np.zeros(self.session.grid_of(fine).track.size)
+        for term, values in zip(self.terms, self.coefficients, strict=True):
+            if term.effect.fast:
+                part += self.session.columns(term, fine) @ values
+        return part
+
+    @cached_property
+    def opened(self) -> "Fit":
+        """The same fit with the sealed samples beside the open ones: itself, if they are there.
+
+        Of a long recording the fine grid holds a sample of the open groups alone; the terms are
+        fitted once more, to the same samples, where all sealed groups can be predicted.
+        """
+        session = self.session.opened
+        if session is None:
+            return self
+        # This is the end: what is kept would only take memory from here on.
+        self.session.cache.clear()
+        return fit_terms(session, self.terms)
+
+    def rmse(self, sealed: bool) -> float:
+        """Root mean square residual on the open or on the sealed samples."""
+        fit = self.opened if sealed else self
+        grid = fit.session.sharp
+        values = fit.residual_a[grid.sealed if sealed else grid.fit]
+        return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
+    """Fit all terms jointly; where some scale with the load or the model, until that settles.
+
+    Parameters
+    ----------
+    session : Session
+        Recordings.
+    terms : tuple of Term
+        Model.
+
+    Returns
+    -------
+    Fit
+    """
+    circular = not all(term.is_constant for term in terms)
+    plain = not np.any(session.fine.track.model_a)
+    fewest = 3 if plain else 2
+    before = np.inf
+    for number in range(1, MOST_ROUNDS + 1):
+        fitted = _fit_once(session, terms)
+        error = fitted.rmse(sealed=False)
+        settled = number >= fewest and abs(before - error) <= SETTLED * error
+        if not circular or settled:
+            break
+        session, before = fitted.session, error
+    return fitted
+
+
+def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
+    grid = session.fine
+    current = grid.track.current_a
+    blocks = [session.columns(term, fine=True) for term in terms]
+    widths = [block.shape[1] for block in blocks]
+    sums = session.sums_of(blocks, fine=True)
+    solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
+    coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
+    total = np.zeros(grid.track.size)
+    model = np.zeros(grid.track.size)
+    load = np.zeros(grid.track.size)
+    static = []
+    for term, block, values in zip(terms, blocks, coefficients, strict=True):
+        part = block @ values
+        total += part
+        if term.effect.static and not term.effect.fast:
+            model += part
+            static.append(term)
+        if term.effect.carries_load:
+            load += part
+    session = session.with_model(load, model, tuple(static))
+    return Fit(terms, coefficients, session, current - total, sums)

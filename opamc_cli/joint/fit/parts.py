@@ -1,0 +1,168 @@
+"""Samples in parts: what is left out together, what is judged, and sums of products over each."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.motion.track import Bools, Floats, Ints
+
+FEWEST_UNITS = 8
+"""Units that are left out in turn: fewer groups than that are halved until they suffice."""
+PARTS_PER_UNIT = 4
+"""So many drops per unit make the standard error of a drop: 9 units have 36."""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Open samples of one grid, part after part.
+
+    Attributes
+    ----------
+    rows : int array of shape (m,)
+        Places on the grid.
+    slices : tuple of (int, int)
+        Half-open range of each part among the rows.
+    unit : int array of shape (p,)
+        Unit that each part belongs to; a unit is left out as one.
+    judged : bool array of shape (p,)
+        Parts whose error counts; all are fitted.
+    """
+
+    rows: Ints
+    slices: tuple[tuple[int, int], ...]
+    unit: Ints
+    judged: Bools
+
+    @property
+    def units(self) -> int:
+        """Number of units."""
+        return int(self.unit.max()) + 1 if self.unit.size else 0
+
+    def elsewhere(self, units: Floats) -> Floats:
+        """Sum over all units but each one, of values of shape (units, ...)."""
+        rest: Floats = units.sum(axis=0) - units
+        return rest
+
+    def taken(self, values: Floats) -> Floats:
+        """Return the parts' samples of an array on the grid."""
+        taken: Floats = values[self.rows]
+        return taken
+
+    def products(self, left: Floats, right: Floats) -> Floats:
+        """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
+        sums = np.empty((len(self.slices), left.shape[1], right.shape[1]))
+        for i, (start, stop) in enumerate(self.slices):
+            sums[i] = left[start:stop].T @ right[start:stop]
+        return sums
+
+
+class Grouped(Protocol):
+    """A grid that knows its open groups."""
+
+    @property
+    def rows(self) -> list[Ints]:
+        """Places of each open group's samples."""
+        ...
+
+
+def parts_of(grid: Grouped, clear: Bools) -> Parts:
+    """Cut a grid's open samples into units, and units into parts.
+
+    Parameters
+    ----------
+    grid : Grid
+        Its `fit` samples are fitted.
+    clear : bool array of shape (n,)
+        Those that are judged.
+    """
+    groups = [rows for rows in grid.rows if rows.size]
+    cuts = -(-FEWEST_UNITS // max(len(groups), 1))
+    units = [piece for rows in groups for piece in np.array_split(rows, cuts) if piece.size]
+    rows: list[Ints] = []
+    unit: list[int] = []
+    judged: list[bool] = []
+    for number, members in enumerate(units):
+        for piece in np.array_split(members, PARTS_PER_UNIT):
+            for kind in (True, False):
+                chosen = piece[clear[piece] == kind]
+                if chosen.size:
+                    rows.append(chosen)
+                    unit.append(number)
+                    judged.append(kind)
+    stops = np.cumsum([piece.size for piece in rows])
+    slices = tuple((int(b) - piece.size, int(b)) for b, piece in zip(stops, rows, strict=True))
+    return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged))
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Products of regressors with themselves and with the current, over each part."""
+
+    gram: Floats
+    moment: Floats
+    power: Floats
+    parts: Parts
+
+    def beside(self, cross: Floats, own: Floats, moment: Floats) -> "Sums":
+        """Append regressors, given their products with the others, themselves and the current."""
+        top = np.concatenate([self.gram, cross], axis=2)
+        bottom = np.concatenate([np.swapaxes(cross, 1, 2), own], axis=2)
+        gram = np.concatenate([top, bottom], axis=1)
+        return Sums(gram, np.concatenate([self.moment, moment], axis=1), self.power, self.parts)
+
+    def without_drift(self) -> "Sums":
+        """Allow the current another offset in every part; the last regressor has to be ones."""
+        count = np.maximum(self.gram[:, -1, -1], 1.0)
+        total, power = self.gram[:, :-1, -1], self.moment[:, -1]
+        gram = self.gram[:, :-1, :-1] - np.einsum("pi,pj,p->pij", total, total, 1 / count)
+        moment = self.moment[:, :-1] - total * (power / count)[:, None]
+        return Sums(gram, moment, self.power - power**2 / count, self.parts)
+
+    def columns(self, kept: Sequence[int]) -> "Sums":
+        """Keep some of the regressors."""
+        index = np.asarray(kept, dtype=np.int64)
+        gram = self.gram[:, index[:, None], index]
+        return Sums(gram, self.moment[:, index], self.power, self.parts)
+
+    def given(self, known: Sequence[int], coefficients: Floats) -> "Sums":
+        """Take regressors with known coefficients out of the current.
+
+        Parameters
+        ----------
+        known : sequence of int
+            Places of the regressors.
+        coefficients : array of shape (len(known),)
+        """
+        if not len(known):
+            return self
+        left = [i for i in range(self.moment.shape[1]) if i not in set(known)]
+        among = self.gram[:, :, known]
+        power = (
+            self.power
+            - 2 * self.moment[:, known] @ coefficients
+            + np.einsum("i,pij,j->p", coefficients, among[:, known], coefficients)
+        )
+        moment = self.moment - among @ coefficients
+        rest = self.columns(left)
+        return Sums(rest.gram, moment[:, left], power, self.parts)
+
+    def held_out(self) -> Floats:
+        """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
+        parts = self.parts
+        units = parts.units
+        width = self.moment.shape[1]
+        if width == 0:
+            return self.power
+        gram = np.zeros((units, width, width))
+        moment = np.zeros((units, width))
+        np.add.at(gram, parts.unit, self.gram)
+        np.add.at(moment, parts.unit, self.moment)
+        rest = parts.elsewhere(gram)
+        coefficients = solve(rest, parts.elsewhere(moment))[parts.unit]
+        linear = np.einsum("pi,pi->p", coefficients, self.moment)
+        quadratic = np.einsum("pi,pij,pj->p", coefficients, self.gram, coefficients)
+        error: Floats = np.maximum(self.power - 2 * linear + quadratic, 0.0)
+        return error

@@ -1,0 +1,105 @@
+"""What fits of the same recordings share: regressors that do not follow the model, and products."""
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.joint.fit.parts import Parts, Sums
+from opamc_cli.joint.motion.track import Floats
+
+MOST_BYTES = 250e6
+"""Regressors that are kept; a session has 1 GB for everything."""
+
+
+class RegressorCache:
+    """Regressors by term, and sums of products by pair of regressor arrays.
+
+    A chain of effects differs from its neighbour by one; nearly all products are known.
+    """
+
+    def __init__(self) -> None:
+        self.shared: dict[str, Any] = {}
+        self._columns: OrderedDict[Hashable, Floats] = OrderedDict()
+        self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
+        self._products: dict[tuple[int, int, bool], Floats] = {}
+
+    def clear(self) -> None:
+        """Forget everything; it is computed again where it is asked for."""
+        self.shared.clear()
+        self._columns.clear()
+        self._taken.clear()
+        self._products.clear()
+
+    def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
+        """Regressors of a term, computed where they are not at hand."""
+        found = self._columns.get(key)
+        if found is None:
+            found = self._columns[key] = compute()
+        self._columns.move_to_end(key)
+        return found
+
+    def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
+        """Sum products over parts.
+
+        Parameters
+        ----------
+        blocks : sequence of arrays of shape (n, k)
+            Regressors, term by term.
+        current : array of shape (n,)
+            The same in every call for one grid.
+        parts : Parts
+            Likewise.
+        fine : bool
+            Which grid.
+        """
+        self._forget_strangers(blocks)
+        target = current[:, None] if "target" + str(fine) not in self.shared else None
+        if target is not None:
+            self.shared["target" + str(fine)] = target
+        target = self.shared["target" + str(fine)]
+        every = [*blocks, target]
+        for i, block in enumerate(every):
+            missing = [
+                other
+                for other in every[: i + 1]
+                if (id(other), id(block), fine) not in self._products
+            ]
+            if not missing:
+                continue
+            mine = self._rows(block, parts, fine)
+            for other in missing:
+                product = parts.products(self._rows(other, parts, fine), mine)
+                self._products[id(other), id(block), fine] = product
+                self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
+        own = [
+            np.concatenate([self._products[id(a), id(b), fine] for b in blocks], axis=2)
+            for a in blocks
+        ]
+        count = len(parts.slices)
+        gram = np.concatenate(own, axis=1) if own else np.zeros((count, 0, 0))
+        moments = [self._products[id(a), id(target), fine][:, :, 0] for a in blocks]
+        moment = np.concatenate(moments, axis=1) if moments else np.zeros((count, 0))
+        power = self._products[id(target), id(target), fine][:, 0, 0]
+        return Sums(gram, moment, power, parts)
+
+    def _rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
+        key = (id(block), fine)
+        if key not in self._taken:
+            # The block itself is kept beside its rows, so that its identity stays its own.
+            self._taken[key] = (block, parts.taken(block))
+        return self._taken[key][1]
+
+    def _forget_strangers(self, blocks: Sequence[Floats]) -> None:
+        """Keep the memory bounded: what was used longest ago goes first."""
+        held = sum(block.nbytes for block in self._columns.values())
+        while held > MOST_BYTES and len(self._columns) > 1:
+            _, block = self._columns.popitem(last=False)
+            held -= block.nbytes
+        wanted = {id(block) for block in (*self._columns.values(), *blocks)}
+        wanted |= {id(value) for value in self.shared.values()}
+        for key in [key for key in self._taken if key[0] not in wanted]:
+            del self._taken[key]
+        for pair in [p for p in self._products if p[0] not in wanted or p[1] not in wanted]:
+            del self._products[pair]

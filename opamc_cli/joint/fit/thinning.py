@@ -1,0 +1,110 @@
+"""A long recording's open groups by a sample of them: a track of its own, of bounded size."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from opamc_cli.joint.motion.groups import Grouping
+from opamc_cli.joint.motion.track import Bools, Track, excerpt
+
+MOST_SAMPLES = 250_000
+"""Above this many moving samples, evenly spread parts of the open groups stand for all."""
+
+TAKEN_SAMPLES = 100_000
+"""So many of all moving samples are taken (times the share of the open ones)."""
+
+FEWEST_GROUPS = 12
+"""What happens at some time is consistent over groups only if there are some on both sides."""
+
+LEAD_S = 2.0
+"""Before each piece, so that what has a memory (wind-up, hysteresis) has settled."""
+
+TAIL_S = 0.15
+"""After each piece, so that a delayed current finds its motion."""
+
+Pieces = list[tuple[int, int]]
+
+
+def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
+    """Let a sample of the open groups stand for all of a long recording.
+
+    Parameters
+    ----------
+    track : Track
+        With its groups.
+    grouping : Grouping
+        Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks
+        the first and the last part is taken, so that whatever changes at some time is seen on
+        its own side of a sealed neighbour.
+    groups : sequence of int
+        The open ones, in time order.
+
+    Returns
+    -------
+    list of (int, int)
+        Half-open pieces with some 100 000 moving samples times the open groups' share; more
+        where whole cycles are long.
+    """
+    member = track.moving & (track.group >= 0)
+    share = TAKEN_SAMPLES / max(int(np.count_nonzero(member)), 1)
+    sizes = np.bincount(track.group[member], minlength=len(grouping.names))
+    count = min(max(int(len(groups) * share), FEWEST_GROUPS), len(groups))
+    whole = grouping.kind == "cycles"
+    picks = [groups[i] for i in np.linspace(0, len(groups) - 1, count).round().astype(int)]
+    budget = share * float(sizes[list(groups)].sum()) / len(picks)
+    pieces: Pieces = []
+    for group in picks:
+        rows = np.flatnonzero(member & (track.group == group))
+        half = int(budget / 2)
+        if whole or rows.size <= 2 * half:
+            pieces.append((int(rows[0]), int(rows[-1]) + 1))
+        else:
+            pieces.append((int(rows[0]), int(rows[half - 1]) + 1))
+            pieces.append((int(rows[-half]), int(rows[-1]) + 1))
+    return pieces
+
+
+def whole_groups(track: Track, groups: Sequence[int]) -> Pieces:
+    """Find the pieces of a track that groups take."""
+    pieces = []
+    for group in groups:
+        rows = np.flatnonzero(track.group == group)
+        pieces.append((int(rows[0]), int(rows[-1]) + 1))
+    return pieces
+
+
+def cut(track: Track, pieces: Pieces) -> Track:
+    """Cut pieces out of a track, each with what comes before and after it.
+
+    Parameters
+    ----------
+    track : Track
+        With its groups.
+    pieces : list of (int, int)
+        Half-open, ascending, not overlapping.
+
+    Returns
+    -------
+    Track
+        Outside the pieces its samples belong to no group.
+    """
+    inside: Bools = np.zeros(track.size, dtype=bool)
+    spans: Pieces = []
+    for start, stop in pieces:
+        inside[start:stop] = True
+        span = _with_surroundings(track, start, stop)
+        if spans and span[0] <= spans[-1][1]:
+            spans[-1] = (spans[-1][0], max(span[1], spans[-1][1]))
+        else:
+            spans.append(span)
+    return excerpt(track, inside, tuple(spans))
+
+
+def _with_surroundings(track: Track, start: int, stop: int) -> tuple[int, int]:
+    first, last = next(bound for bound in track.bounds if bound[0] <= start < bound[1])
+    lead = int(LEAD_S * track.rate_hz)
+    begin = max(start - lead, first)
+    if track.period_samples:
+        # Pieces that begin at the same place of the cycle can be laid over one another.
+        begin = first + (begin - first) // track.period_samples * track.period_samples
+    return begin, min(stop + int(TAIL_S * track.rate_hz), last)

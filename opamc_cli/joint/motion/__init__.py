@@ -1,0 +1,1 @@
+"""Recordings to kinematics: what the joint did."""

@@ -1,0 +1,70 @@
+"""Where the motion changes faster than its smoothing can follow.
+
+At a step of the acceleration, as every trapezoidal speed has them, and where a coarse encoder asks
+for a long window, the smoothed acceleration is not the true one. The inertia's current is left
+over: broad in frequency, the same in every cycle, and well fitted by sines of the angle or of time.
+"""
+
+import numpy as np
+
+from opamc_cli.joint.motion.track import Bools, Floats, averaged
+
+LARGEST_LACK = 0.3
+"""Standard deviations of the current's noise that the smoothing may take from a sample."""
+CERTAIN = 3.0
+"""Standard deviations of the acceleration's noise: less may not be lacking at all."""
+FEWEST_CLEAR = 0.02
+"""Share of the moving samples: where fewer would be left, the path is of that nature."""
+
+
+def clear_of_corners(
+    acceleration: Floats, current_a: Floats, moving: Bools, kernel: Floats, noise: float
+) -> Bools:
+    """Tell the samples whose acceleration is as true as the current's noise can show.
+
+    What the window takes from the acceleration is about what it would take a second time (Tukey's
+    twicing). How much current that is, is fitted to the current less its own moving average, which
+    holds what the window takes, and noise.
+
+    Parameters
+    ----------
+    acceleration : array of shape (n,)
+        Smoothed acceleration of one recording.
+    current_a : array of shape (n,)
+        Torque current.
+    moving : bool array of shape (n,)
+        Samples in motion.
+    kernel : array of odd length
+        Moving average that the acceleration has gone through.
+    noise : float
+        Standard deviation of the noise in what the window takes a second time; 0 if unknown.
+
+    Returns
+    -------
+    bool array of shape (n,)
+    """
+    everywhere = ((0, acceleration.size),)
+    clear = np.ones(acceleration.size, dtype=bool)
+    taken = acceleration - averaged(acceleration, everywhere, kernel)
+    energy = float(taken[moving] @ taken[moving])
+    if energy <= 0:
+        return clear
+    fast = current_a - averaged(current_a, everywhere, kernel)
+    inertia = float(taken[moving] @ fast[moving]) / energy
+    current_noise = float(np.median(np.abs(fast - inertia * taken)[moving])) / 0.6745
+    limit = max(LARGEST_LACK * current_noise, CERTAIN * noise * abs(inertia))
+    # At the corner itself nothing is taken, on its two sides the more.
+    clear = ~widened(np.abs(inertia * taken) > limit, max(kernel.size // 4, 1))
+    if np.count_nonzero(clear & moving) < FEWEST_CLEAR * np.count_nonzero(moving):
+        return np.ones_like(clear)
+    return clear
+
+
+def widened(rows: Bools, reach: int) -> Bools:
+    """Rows that are true, or at most `reach` from one that is."""
+    change = np.zeros(rows.size + 1, dtype=np.int64)
+    at = np.flatnonzero(rows)
+    np.add.at(change, np.maximum(at - reach, 0), 1)
+    np.add.at(change, np.minimum(at + reach + 1, rows.size), -1)
+    wide: Bools = np.cumsum(change[:-1]) > 0
+    return wide

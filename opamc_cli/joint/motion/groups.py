@@ -1,0 +1,191 @@
+"""Which samples stand or fall together: cycles, recordings or blocks, and which are sealed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import correlate
+
+from opamc_cli.joint.motion.track import Bools, Floats, Ints
+
+REPEAT_ERROR = 0.02
+COARSE_REPEAT_ERROR = 0.3
+"""At 50 Hz a cycle is rarely a whole number of samples: first look with a wide mesh."""
+MOST_DIPS = 30
+SEALED_SHARE = 0.27
+BLOCKS_WITHOUT_CYCLES = 12
+SEALED_BLOCKS = (2, 5, 9)
+"""Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
+run three times, every fourth block is the same motion, which nothing open would have shown."""
+FEWEST_PER_BLOCK = 20
+"""Samples: some four per coefficient of the declared effects."""
+FEWEST_FIT_GROUPS = 4
+
+
+@dataclass(frozen=True)
+class Grouping:
+    """Groups of samples that are left out as one, and the sealed ones among them.
+
+    Attributes
+    ----------
+    group : int array of shape (n,)
+        Group of each sample, -1 outside all groups.
+    names : tuple of str
+        Name of each group, for people.
+    sealed : tuple of int
+        Groups that nothing looks at before the end.
+    kind : {"cycles", "recordings", "blocks"}
+    """
+
+    group: Ints
+    names: tuple[str, ...]
+    sealed: tuple[int, ...]
+    kind: str
+
+
+def cycle_length(path: Floats, rate_hz: float) -> int | None:
+    """Shortest lag at which a path repeats itself.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Speed (or position) of one recording.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    int or None
+        Samples per cycle; None where the path does not repeat. A lag counts if the mean square
+        of ``path[t + lag] - path[t]`` is below 2 % of twice the variance and at least half of
+        the recording overlaps with itself, or 60 % of a cycle.
+    """
+    factor = max(int(rate_hz // 50), 1)
+    usable = path.size // factor * factor
+    coarse = path[:usable].reshape(-1, factor).mean(axis=1)
+    n = coarse.size
+    variance = float(np.var(coarse))
+    if n < 16 or variance <= 0:
+        return None
+    lags = np.arange(1, int(n * 0.7))
+    mismatch = _mismatch(coarse)[lags] / (2 * variance)
+    # Everything looks alike at short lags: first leave that neighbourhood.
+    away = np.flatnonzero(mismatch > 0.5)
+    if not away.size:
+        return None
+    inner = mismatch[1:-1]
+    dips = np.flatnonzero((inner <= mismatch[:-2]) & (inner <= mismatch[2:])) + 1
+    dips = dips[(dips > away[0]) & (mismatch[dips] < COARSE_REPEAT_ERROR)]
+    if not dips.size:
+        return None
+    mismatch = _mismatch(path)
+    limit = REPEAT_ERROR * 2 * float(np.var(path))
+    for dip in dips[:MOST_DIPS]:
+        near = int(lags[dip]) * factor
+        first = max(near - factor, 1)
+        lag = first + int(np.argmin(mismatch[first : near + factor + 1]))
+        if mismatch[lag] < limit:
+            return lag
+    return None
+
+
+def _mismatch(path: Floats) -> Floats:
+    """Mean square of ``path[t + lag] - path[t]`` for every lag below n, by one correlation."""
+    n = path.size
+    centred = path - path.mean()
+    products = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    lags = np.arange(n)
+    overlap = n - lags
+    mismatch: Floats = (squares[overlap] + squares[n] - squares[lags] - 2 * products) / overlap
+    return mismatch
+
+
+def group_samples(
+    moving: Bools,
+    bounds: tuple[tuple[int, int], ...],
+    period: int | None,
+    rate_hz: float,
+    run_names: tuple[str, ...],
+) -> Grouping | None:
+    """Split recordings into groups and seal some of them, before anything else is looked at.
+
+    Parameters
+    ----------
+    moving : bool array of shape (n,)
+        Samples that count.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    period : int or None
+        Samples per cycle, if the motion repeats.
+    rate_hz : float
+        Sampling rate.
+    run_names : tuple of str
+        One name per recording.
+
+    Returns
+    -------
+    Grouping or None
+        None where too little moves to seal anything off. With cycles, the last 27 % of them are
+        sealed (of each recording that holds four or more, else of all); a motion that does not
+        repeat is cut into blocks of equal moving time, of which a quarter is sealed, since the
+        end of a single stroke would be a place that the fit has never seen.
+    """
+    group = np.full(moving.size, -1, dtype=np.int64)
+    pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
+    for run, (start, stop) in enumerate(bounds):
+        if period is not None and stop - start >= 2 * period:
+            cycles = (stop - start + period // 20) // period
+            for cycle in range(cycles):
+                end = start + (cycle + 1) * period if cycle + 1 < cycles else stop
+                pieces.append((run, start + cycle * period, end, f"{run_names[run]}:{cycle}"))
+        else:
+            pieces.append((run, start, stop, run_names[run]))
+    needed = 0.1 * rate_hz
+    pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
+    if len(pieces) < 2:
+        return _blocks(moving, run_names)
+    sealed_pieces = _sealed_pieces(pieces)
+    fit = [i for i in range(len(pieces)) if i not in sealed_pieces]
+    parts = -(-FEWEST_FIT_GROUPS // len(fit)) if len(fit) < FEWEST_FIT_GROUPS else 1
+    names: list[str] = []
+    sealed: list[int] = []
+    for i, (_, start, stop, name) in enumerate(pieces):
+        cuts = 1 if i in sealed_pieces else parts
+        indices = np.flatnonzero(moving[start:stop]) + start
+        edges = [start, *(int(part[0]) for part in np.array_split(indices, cuts)[1:]), stop]
+        for j in range(cuts):
+            group[edges[j] : edges[j + 1]] = len(names)
+            if i in sealed_pieces:
+                sealed.append(len(names))
+            names.append(name if cuts == 1 else f"{name}.{j}")
+    kind = "cycles" if period is not None else "recordings"
+    return Grouping(group, tuple(names), tuple(sealed), kind)
+
+
+def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
+    by_run: dict[int, list[int]] = {}
+    for i, piece in enumerate(pieces):
+        by_run.setdefault(piece[0], []).append(i)
+    if all(len(members) >= 4 for members in by_run.values()):
+        batches = list(by_run.values())
+    else:
+        batches = [list(range(len(pieces)))]
+    sealed: set[int] = set()
+    for members in batches:
+        sealed.update(members[-max(round(SEALED_SHARE * len(members)), 1) :])
+    return sealed
+
+
+def _blocks(
+    moving: Bools,
+    run_names: tuple[str, ...],
+) -> Grouping | None:
+    indices = np.flatnonzero(moving)
+    if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
+        return None
+    group = np.full(moving.size, -1, dtype=np.int64)
+    chunks = np.array_split(indices, BLOCKS_WITHOUT_CYCLES)
+    for i, chunk in enumerate(chunks):
+        group[chunk[0] : chunk[-1] + 1] = i
+    names = tuple(f"{run_names[0]}:block{i}" for i in range(BLOCKS_WITHOUT_CYCLES))
+    return Grouping(group, names, SEALED_BLOCKS, "blocks")

@@ -1,0 +1,522 @@
+"""From recordings to a track: motion by local polynomials, torque current with its sign."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from opamc_cli.joint.motion.corners import clear_of_corners, widened
+from opamc_cli.joint.motion.groups import cycle_length
+from opamc_cli.joint.motion.phases.angle_filter import NOISE_SHARE
+from opamc_cli.joint.motion.phases.following import follow_phases
+from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
+from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
+from opamc_cli.joint.motion.phases.torque_axis import side_of_torque, torque_current
+from opamc_cli.joint.motion.smoothing import (
+    SHORTEST_WINDOW,
+    averaging_kernel,
+    blurred,
+    derivatives,
+    measurement_noise,
+    noise_gain,
+    quiet_block,
+    smoothing_window,
+    taken_noise_gain,
+    unstepped,
+)
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track
+
+RATIO_BLOCK_S = 0.1
+FEWEST_BLOCKS = 20
+SAME_MOTION = 0.98
+"""Correlation of a logged speed with the rate of change of a logged position."""
+LEAST_CORNER = 0.05 / 3
+"""Share of the acceleration; three times that is lacking at a corner of a path without noise."""
+SLOWEST_SHARE = 0.02
+"""Samples below this share of the top speed do not count: their direction is not certain."""
+
+
+@dataclass(frozen=True)
+class Recording:
+    """One joint's samples of one run, as they were logged.
+
+    Attributes
+    ----------
+    name : str
+        Name of the run.
+    rate_hz : float
+        Sampling rate.
+    current_a : array of shape (n,) or None
+        Reported torque current, signed.
+    phases_a : array of shape (n, 3) or None
+        Phase currents.
+    position_rad, velocity_rad_s, temperature_c : array of shape (n,) or None
+        Joint side.
+    started_s : float or None
+        Start of the run on a clock common to all runs.
+    """
+
+    name: str
+    rate_hz: float
+    current_a: Floats | None = None
+    phases_a: Floats | None = None
+    position_rad: Floats | None = None
+    velocity_rad_s: Floats | None = None
+    temperature_c: Floats | None = None
+    started_s: float | None = None
+
+    @property
+    def size(self) -> int:
+        """Number of samples."""
+        for values in (self.current_a, self.phases_a, self.position_rad):
+            if values is not None:
+                return int(values.shape[0])
+        return 0
+
+
+WINDOWS_S = (0.01, 0.02, 0.05, 0.12)
+"""Windows that compete with the one that the noise of the path asks for: where the drive itself
+moves a joint that should go steadily, the acceleration that the noise would smooth away is real."""
+
+
+@dataclass(frozen=True)
+class Smoothing:
+    """How a motion is differentiated: over which window, and from a logged speed or a position."""
+
+    window_s: float
+    from_velocity: bool
+
+
+def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
+    """Ways to differentiate recordings beside the one that the noise of each path asks for."""
+    if any(recording.position_rad is None for recording in recordings):
+        return []
+    speeds = all(recording.velocity_rad_s is not None for recording in recordings)
+    windows = {
+        max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window
+        for window in WINDOWS_S
+    }
+    ways = [False, True] if speeds else [False]
+    return [Smoothing(window, way) for window in windows.values() for way in ways]
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Smoothed motion of one recording.
+
+    Attributes
+    ----------
+    position_rad, velocity, acceleration : arrays of shape (n,)
+        Smoothed.
+    window : int
+        Samples over which they are smooth.
+    velocity_noise : float
+        Standard deviation of the speed's noise.
+    kernel : array of odd length
+        Moving average that the acceleration has gone through.
+    evenly_smooth : bool
+        True where position and speed have gone through the same.
+    quiet : int
+        Samples over which the acceleration's noise averages to almost nothing.
+    blur : array of shape (n, 2) or None
+        What the acceleration would gain or lose by a third and by three times the window.
+    taken_noise : float
+        Standard deviation of the noise in what the window would take from the acceleration a
+        second time; 0 where it is not known.
+    """
+
+    position_rad: Floats
+    velocity: Floats
+    acceleration: Floats
+    window: int
+    velocity_noise: float
+    kernel: Floats
+    quiet: int = 1
+    blur: Floats | None = None
+    taken_noise: float = 0.0
+    evenly_smooth: bool = False
+
+    def later(self, lag_s: float, rate_hz: float) -> "Motion":
+        """Return the motion delayed by a fraction of a sample."""
+        time_s = np.arange(self.velocity.size) / rate_hz
+
+        def delayed(values: Floats) -> Floats:
+            return np.interp(time_s - lag_s, time_s, values)
+
+        return replace(
+            self,
+            position_rad=delayed(self.position_rad),
+            velocity=delayed(self.velocity),
+            acceleration=delayed(self.acceleration),
+        )
+
+
+def motion_from_position(
+    position_rad: Floats,
+    velocity_rad_s: Floats | None,
+    rate_hz: float,
+    smoothing: Smoothing | None = None,
+) -> Motion:
+    """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
+
+    Parameters
+    ----------
+    position_rad : array of shape (n,)
+        Logged position.
+    velocity_rad_s : array of shape (n,) or None
+        Logged speed: used where it agrees with the position and is the cleaner of the two.
+    rate_hz : float
+        Sampling rate.
+    smoothing : Smoothing, optional
+        Another window.
+
+    Returns
+    -------
+    Motion
+    """
+    window = smoothing_window(position_rad, rate_hz, derivative=2)
+    if smoothing is not None:
+        window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
+    position = derivatives(position_rad, rate_hz, window, 0)
+    velocity = derivatives(position_rad, rate_hz, window, 1)
+    acceleration = derivatives(position_rad, rate_hz, window, 2)
+    asked = smoothing is not None and smoothing.from_velocity
+    if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
+        speed = velocity_rad_s
+        # Of the speed itself, not of its changes: at constant speed those are nearly noise.
+        size = float(np.sqrt(np.mean(velocity**2)))
+        agrees = size > 0 and float(np.std(speed - velocity)) < 0.1 * size
+        own = window if asked else smoothing_window(speed, rate_hz, derivative=1)
+        if agrees and (asked or own < window):
+            acceleration = derivatives(speed, rate_hz, own, 1)
+            spread = float(np.std(acceleration))
+            return Motion(
+                position,
+                derivatives(speed, rate_hz, own, 0),
+                acceleration,
+                own,
+                measurement_noise(speed) * noise_gain(rate_hz, own, 0),
+                averaging_kernel(own, 1),
+                quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
+                blurred(speed, rate_hz, own, 1),
+                measurement_noise(speed) * taken_noise_gain(rate_hz, own, 1),
+            )
+    noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
+    kernel = averaging_kernel(window, 2)
+    spread = float(np.std(acceleration))
+    quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
+    blur = blurred(position_rad, rate_hz, window, 2)
+    taken = measurement_noise(position_rad) * taken_noise_gain(rate_hz, window, 2)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
+
+
+def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) -> float | None:
+    """How many times the rate of change of a logged position a logged speed is.
+
+    Parameters
+    ----------
+    position_rad, velocity_rad_s : arrays of shape (n,)
+        Logged side by side.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    float or None
+        1 where the units agree; None where the two do not tell, or have nothing to do with one
+        another.
+    """
+    length = max(int(RATIO_BLOCK_S * rate_hz), 1)
+    edges = np.arange(0, position_rad.size, length)
+    if edges.size < FEWEST_BLOCKS:
+        return None
+    change = np.diff(position_rad[edges]) * rate_hz / length
+    sums = np.concatenate([[0.0], np.cumsum(velocity_rad_s)])
+    speed = np.diff(sums[edges]) / length
+    good = np.isfinite(change) & np.isfinite(speed)
+    power = float(change[good] @ change[good])
+    both = float(change[good] @ speed[good])
+    if power <= 0 or both**2 < SAME_MOTION**2 * power * float(speed[good] @ speed[good]):
+        return None
+    return both / power
+
+
+def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
+    """Position by the trapezoidal rule from zero, acceleration by a local polynomial."""
+    window = smoothing_window(velocity_rad_s, rate_hz, derivative=1)
+    velocity = derivatives(velocity_rad_s, rate_hz, window, 0)
+    acceleration = derivatives(velocity_rad_s, rate_hz, window, 1)
+    steps = 0.5 * (velocity[1:] + velocity[:-1]) / rate_hz
+    noise = measurement_noise(velocity_rad_s) * noise_gain(rate_hz, window, 0)
+    position = np.concatenate([[0.0], np.cumsum(steps)])
+    kernel = averaging_kernel(window, 1)
+    spread = float(np.std(acceleration))
+    quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
+    blur = blurred(velocity_rad_s, rate_hz, window, 1)
+    taken = measurement_noise(velocity_rad_s) * taken_noise_gain(rate_hz, window, 1)
+    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
+
+
+def direction_of(motion: Motion) -> Floats:
+    """Return the direction of motion: -1, 1, and 0 where noise or rest leave it open."""
+    speeds = np.abs(motion.velocity)
+    slowest = max(1e-3 * float(np.quantile(speeds, 0.98)), 5 * motion.velocity_noise, 1e-9)
+    return np.where(speeds > slowest, np.sign(motion.velocity), 0.0)
+
+
+def moving_samples(motion: Motion, usable: Bools) -> Bools:
+    """Tell the samples in motion: fast enough, half a window from any reversal.
+
+    Parameters
+    ----------
+    motion : Motion
+        Smoothed motion.
+    usable : bool array of shape (n,)
+        Samples whose readings are finite.
+
+    Returns
+    -------
+    bool array of shape (n,)
+    """
+    speeds = np.abs(motion.velocity)
+    direction = direction_of(motion)
+    half = motion.window // 2
+    uncertain = direction == 0
+    uncertain[1:] |= direction[1:] != direction[:-1]
+    moving: Bools = usable & ~widened(uncertain, half)
+    moving &= speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
+    moving[:half] = False
+    moving[speeds.size - half :] = False
+    return moving
+
+
+def filled(values: Floats) -> Floats:
+    """Values with gaps bridged by straight lines; unchanged if all are finite."""
+    values = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    indices = np.arange(values.size)
+    return np.interp(indices, indices[good], values[good])
+
+
+def build_track(
+    recordings: list[Recording], joint: Joint, smoothing: Smoothing | None = None
+) -> Track:
+    """Put recordings of one joint on one grid, with smoothed motion and torque current.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        All at the same rate; each with a signed current, or three phases.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    smoothing : Smoothing, optional
+        Another window than the noise of each path asks for.
+
+    Returns
+    -------
+    Track
+        Groups are not set yet (-1 everywhere).
+
+    Raises
+    ------
+    ValueError
+        If a recording holds neither three phases nor a current with position or speed.
+    """
+    rate = recordings[0].rate_hz
+    pieces = [_one(recording, joint, smoothing) for recording in recordings]
+    with_phases = all("phases" in piece.channels for piece in pieces)
+    with_angle = all(piece.electrical_rad is not None for piece in pieces)
+    with_temperature = all(piece.temperature_c is not None for piece in pieces)
+    channels = frozenset.intersection(*(piece.channels for piece in pieces))
+    bounds = []
+    offset = 0
+    clock = 0.0
+    times = []
+    for recording, piece in zip(recordings, pieces, strict=True):
+        n = piece.size
+        bounds.append((offset, offset + n))
+        offset += n
+        first = recordings[0].started_s
+        if recording.started_s is not None and first is not None:
+            clock = max(recording.started_s - first, clock)
+        times.append(clock + np.arange(n) / rate)
+        clock += n / rate
+
+    def join(name: str) -> Floats:
+        return np.concatenate([getattr(piece, name) for piece in pieces])
+
+    n = offset
+    alone = len(recordings) == 1
+    common = all(recording.started_s is not None for recording in recordings)
+    return Track(
+        rate_hz=rate,
+        bounds=tuple(bounds),
+        time_s=np.concatenate(times),
+        run_time_s=join("run_time_s"),
+        current_a=join("current_a"),
+        position_rad=join("position_rad"),
+        velocity=join("velocity"),
+        acceleration=join("acceleration"),
+        machine_angle_rad=join("machine_angle_rad"),
+        angle_kind=pieces[0].angle_kind,
+        direction=join("direction"),
+        moving=np.concatenate([piece.moving for piece in pieces]),
+        clear=np.concatenate([piece.clear for piece in pieces]),
+        group=np.full(n, -1, dtype=np.int64),
+        load_a=np.zeros(n),
+        model_a=np.zeros(n),
+        joint=joint,
+        channels=channels,
+        temperature_c=join("temperature_c") if with_temperature else None,
+        current_d_a=join("current_d_a") if with_phases else None,
+        electrical_rad=join("electrical_rad") if with_angle else None,
+        kernel=max((piece.kernel for piece in pieces), key=len),
+        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+        quiet=max(piece.quiet for piece in pieces),
+        blur=join("blur") if all(piece.blur is not None for piece in pieces) else None,
+        own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
+    )
+
+
+def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Track:
+    rate = recording.rate_hz
+    ratio, poles = joint.gear_ratio, joint.pole_pairs
+    channels: set[str] = set()
+    phase_angle: PhaseAngle | None = None
+    phases = recording.phases_a
+    usable = np.ones(recording.size, dtype=bool)
+    if phases is not None:
+        usable &= np.isfinite(phases).all(axis=1)
+        phases = np.stack([filled(phases[:, k]) for k in range(3)], axis=1)
+        phase_angle = follow_phases(phases, rate)
+        channels |= {"phases"}
+    if recording.position_rad is not None:
+        speed = recording.velocity_rad_s
+        usable &= np.isfinite(recording.position_rad)
+        motion = motion_from_position(
+            filled(recording.position_rad),
+            None if speed is None else filled(speed),
+            rate,
+            smoothing,
+        )
+        channels |= {"position", "scale", "logged"}
+        kind = "joint"
+    elif recording.velocity_rad_s is not None:
+        usable &= np.isfinite(recording.velocity_rad_s)
+        motion = motion_from_velocity(filled(recording.velocity_rad_s), rate)
+        channels |= {"position", "scale", "logged"}
+        kind = "joint"
+    elif phase_angle is not None:
+        period = cycle_length(phase_angle.velocity_rad_s, rate)
+        if period is not None:
+            phase_angle = without_slips(phase_angle, period, rate)
+        scale = 1.0
+        kind = "electrical"
+        if poles and ratio:
+            scale, kind = 1.0 / (poles * ratio), "joint"
+            channels |= {"scale"}
+        motion = _scaled(phase_angle, scale)
+        # Where there is too little current to tell an angle, the motion is a guess.
+        usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear
+        channels |= {"position"}
+    else:
+        msg = "a recording needs a position, a velocity or three phase currents"
+        raise ValueError(msg)
+
+    current_d = electrical = None
+    if phases is not None and phase_angle is not None:
+        if recording.position_rad is not None or recording.velocity_rad_s is not None:
+            known = poles * ratio if poles and ratio else None
+            electrical, lag_s = phase_angle.aligned_with(
+                motion.position_rad, motion.velocity, known, rate
+            )
+            if abs(lag_s) * rate <= 1:
+                # Sensors' filters and channels read in turn come to this, no clock does.
+                motion = motion.later(lag_s, rate)
+        else:
+            electrical = phase_angle.angle_rad
+        current, current_d = torque_current(
+            phases, electrical, motion.velocity, motion.position_rad
+        )
+        if electrical is phase_angle.angle_rad:
+            side = side_of_torque(current, phase_angle, rate)
+            current, current_d = side * current, side * current_d
+            # The other side is half an electrical turn away.
+            electrical = electrical + np.where(side < 0, np.pi, 0.0)
+        channels |= {"electrical"}
+    elif recording.current_a is not None:
+        usable &= np.isfinite(recording.current_a)
+        current = filled(recording.current_a)
+        if poles and ratio:
+            electrical = poles * ratio * motion.position_rad
+            channels |= {"electrical"}
+    else:
+        msg = "a recording needs a signed current or three phase currents"
+        raise ValueError(msg)
+
+    machine, angle_kind = motion.position_rad, kind
+    if kind == "joint" and ratio:
+        machine, angle_kind = ratio * motion.position_rad, "motor"
+    elif electrical is not None and poles:
+        machine, angle_kind = electrical / poles, "motor"
+    elif electrical is not None and phases is not None:
+        machine, angle_kind = electrical, "electrical"
+    temperature = recording.temperature_c
+    if temperature is not None and not np.isfinite(temperature).any():
+        temperature = None
+    if temperature is not None:
+        channels |= {"temperature"}
+    n = motion.velocity.size
+    moving = moving_samples(motion, usable)
+    uncertain = motion.taken_noise
+    if motion.window <= SHORTEST_WINDOW:
+        # Without an encoder's noise vibration shows, of which the window takes a little everywhere.
+        uncertain = max(uncertain, LEAST_CORNER * float(np.std(motion.acceleration)))
+    clear = clear_of_corners(motion.acceleration, current, moving, motion.kernel, uncertain)
+    if motion.window <= SHORTEST_WINDOW:
+        # The coarse grid has no counterpart for so short an average.
+        moving &= clear
+    return Track(
+        rate_hz=rate,
+        bounds=((0, n),),
+        time_s=np.arange(n) / rate,
+        run_time_s=np.arange(n) / rate,
+        current_a=current,
+        position_rad=motion.position_rad,
+        velocity=motion.velocity,
+        acceleration=motion.acceleration,
+        machine_angle_rad=machine,
+        angle_kind=angle_kind,
+        direction=direction_of(motion),
+        moving=moving,
+        clear=clear,
+        group=np.full(n, -1, dtype=np.int64),
+        load_a=np.zeros(n),
+        model_a=np.zeros(n),
+        joint=joint,
+        channels=frozenset(channels),
+        temperature_c=None if temperature is None else unstepped(filled(temperature)),
+        current_d_a=current_d,
+        electrical_rad=electrical,
+        kernel=motion.kernel,
+        evenly_smooth=motion.evenly_smooth,
+        quiet=motion.quiet,
+        blur=motion.blur,
+    )
+
+
+def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:
+    return Motion(
+        phase_angle.angle_rad * scale,
+        phase_angle.velocity_rad_s * scale,
+        phase_angle.acceleration_rad_s2 * scale,
+        phase_angle.window,
+        0.0,
+        phase_angle.kernel,
+        blur=phase_angle.blur * scale,
+        # So the bandwidth was chosen.
+        taken_noise=NOISE_SHARE * scale * float(np.std(phase_angle.acceleration_rad_s2)),
+        evenly_smooth=True,
+    )

@@ -1,0 +1,1 @@
+"""The motion from three phase currents alone."""

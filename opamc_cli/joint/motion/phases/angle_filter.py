@@ -1,0 +1,258 @@
+"""Kalman filter and smoother of an angle that is measured modulo pi, with gaps."""
+
+import numpy as np
+from numba import njit
+from scipy.special import beta
+
+from opamc_cli.joint.motion.track import Bools, Floats
+
+WIDEST_HZ = 30.0
+NARROWEST_HZ = 6.0
+NOISE_SHARE = 0.015
+"""Noise of the acceleration, relative to the acceleration, that sets the bandwidth."""
+
+ANGLE_NOISE_RAD = 0.3
+FREE_RAD2 = 1e6
+"""Variance of a step of the angle about which nothing is known."""
+
+ROUGH_NOISE_RAD = 1.0
+"""Error of the rough speed, as an angle over its own window of 15 samples."""
+
+
+def widest_bandwidth(rate_hz: float) -> float:
+    """Bandwidth above which errors of sensors and inverter, at the carrier, would be followed."""
+    return min(WIDEST_HZ, rate_hz / 20)
+
+
+def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: float) -> float:
+    """Tell the standard deviation of the acceleration that white noise of the angle leaves.
+
+    Parameters
+    ----------
+    angle_noise_rad : float
+        Standard deviation per sample.
+    rate_hz, bandwidth_hz : float
+        Sampling rate and the smoother's bandwidth.
+
+    Returns
+    -------
+    float
+        In rad/s^2: the root of the noise's density times the integral of
+        ``(2 pi f)^4 / (1 + (f / b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
+    """
+    return float(
+        angle_noise_rad
+        * (2 * np.pi) ** 2
+        * np.sqrt(2 / rate_hz * bandwidth_hz**5 * beta(5 / 6, 7 / 6) / 6)
+    )
+
+
+def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float) -> float:
+    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration.
+
+    Parameters
+    ----------
+    angle_noise_rad : float
+        Standard deviation of the measured angle per sample.
+    acceleration : float
+        Standard deviation of the acceleration, rad/s^2.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    float
+        In Hz, at least 6, at most 30 and a twentieth of the rate.
+    """
+    widest = widest_bandwidth(rate_hz)
+    own = acceleration_noise(angle_noise_rad, rate_hz, widest)
+    if own <= NOISE_SHARE * acceleration:
+        return widest
+    clean = widest * (NOISE_SHARE * acceleration / own) ** 0.4
+    return float(max(clean, min(NARROWEST_HZ, widest)))
+
+
+def smoothing_kernel(rate_hz: float, bandwidth_hz: float) -> Floats:
+    """Weights by which the smoother averages a steady recording, odd length, sum 1.
+
+    With ``b`` the bandwidth, the smoother's gain at frequency f is ``1 / (1 + (f / b)^6)``.
+
+    Parameters
+    ----------
+    rate_hz, bandwidth_hz : float
+        Sampling rate and bandwidth.
+    """
+    half = int(1.5 * rate_hz / bandwidth_hz)
+    length = 16 * half
+    frequency = np.fft.rfftfreq(length, 1 / rate_hz)
+    response = np.fft.irfft(1 / (1 + (frequency / bandwidth_hz) ** 6), length)
+    kernel = np.concatenate([response[-half:], response[: half + 1]])
+    weights: Floats = kernel / kernel.sum()
+    return weights
+
+
+def smoothed_angle(
+    angle_rad: Floats,
+    strong: Bools,
+    rough_rad_s: Floats,
+    sure: Bools,
+    rate_hz: float,
+    bandwidth_hz: float,
+    *,
+    spread: Floats | None = None,
+    free: Bools | None = None,
+    turn_rad: float = np.pi,
+) -> tuple[Floats, Floats, Floats]:
+    """Follow angle, speed and acceleration through a recording and back.
+
+    The acceleration is a random walk whose size sets the smoother's bandwidth.
+
+    Parameters
+    ----------
+    angle_rad : array of shape (n,)
+        Measured angle, known modulo pi.
+    strong : bool array of shape (n,)
+        Samples whose angle counts.
+    rough_rad_s : array of shape (n,)
+        Rough speed, for the lock.
+    sure : bool array of shape (n,)
+        Samples whose rough speed counts.
+    rate_hz, bandwidth_hz : float
+        Sampling rate and bandwidth: slower than an electrical period at working speed, so that
+        errors of sensors and inverter are not followed.
+    spread : array of shape (n,), optional
+        Variance of each measured angle, in units of the best; 1 where not given.
+    free : bool array of shape (n,), optional
+        Samples before which the angle may have changed by any amount: angles on both sides do
+        not bind each other there, speeds and accelerations do.
+    turn_rad : float
+        The measured angle is known modulo this; 0 where it is known for good.
+
+    Returns
+    -------
+    angle, speed, acceleration : arrays of shape (n,)
+
+    References
+    ----------
+    Rauch, Tung and Striebel, AIAA Journal 3, 1965.
+    """
+    step = 1.0 / rate_hz
+    variance = ANGLE_NOISE_RAD**2
+    walk = variance * step * (2 * np.pi * bandwidth_hz) ** 6
+    first = np.flatnonzero(sure)
+    start = float(rough_rad_s[first[0]]) if first.size and first[0] < rate_hz / 10 else 0.0
+    angle, speed, acceleration = _smooth(
+        angle_rad,
+        strong,
+        rough_rad_s,
+        sure,
+        step,
+        variance,
+        (ROUGH_NOISE_RAD * rate_hz / 15) ** 2,
+        walk,
+        start,
+        (2 * np.pi * bandwidth_hz) ** 2,
+        np.ones(angle_rad.size) if spread is None else spread,
+        np.zeros(angle_rad.size, dtype=bool) if free is None else free,
+        turn_rad,
+    )
+    return angle, speed, acceleration
+
+
+@njit(cache=True, nogil=True)  # type: ignore[misc,unused-ignore]
+def _smooth(  # type: ignore[no-untyped-def]
+    measured,
+    strong,
+    rough,
+    sure,
+    step,
+    variance,
+    rough_variance,
+    walk,
+    start,
+    spread,
+    ease,
+    free,
+    turn,
+):
+    # Scalars throughout: three states are too few for matrix calls, which cost 20 times as much.
+    n = measured.size
+    x = np.empty((n, 3))
+    p = np.empty((n, 6))
+    h = step * step / 2
+    q00, q01, q02 = walk * step**5 / 20, walk * step**4 / 8, walk * step**3 / 6
+    q11, q12, q22 = walk * step**3 / 3, walk * step**2 / 2, walk * step
+    a, v, c = measured[0], start, 0.0
+    p00, p01, p02, p11, p12, p22 = 1.0, 0.0, 0.0, spread, 0.0, spread * spread
+    for i in range(n):
+        if i > 0:
+            a, v = a + step * v + h * c, v + step * c
+            m00 = p00 + step * p01 + h * p02
+            m01 = p01 + step * p11 + h * p12
+            m02 = p02 + step * p12 + h * p22
+            m11 = p11 + step * p12
+            m12 = p12 + step * p22
+            # A long gap must not let the uncertainty grow until the numbers lose their digits.
+            grow = 0.0 if p22 > spread * spread else 1.0
+            p00 = m00 + step * m01 + h * m02 + grow * q00
+            p01 = m01 + step * m02 + grow * q01
+            p02 = m02 + grow * q02
+            p11 = m11 + step * m12 + grow * q11
+            p12 = m12 + grow * q12
+            p22 = p22 + grow * q22
+            if free[i]:
+                p00 += FREE_RAD2
+        if sure[i]:
+            total = p11 + rough_variance
+            k0, k1, k2 = p01 / total, p11 / total, p12 / total
+            error = rough[i] - v
+            a, v, c = a + k0 * error, v + k1 * error, c + k2 * error
+            p00, p02, p22 = p00 - k0 * p01, p02 - k0 * p12, p22 - k2 * p12
+            p01, p11, p12 = p01 - k0 * p11, p11 - k1 * p11, p12 - k1 * p12
+        if strong[i]:
+            total = p00 + variance * ease[i]
+            k0, k1, k2 = p00 / total, p01 / total, p02 / total
+            error = measured[i] - a
+            if turn > 0:
+                error -= turn * np.round(error / turn)
+            a, v, c = a + k0 * error, v + k1 * error, c + k2 * error
+            p11, p12, p22 = p11 - k1 * p01, p12 - k1 * p02, p22 - k2 * p02
+            p00, p01, p02 = p00 - k0 * p00, p01 - k0 * p01, p02 - k0 * p02
+        x[i, 0], x[i, 1], x[i, 2] = a, v, c
+        p[i, 0], p[i, 1], p[i, 2] = p00, p01, p02
+        p[i, 3], p[i, 4], p[i, 5] = p11, p12, p22
+    for i in range(n - 2, -1, -1):
+        p00, p01, p02 = p[i, 0], p[i, 1], p[i, 2]
+        p11, p12, p22 = p[i, 3], p[i, 4], p[i, 5]
+        m00 = p00 + step * p01 + h * p02
+        m01 = p01 + step * p11 + h * p12
+        m02 = p02 + step * p12 + h * p22
+        m10, m11, m12 = p01 + step * p02, p11 + step * p12, p12 + step * p22
+        grow = 0.0 if p22 > spread * spread else 1.0
+        u00 = m00 + step * m01 + h * m02 + grow * q00
+        if free[i + 1]:
+            u00 += FREE_RAD2
+        u01 = m01 + step * m02 + grow * q01
+        u02 = m02 + grow * q02
+        u11 = m11 + step * m12 + grow * q11
+        u12 = m12 + grow * q12
+        u22 = p22 + grow * q22
+        a = x[i, 0] + step * x[i, 1] + h * x[i, 2]
+        v = x[i, 1] + step * x[i, 2]
+        d0, d1, d2 = x[i + 1, 0] - a, x[i + 1, 1] - v, x[i + 1, 2] - x[i, 2]
+        # Solve U y = d by Cholesky, then x += (F P)^T y.
+        l00 = np.sqrt(u00)
+        l10, l20 = u01 / l00, u02 / l00
+        l11 = np.sqrt(max(u11 - l10 * l10, 1e-300))
+        l21 = (u12 - l20 * l10) / l11
+        l22 = np.sqrt(max(u22 - l20 * l20 - l21 * l21, 1e-300))
+        z0 = d0 / l00
+        z1 = (d1 - l10 * z0) / l11
+        z2 = (d2 - l20 * z0 - l21 * z1) / l22
+        y2 = z2 / l22
+        y1 = (z1 - l21 * y2) / l11
+        y0 = (z0 - l10 * y1 - l20 * y2) / l00
+        x[i, 0] += m00 * y0 + m10 * y1 + p02 * y2
+        x[i, 1] += m01 * y0 + m11 * y1 + p12 * y2
+        x[i, 2] += m02 * y0 + m12 * y1 + p22 * y2
+    return x[:, 0].copy(), x[:, 1].copy(), x[:, 2].copy()

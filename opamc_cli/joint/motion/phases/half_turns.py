@@ -1,0 +1,206 @@
+"""How many half turns the electrical angle makes while there is too little current to see it."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from opamc_cli.joint.motion.phases.angle_filter import smoothed_angle
+from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
+from opamc_cli.joint.motion.track import Bools, Floats
+
+LOST_S = 0.015
+"""After this long without current half turns have to be counted anew."""
+
+REST_SHARE = 0.03
+REST_MARGIN_S = 0.02
+"""Speed, relative to working speed, on both sides of a rest, and what is left open beside it."""
+
+FEWEST_CYCLES = 3
+LARGEST_DRIFT = 0.1
+
+
+def bridged(
+    measured_rad: Floats,
+    strong: Bools,
+    rough_rad_s: Floats,
+    sure: Bools,
+    spread: Floats | None,
+    rate_hz: float,
+    bandwidth_hz: float,
+) -> tuple[Floats, Floats]:
+    """Follow an angle that is known modulo pi through long gaps of the current.
+
+    As whole waves are resolved in satellite positioning: first the angle may change by any amount
+    in every gap, and only speeds and accelerations of both sides tell how it goes on. Then each
+    change is set to the nearest multiple of pi. A filter that guesses before it has seen the
+    other side loses count four times as early. A long gap between two slow stretches is a rest.
+
+    Parameters
+    ----------
+    measured_rad : array of shape (n,)
+        Angle modulo pi.
+    strong : bool array of shape (n,)
+        Samples whose angle counts.
+    rough_rad_s, sure, spread, rate_hz, bandwidth_hz
+        As for `smoothed_angle`.
+
+    Returns
+    -------
+    angle, speed : arrays of shape (n,)
+        The angle is steady within each stretch of current, and on the same branch in all.
+    """
+    if not strong.any():
+        return np.zeros(strong.size), np.zeros(strong.size)
+    gaps = [(stop, start) for (_, stop), (start, _) in pairwise(stretches(strong, rate_hz))]
+    free = np.zeros(strong.size, dtype=bool)
+    free[[start for _, start in gaps]] = True
+
+    def followed(rough: Floats, known: Bools) -> tuple[Floats, Floats]:
+        angle, speed, _ = smoothed_angle(
+            measured_rad, strong, rough, known, rate_hz, bandwidth_hz, spread=spread, free=free
+        )
+        return angle, speed
+
+    angle, speed = followed(rough_rad_s, sure)
+    slow = REST_SHARE * float(np.quantile(np.abs(speed[strong]), 0.95))
+    margin = int(REST_MARGIN_S * rate_hz)
+    resting = np.zeros(strong.size, dtype=bool)
+    for stop, start in gaps:
+        if max(abs(speed[stop - 1]), abs(speed[start])) < slow:
+            resting[stop + margin : max(start - margin, 0)] = True
+    if resting.any():
+        angle, speed = followed(np.where(resting, 0.0, rough_rad_s), sure | resting)
+    at = np.flatnonzero(free)
+    changes = angle[at] - angle[at - 1] - 0.5 * (speed[at] + speed[at - 1]) / rate_hz
+    turns = np.zeros(strong.size)
+    turns[at] = np.pi * np.round(changes / np.pi)
+    return angle - np.cumsum(turns), speed
+
+
+def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
+    """Let the angle of a motion that repeats repeat.
+
+    While the current is too small to be followed, the angle may slip by a multiple of pi. A
+    stretch of current has the angle that it had one cycle earlier; in the first cycle, the one
+    that follows from the median of all cycles' steps.
+
+    Parameters
+    ----------
+    angle : PhaseAngle
+        As followed.
+    period : int
+        Samples per cycle.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    PhaseAngle
+        As it was where there are fewer than three cycles, or where a cycle ends elsewhere than
+        it began by more than a tenth of its travel: that is no slip.
+    """
+    path = angle.angle_rad
+    cycles = path.size // period
+    pieces = stretches(angle.strong, rate_hz)
+    if cycles < FEWEST_CYCLES or not pieces:
+        return angle
+    course = _common_course(path, angle.strong, period, rate_hz)
+    if course is None:
+        return angle
+    repeated = path.copy()
+    edges, slips = [0.0], [0.0]
+    slip, anchor = 0.0, None
+    for start, stop in pieces:
+        rest = path[start:stop] - course[np.arange(start, stop) % period]
+        # A cycle is no whole number of samples: the cycle before is nearer than the first.
+        later = np.arange(max(start, period), max(stop, period))
+        later = later[angle.strong[later - period]]
+        if later.size:
+            rest = path[later] - repeated[later - period]
+            slip = np.pi * np.round(float(np.median(rest)) / np.pi)
+        elif np.isfinite(rest).any():
+            middle = float(np.nanmedian(rest))
+            anchor = middle if anchor is None else anchor
+            slip = np.pi * np.round((middle - anchor) / np.pi)
+        repeated[start:] = path[start:] - slip
+        edges += [float(start), float(stop)]
+        slips += [slip, slip]
+    correction = np.interp(np.arange(path.size), edges, slips)
+    return replace(angle, angle_rad=path - correction)
+
+
+def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> Floats | None:
+    """One cycle of a path that repeats, NaN where few cycles have current.
+
+    From one stretch of current to the next the angle changes by what most cycles say; of a whole
+    cycle nothing may be left. None where that is no matter of a few turns in the longest gap.
+    """
+    cycles = path.size // period
+    folded = path[: cycles * period].reshape(cycles, period)
+    current = strong[: cycles * period].reshape(cycles, period)
+    common = np.mean(current, axis=0) > 0.5
+    anchors = stretches(common, rate_hz)
+    if not anchors:
+        return None
+    steps = []
+    places = [(start + stop) // 2 for start, stop in anchors]
+    for here, there in zip(places, [*places[1:], places[0] + period], strict=True):
+        known = np.flatnonzero(strong[here : path.size - there + here : period]) * period + here
+        known = known[strong[known + there - here]]
+        changes = path[known + there - here] - path[known] if known.size else np.zeros(1)
+        whole = np.round((changes - changes[0]) / np.pi)
+        values, counts = np.unique(whole, return_counts=True)
+        often = values[counts == counts.max()]
+        chosen = often[np.argmin(np.abs(often - np.median(whole)))]
+        steps.append(float(np.median(changes[whole == chosen])))
+    left = float(np.sum(steps))
+    heights = np.concatenate([[0.0], np.cumsum(steps)])
+    if abs(left) > LARGEST_DRIFT * float(np.ptp(heights)):
+        return None
+    turns = np.pi * np.round(left / np.pi)
+    if turns:
+        gaps = [
+            (start - stop) % period
+            for (_, stop), (start, _) in zip(anchors, [*anchors[1:], anchors[0]], strict=True)
+        ]
+        heights[int(np.argmax(gaps)) + 1 :] -= turns
+    course = np.full(period, np.nan)
+    for (start, stop), place, height in zip(anchors, places, heights, strict=False):
+        rows = np.flatnonzero(common[start:stop]) + start
+        about = np.where(current[:, [place]], folded - folded[:, [place]], np.nan)[:, rows]
+        inside = np.where(current[:, rows], about, np.nan)
+        course[rows] = height + np.nanmedian(inside, axis=0)
+    return course
+
+
+def lost(strong: Bools, rate_hz: float) -> Bools:
+    """Tell where the current was too small, for too long, to carry the followed angle across.
+
+    Parameters
+    ----------
+    strong : bool array of shape (n,)
+        Samples with enough current to tell an angle.
+    rate_hz : float
+        Sampling rate.
+
+    Returns
+    -------
+    bool array of shape (n,)
+        False also in gaps of up to 15 ms, as where the torque passes zero: the filter bridges them.
+    """
+    result: Bools = np.ones(strong.size, dtype=bool)
+    for start, stop in stretches(strong, rate_hz):
+        result[start:stop] = False
+    return result
+
+
+def stretches(strong: Bools, rate_hz: float) -> list[tuple[int, int]]:
+    """Half-open stretches of strong samples; gaps of up to 15 ms do not end them."""
+    rows = np.flatnonzero(strong)
+    if not rows.size:
+        return []
+    breaks = np.flatnonzero(np.diff(rows) > max(int(LOST_S * rate_hz), 2))
+    starts = [int(rows[0]), *(int(rows[b + 1]) for b in breaks)]
+    stops = [*(int(rows[b]) + 1 for b in breaks), int(rows[-1]) + 1]
+    return list(zip(starts, stops, strict=True))

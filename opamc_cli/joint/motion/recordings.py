@@ -1,0 +1,63 @@
+"""From recordings to a session: motion, cycles, groups, and what is sealed."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from opamc_cli.joint.motion.groups import Grouping, cycle_length, group_samples
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
+from opamc_cli.joint.motion.track import Joint, Track
+
+SHORTEST_TRAVEL_RAD = 1e-4
+FEWEST_MOVING_SAMPLES = 50
+SHORTEST_PATH = 3.0
+
+
+def grouped_track(
+    recordings: list[Recording], joint: Joint, smoothing: Smoothing | None = None
+) -> tuple[Track, Grouping | None]:
+    """Lay recordings on one grid and split them into groups.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        In time order, all at one rate.
+    joint : Joint
+        Gear ratio and pole pairs, where known.
+    smoothing : Smoothing, optional
+        Another window than the noise of each path asks for.
+
+    Returns
+    -------
+    track : Track
+        With the cycle's length, if the motion repeats.
+    grouping : Grouping or None
+        None where too little moves to seal anything off.
+    """
+    track = build_track(recordings, joint, smoothing)
+    lengths = [
+        cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
+    ]
+    known = [length for length in lengths if length is not None]
+    period = round(float(np.median(known))) if known else None
+    channels = track.channels | ({"revisits"} if _revisits(track) else set())
+    track = replace(track, period_samples=period, channels=channels)
+    names = tuple(recording.name for recording in recordings)
+    return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def _revisits(track: Track) -> bool:
+    """Tell whether places are passed at different times: three times the travel, or more."""
+    inside = np.ones(track.size - 1, dtype=bool)
+    for start, _ in track.bounds[1:]:
+        inside[start - 1] = False
+    path = float(np.abs(np.diff(track.position_rad))[inside].sum())
+    return path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
+
+
+def is_moving(track: Track) -> bool:
+    """Tell whether the joint moves at all."""
+    return (
+        int(np.count_nonzero(track.moving)) >= FEWEST_MOVING_SAMPLES
+        and float(np.ptp(track.position_rad)) >= SHORTEST_TRAVEL_RAD
+    )

@@ -1,0 +1,258 @@
+"""Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
+
+import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
+
+from opamc_cli.joint.motion.track import Floats
+
+POLYNOMIAL_ORDER = 3
+SHORTEST_WINDOW = 5
+LONGEST_WINDOW_S = 0.2
+ALLOWED_NOISE_SHARE = 0.01
+QUIET_NOISE_SHARE = 0.0025
+OFF_GRID = 0.05
+"""Share of a step by which a change may miss a multiple of it."""
+ROUNDING = 1e-12
+"""Share of the largest value below which a difference is the computer's rounding."""
+
+
+def measurement_noise(path: Floats) -> float:
+    """Estimate the standard deviation of what is not smooth in a path, from its fourth differences.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Uniformly sampled path, n > 4.
+
+    Returns
+    -------
+    float
+        Robust estimate in the path's unit (median absolute difference; the sum of squares of
+        the fourth difference's weights 1, -4, 6, -4, 1 is 70). Where a path in steps of an
+        encoder hardly changes from sample to sample, most differences are none: they do not count.
+    """
+    rounding = ROUNDING * float(np.max(np.abs(path)))
+    differences = np.abs(np.diff(path, 4))
+    if _in_steps(path, rounding):
+        differences = differences[differences > rounding]
+    middle = float(np.median(differences)) if differences.size else 0.0
+    return middle / 0.6745 / np.sqrt(70.0) if middle > rounding else 0.0
+
+
+def _in_steps(path: Floats, rounding: float) -> bool:
+    """Whether all changes of a path are multiples of the least: a path in an encoder's steps."""
+    changes = np.abs(np.diff(path))
+    changes = changes[changes > rounding]
+    if not changes.size:
+        return False
+    steps = changes / changes.min()
+    return bool(np.quantile(np.abs(steps - np.round(steps)), 0.9) < OFF_GRID)
+
+
+def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
+    """Shortest odd window whose derivative noise is small against the derivative itself.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Position (derivative 2) or speed (derivative 1).
+    rate_hz : float
+        Sampling rate.
+    derivative : int
+        Derivative that must come out clean.
+
+    Returns
+    -------
+    int
+        Odd number of samples, 5 or more, at most 0.2 s.
+    """
+    longest = min(int(LONGEST_WINDOW_S * rate_hz) | 1, (path.size - 1) | 1)
+    noise = measurement_noise(path)
+    window = SHORTEST_WINDOW
+    while window < longest:
+        values = derivatives(path, rate_hz, window, derivative)
+        own = noise * noise_gain(rate_hz, window, derivative)
+        if own <= ALLOWED_NOISE_SHARE * float(np.std(values)):
+            break
+        window = int(window * 1.3 + 2) | 1
+    return max(min(window, longest), SHORTEST_WINDOW)
+
+
+def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
+    """Compute the standard deviation of a derivative of white noise of unit deviation.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples.
+    derivative : int
+        Order of the derivative.
+    """
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    return float(np.linalg.norm(kernel))
+
+
+def averaging_kernel(window: int, derivative: int) -> Floats:
+    """Weights of the moving average that a local polynomial's derivative is a derivative of.
+
+    The second derivative of a Savitzky-Golay filter is the plain second difference of the path
+    averaged with these weights; what is fitted to that derivative has to be averaged alike.
+
+    Parameters
+    ----------
+    window : int
+        Odd number of samples.
+    derivative : int
+        1 or 2.
+
+    Returns
+    -------
+    array of shape (window,)
+        Sum 1.
+    """
+    weights = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, use="dot")
+    for _ in range(derivative):
+        weights = -np.cumsum(weights)
+    # Two sums have moved the weights back by one sample, one sum by half a sample.
+    centred = np.roll(weights, 1) if derivative == 2 else weights + np.roll(weights, 1)
+    kernel: Floats = centred / centred.sum()
+    return kernel
+
+
+def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats | None:
+    """Compare the derivative with those of a third and of three times the window.
+
+    Where the motion is less smooth than the window, as at a step of the acceleration, the
+    current holds what the derivative lacks; these two span the lack.
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Position or speed.
+    rate_hz : float
+        Sampling rate.
+    window, derivative : int
+        Of the local polynomial.
+
+    Returns
+    -------
+    array of shape (n, 2) or None
+        None where the window is the shortest there is.
+    """
+    if window <= SHORTEST_WINDOW:
+        return None
+    middle = derivatives(path, rate_hz, window, derivative)
+    narrow = max(window // 3 | 1, SHORTEST_WINDOW)
+    wide = min(3 * window, (path.size - 1) | 1)
+    return np.stack(
+        [derivatives(path, rate_hz, size, derivative) - middle for size in (narrow, wide)], axis=1
+    )
+
+
+def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
+    """Compute the standard deviation of what a window takes from a derivative a second time.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples.
+    derivative : int
+        1 or 2.
+
+    Returns
+    -------
+    float
+        For a path that is white noise of unit deviation.
+    """
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
+    half = (twice.size - kernel.size) // 2
+    return float(np.linalg.norm(np.pad(kernel, half) - twice))
+
+
+def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivative: int) -> int:
+    """Count the samples per block over which a derivative's noise averages to almost nothing.
+
+    A regressor with noise invites every effect that is a smoother version of it. Blocks are long
+    enough when the noise that is left is below 0.25 % of the derivative.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation of the path's white noise.
+    scale : float
+        Standard deviation of the derivative.
+    rate_hz : float
+        Sampling rate.
+    window, derivative : int
+        Of the local polynomial.
+
+    Returns
+    -------
+    int
+        At least 1, at most 0.2 s.
+    """
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
+    block = 1
+    while block < longest:
+        left = float(np.linalg.norm(np.convolve(kernel, np.ones(block) / block)))
+        if noise * left <= QUIET_NOISE_SHARE * scale:
+            break
+        block += max(block // 4, 1)
+    return min(block, longest)
+
+
+def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:
+    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial).
+
+    Parameters
+    ----------
+    path : array of shape (n,)
+        Uniformly sampled path, n >= window.
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples, at least 5.
+    derivative : int
+        0 for the smoothed path itself.
+
+    Returns
+    -------
+    array of shape (n,)
+
+    References
+    ----------
+    Savitzky and Golay, Analytical Chemistry 36, 1964.
+    """
+    smooth: Floats = savgol_filter(
+        path, window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz, mode="interp"
+    )
+    return smooth
+
+
+def unstepped(values: Floats) -> Floats:
+    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature.
+
+    Parameters
+    ----------
+    values : array of shape (n,)
+        Uniformly sampled.
+
+    Returns
+    -------
+    array of shape (n,)
+        Straight lines through the middles of the steps, the first and the last value held; the
+        values themselves where more than a tenth of them are steps.
+    """
+    steps = np.flatnonzero(np.diff(values)) + 1
+    if not steps.size or steps.size > values.size / 10:
+        return values
+    places = np.concatenate([[0], steps - 0.5, [values.size - 1]])
+    levels = np.concatenate([values[:1], (values[steps - 1] + values[steps]) / 2, values[-1:]])
+    bridged: Floats = np.interp(np.arange(values.size), places, levels)
+    return bridged

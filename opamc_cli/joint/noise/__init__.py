@@ -1,0 +1,1 @@
+"""Spectra and colour of what is left."""

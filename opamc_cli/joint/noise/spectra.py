@@ -1,0 +1,224 @@
+"""Order and frequency spectra of a residual, from samples that are uniform in time only."""
+
+import numpy as np
+from scipy.fft import next_fast_len, rfft
+from scipy.ndimage import uniform_filter1d
+
+from opamc_cli.joint.motion.track import Floats, Track
+
+OVERSAMPLING = 4
+MOST_BINS = 2**21
+MOST_TIME = 8
+"""Pieces of a recording are put on its clock if it is at most so many times as long."""
+NYQUIST_SHARE = 0.9
+LOWEST_ORDER = {"motor": 0.4, "joint": 8.0, "electrical": 0.05}
+SURROUNDINGS = 20
+"""Resolutions on both sides of a line over which its surroundings are averaged."""
+LEAST_LINE = 0.02
+"""Share of the residual's power: less than half of what an effect must hold to be added."""
+
+
+def highest_order(track: Track) -> float:
+    """Highest order that is not folded at the median speed.
+
+    Parameters
+    ----------
+    track : Track
+        Track at the full rate.
+
+    Returns
+    -------
+    float
+        Cycles per revolution of the machine angle.
+    """
+    step = np.abs(np.gradient(track.machine_angle_rad))[track.moving]
+    typical = float(np.median(step)) if step.size else 0.0
+    return NYQUIST_SHARE * np.pi / typical if typical > 0 else 0.0
+
+
+def order_resolution(track: Track) -> float:
+    """Smallest difference of orders that the travelled angle can tell apart."""
+    return float(2 * np.pi / np.ptp(track.machine_angle_rad[track.moving]))
+
+
+def order_spectrum(track: Track, residual: Floats) -> tuple[Floats, Floats, int]:
+    """Power of a residual over orders of the machine angle, in units of white noise's power.
+
+    Samples are binned by angle, separately for both directions and for slow and fast motion, so
+    that a ripple whose phase depends on either is seen; each class is transformed on its own and
+    the powers are added.
+
+    Parameters
+    ----------
+    track : Track
+        Track at the full rate.
+    residual : array of shape (n,)
+        Whitened residual; zero where samples do not count.
+
+    Returns
+    -------
+    orders, power : arrays
+        Orders (cycles per revolution), oversampled four times, and the power summed over
+        classes; each class alone has mean 1 for white noise.
+    classes : int
+        Number of classes that were summed.
+    """
+    valid = track.moving & (residual != 0)
+    top = highest_order(track)
+    if valid.sum() < 50 or top <= 0:
+        return np.empty(0), np.empty(0), 1
+    angle = track.machine_angle_rad[valid]
+    values = residual[valid]
+    speed = np.abs(track.velocity[valid])
+    fast = speed > np.median(speed)
+    forward = track.velocity[valid] > 0
+    angle = angle - angle.min()
+    travel = float(angle.max()) + 1e-9
+    # A sample's angle is off by half a bin at most: 16 bins per shortest wave lose 1.3 %.
+    width = 2 * np.pi / top / 16
+    if travel / width > MOST_BINS:
+        turns = max(int(MOST_BINS * width / (2 * np.pi)), 1)
+        angle = angle % (2 * np.pi * turns)
+        travel = 2 * np.pi * turns
+    bins = int(np.ceil(travel / width)) + 1
+    length = next_fast_len(OVERSAMPLING * bins, real=True)
+    index = np.minimum((angle / width).astype(np.int64), bins - 1)
+    kept = int(top * length * width / (2 * np.pi))
+    power = np.zeros(kept)
+    classes = 0
+    for direction in (forward, ~forward):
+        for pace in (fast, ~fast):
+            members = direction & pace
+            if members.sum() < 50:
+                continue
+            part = values[members]
+            binned = np.bincount(index[members], weights=part, minlength=bins)
+            energy = float(np.dot(part, part))
+            if energy <= 0:
+                continue
+            power += np.abs(rfft(binned, length)[:kept]) ** 2 / energy
+            classes += 1
+    orders = np.arange(kept) * 2 * np.pi / (length * width)
+    return orders, power, max(classes, 1)
+
+
+def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
+    """Orders that stand out of the noise with their power, strongest first.
+
+    Parameters
+    ----------
+    track : Track
+        Track at the full rate.
+    residual : array of shape (n,)
+        Whitened residual; zero where samples do not count.
+    count : int
+        Strongest peaks, and so many of those that stand out most of their surroundings.
+
+    Returns
+    -------
+    list of (float, float)
+        Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
+        and their power in units of white noise's, where they hold 2 % of the residual's power.
+    """
+    orders, power, _ = order_spectrum(track, residual)
+    lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
+    first = int(np.searchsorted(orders, lowest))
+    if orders.size - first < 8:
+        return []
+    power = power.copy()
+    power[:first] = 0
+    # A sine that holds a share s of the power shows with half of s times the samples.
+    threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
+    spacing = float(orders[1] - orders[0])
+    guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
+    # What repeats with the motion lifts whole stretches of the spectrum: a line stands out.
+    around = uniform_filter1d(power, 2 * SURROUNDINGS * guard + 1, mode="nearest")
+    peaks: list[tuple[float, float]] = []
+    for weighed in (power.copy(), power / np.maximum(around, 1e-300)):
+        for order, _ in peaks:
+            _mask(weighed, round(order / spacing), guard)
+        for _ in range(count):
+            best = int(np.argmax(np.where(power >= threshold, weighed, 0.0)))
+            if power[best] < threshold or weighed[best] <= 0:
+                break
+            peaks.append((_vertex(orders, power, best), float(power[best])))
+            _mask(weighed, best, guard)
+    return peaks
+
+
+def _mask(power: Floats, place: int, guard: int) -> None:
+    power[max(place - guard, 0) : place + guard + 1] = 0
+
+
+def _vertex(orders: Floats, power: Floats, best: int) -> float:
+    """Place of a peak by the parabola through it and its neighbours."""
+    shift = 0.0
+    if 0 < best < power.size - 1:
+        left, middle, right = power[best - 1 : best + 2]
+        curvature = left - 2 * middle + right
+        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
+    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))
+
+
+def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floats]]]:
+    """Signals in which a line of constant frequency stands still.
+
+    Parameters
+    ----------
+    track : Track
+        With the phases' electrical angle, where they were logged.
+    residual : array of shape (n,)
+        Whitened residual.
+
+    Returns
+    -------
+    list of (bool, list of array)
+        The residual itself (False); and, from phases, the residual turned back into their frame
+        (True): what a phase picks up turns against the field in the torque current.
+    """
+    views = [(False, [residual])]
+    if "phases" in track.channels and track.electrical_rad is not None:
+        field = track.electrical_rad
+        views.append((True, [residual * np.cos(field), residual * np.sin(field)]))
+    return views
+
+
+def line_power(track: Track, signals: list[Floats]) -> tuple[Floats, Floats]:
+    """Mean power over frequency of signals on one track, see `frequency_lines`."""
+    lines = [frequency_lines(track, signal) for signal in signals]
+    power: Floats = np.mean([line[1] for line in lines], axis=0)
+    return lines[0][0], power
+
+
+def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
+    """Power of a residual over frequency, oversampled twice.
+
+    Parameters
+    ----------
+    track : Track
+        Gives the rate, and the time that passes between its recordings or pieces.
+    residual : array of shape (n,)
+        Whitened residual, zero where samples do not count.
+
+    Returns
+    -------
+    frequencies_hz, power : arrays
+        Power in units of white noise's.
+    """
+    residual = _on_the_clock(track, residual)
+    length = next_fast_len(2 * residual.size, real=True)
+    energy = float(np.dot(residual, residual))
+    power = np.abs(rfft(residual, length)) ** 2 / max(energy, 1e-300)
+    return np.arange(power.size) * track.rate_hz / length, power
+
+
+def _on_the_clock(track: Track, residual: Floats) -> Floats:
+    """Put zeros where a track leaves time out, unless that is far more than it holds."""
+    if len(track.bounds) == 1:
+        return residual
+    places = np.round((track.time_s - track.time_s[0]) * track.rate_hz).astype(np.int64)
+    if places[-1] >= MOST_TIME * residual.size:
+        return residual
+    values = np.zeros(places[-1] + 1)
+    values[places] = residual
+    return values

@@ -1,0 +1,158 @@
+"""What changed between a baseline and a target, on the tests' own simulator."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from simulator import simulate
+
+from opamc_cli.joint.change.explain import explain_change
+from opamc_cli.joint.change.moderated import moderated_t
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
+
+BASELINE, TARGET = 4, 3
+
+
+def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
+    """Sessions of two cycles each, whose friction differs by 5 %; the target's has an effect."""
+    count = BASELINE + TARGET
+    made = simulate(seed, (), 0.0, cycles=2 * count, rate=250.0)
+    rng = np.random.default_rng(seed)
+    q, v, a, noise = made.position, made.velocity, made.acceleration, made.noise_rms
+    top = np.quantile(np.abs(v), 0.95)
+    tooth = 2 * (made.gear_ratio + 1)
+    shape = {
+        "nothing": np.zeros_like(v),
+        "tooth": 1.5 * noise * np.cos(tooth * q),
+        "payload": 0.3 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
+        "friction": 0.5 * v / top,
+        "tooth and payload": 1.5 * noise * np.cos(tooth * q)
+        + 1.5 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
+        "hum": 1.5 * noise * np.cos(2 * np.pi * 50.0 * made.time),
+    }[kind]
+    edges = np.linspace(0, v.size, count + 1).astype(int)
+    if not sessions:
+        edges = edges[[0, BASELINE, count]]
+    recordings = []
+    for k, (start, stop) in enumerate(pairwise(edges)):
+        rows = slice(start, stop)
+        new = k >= (BASELINE if sessions else 1)
+        current = made.current[rows] + new * shape[rows]
+        current += 0.05 * (rng.normal() * np.sign(v[rows]) + rng.normal() * v[rows] / top)
+        recordings.append(
+            Recording(
+                f"session-{k}",
+                made.rate_hz,
+                current_a=current,
+                position_rad=q[rows],
+                temperature_c=25.0 + rng.normal() - new * colder + 0.0 * q[rows],
+            )
+        )
+    first = BASELINE if sessions else 1
+    joint = Joint(made.gear_ratio, made.pole_pairs) if known else Joint()
+    return explain_change(recordings[:first], recordings[first:], joint)
+
+
+@pytest.mark.parametrize("sessions", [True, False])
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
+    change = change_of("nothing", seed, sessions=sessions)
+    assert change.causes == ()
+    assert not change.benign
+
+
+@pytest.mark.parametrize("sessions", [True, False])
+@pytest.mark.parametrize("seed", [1, 4])
+def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
+    change = change_of("tooth", seed, sessions=sessions)
+    cause = change.causes[0]
+    assert cause.effect == "ripple"
+    assert cause.share > 0.7
+    assert "inspect the flexspline" in cause.interpretation
+    assert cause.parameters["order"] == pytest.approx(2.02, abs=0.02)
+    # An order that a stroke cannot tell from 2 is not sold as one that it can.
+    if cause.evidence["order_resolution"] > 0.05:
+        assert "kinematic error" in cause.ties[0]
+    assert not change.benign
+
+
+def test_tooth_damage_is_a_fault_even_where_a_payload_hides_it():
+    change = change_of("tooth and payload")
+    assert change.causes[0].effect == "ripple"
+    assert change.causes[1].effect == "payload_change"
+    assert change.causes[1].share > 0.7
+    assert not change.benign
+
+
+def test_a_line_that_keeps_its_frequency_is_no_ripple():
+    change = change_of("hum")
+    assert change.causes[0].effect == "mains_hum"
+    assert change.causes[0].parameters == {"frequency_hz": 50.0}
+    assert change.benign
+
+
+def test_unknown_gear_ratio_leaves_the_order_per_joint_revolution():
+    cause = change_of("tooth", known=False).causes[0]
+    assert cause.effect == "ripple"
+    assert "gear ratio unknown" in cause.interpretation
+
+
+@pytest.mark.parametrize(
+    ("kind", "colder", "effect"),
+    [("payload", 0.0, "payload_change"), ("friction", 15.0, "thermal_viscous")],
+)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
+    change = change_of(kind, seed, colder)
+    assert change.causes[0].effect == effect
+    assert change.benign
+
+
+@pytest.mark.parametrize(
+    ("kind", "effect", "benign"),
+    [
+        ("hum of a phase", "mains_hum", True),
+        ("gain of a phase", "sensor_gain", True),
+        ("order 7", "ripple", False),
+    ],
+)
+def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, benign):
+    rng = np.random.default_rng(5)
+    made = simulate(5, (), 0.0, cycles=2 * (BASELINE + TARGET), rate=1000.0)
+    joint = Joint(gear_ratio=50.0, pole_pairs=4)  # a carrier well below half the rate
+    edges = np.linspace(0, made.current.size, BASELINE + TARGET + 1).astype(int)
+    recordings = []
+    for k, (start, stop) in enumerate(pairwise(edges)):
+        q, current = made.position[start:stop], made.current[start:stop]
+        new = k >= BASELINE
+        if new and kind == "order 7":
+            current = current + 3 * made.noise_rms * np.cos(7 * 50 * q)
+        field = 4 * 50 * q + rng.uniform(0, 2 * np.pi)
+        phases = current[:, None] * np.cos(field[:, None] - np.arange(3) * 2 * np.pi / 3)
+        phases += 0.3 * made.noise_rms * rng.normal(size=phases.shape)
+        if new and kind == "hum of a phase":
+            phases[:, 0] += 3 * made.noise_rms * np.sin(100 * np.pi * made.time[start:stop])
+        if new and kind == "gain of a phase":
+            phases[:, 1] *= 1.3
+        recordings.append(Recording(f"{k}", 1000.0, phases_a=phases, position_rad=q))
+    change = explain_change(recordings[:BASELINE], recordings[BASELINE:], joint)
+    assert change.causes[0].effect == effect
+    assert change.causes[0].share > 0.6
+    assert change.benign == benign
+
+
+def test_more_friction_at_the_same_temperature_is_not_benign():
+    change = change_of("friction")
+    assert "viscous" in {change.causes[0].effect, *change.causes[0].ties}
+    assert not change.benign
+
+
+def test_a_variance_of_few_is_drawn_towards_that_of_all():
+    rng = np.random.default_rng(1)
+    before, after = rng.normal(size=(4, 2000)), rng.normal(size=(3, 2000))
+    _, p_values = moderated_t(before, after)
+    assert np.mean(p_values < 0.05) == pytest.approx(0.05, abs=0.02)
+    before[:, 0] = 0.0  # four that agree by chance are no proof of a difference
+    after[:, 0] = 0.5
+    assert moderated_t(before, after)[1][0] > 0.01

@@ -1,0 +1,163 @@
+"""Leaving units out by subtracting sums, against refitting without them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from opamc_cli.joint.fit.parts import FEWEST_UNITS, PARTS_PER_UNIT, Parts, parts_of
+from opamc_cli.joint.fit.regressor_cache import RegressorCache
+
+
+def random_parts(rng, units):
+    """Shuffled rows of a grid, some parts of one sample, some of them not judged."""
+    unit, sizes = [], []
+    for number in range(units):
+        for _ in range(int(rng.integers(1, 5))):
+            unit.append(number)
+            sizes.append(1 if rng.random() < 0.3 else int(rng.integers(2, 20)))
+    stops = np.cumsum(sizes)
+    slices = tuple((int(b - s), int(b)) for b, s in zip(stops, sizes, strict=True))
+    rows = rng.permutation(int(stops[-1]) + 7)[: stops[-1]]
+    return Parts(rows, slices, np.array(unit), rng.random(len(unit)) < 0.7)
+
+
+def sums_of(columns, current, parts):
+    return RegressorCache().sums([columns], current, parts, True)
+
+
+def unit_of_rows(parts):
+    return np.repeat(parts.unit, [stop - start for start, stop in parts.slices])
+
+
+def fitted(columns, signal):
+    scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-100)
+    return np.linalg.lstsq(columns / scale, signal, rcond=1e-6)[0] / scale
+
+
+def slow_held_out(columns, signal, parts):
+    """Fit to all other units, predict each part."""
+    columns, signal, unit = columns[parts.rows], signal[parts.rows], unit_of_rows(parts)
+    errors = []
+    for (start, stop), number in zip(parts.slices, parts.unit, strict=True):
+        others = unit != number
+        values = fitted(columns[others], signal[others])
+        errors.append(np.sum((signal[start:stop] - columns[start:stop] @ values) ** 2))
+    return np.array(errors)
+
+
+def slow_without_drift(columns, signal, parts):
+    """Likewise, with an offset for every part among the regressors."""
+    columns, signal, unit = columns[parts.rows], signal[parts.rows], unit_of_rows(parts)
+    part = np.repeat(np.arange(len(parts.slices)), [b - a for a, b in parts.slices])
+    errors = []
+    for number, (start, stop) in enumerate(parts.slices):
+        others = unit != parts.unit[number]
+        offsets = part[others][:, None] == np.unique(part[others])
+        design = np.concatenate([columns[others], offsets], axis=1)
+        values = fitted(design, signal[others])[: columns.shape[1]]
+        rest = signal[start:stop] - columns[start:stop] @ values
+        errors.append(np.sum((rest - rest.mean()) ** 2))
+    return np.array(errors)
+
+
+def drawn(seed, width, units):
+    rng = np.random.default_rng(seed)
+    parts = random_parts(rng, units)
+    size = parts.rows.max() + 9
+    columns = rng.normal(size=(size, width)) * 10.0 ** rng.integers(-4, 5, width)
+    return rng, parts, columns, rng.normal(size=size)
+
+
+SIZES = (st.integers(0, 10_000), st.integers(1, 4), st.integers(8, 11))
+
+
+@settings(max_examples=40, deadline=None)
+@given(*SIZES)
+def test_leaving_units_out_equals_refitting(seed, width, units):
+    _, parts, columns, signal = drawn(seed, width, units)
+    fast = sums_of(columns, signal, parts).held_out()
+    np.testing.assert_allclose(fast, slow_held_out(columns, signal, parts), rtol=1e-6, atol=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(*SIZES)
+def test_collinear_columns_and_empty_ones_change_no_error(seed, width, units):
+    _, parts, columns, signal = drawn(seed, width, units)
+    twice = np.concatenate([columns, 3 * columns[:, :1], np.zeros_like(columns[:, :1])], axis=1)
+    fast = sums_of(twice, signal, parts).held_out()
+    np.testing.assert_allclose(fast, slow_held_out(columns, signal, parts), rtol=1e-5, atol=1e-9)
+
+
+def test_a_model_of_nothing_leaves_the_current():
+    _, parts, columns, signal = drawn(1, 2, 8)
+    power = [np.sum(signal[parts.rows][a:b] ** 2) for a, b in parts.slices]
+    np.testing.assert_allclose(sums_of(columns[:, :0], signal, parts).held_out(), power)
+
+
+@settings(max_examples=30, deadline=None)
+@given(*SIZES)
+def test_known_coefficients_are_taken_out_of_the_current(seed, width, units):
+    rng, parts, columns, signal = drawn(seed, width, units)
+    extra, values = rng.normal(size=(signal.size, 2)), rng.normal(size=2)
+    mixed = np.concatenate([extra[:, :1], columns, extra[:, 1:]], axis=1)
+    fast = sums_of(mixed, signal, parts).given([0, width + 1], values)
+    slow = sums_of(columns, signal - extra @ values, parts)
+    for name in ("gram", "moment", "power"):
+        np.testing.assert_allclose(getattr(fast, name), getattr(slow, name), rtol=1e-7, atol=1e-7)
+
+
+@settings(max_examples=30, deadline=None)
+@given(*SIZES)
+def test_drift_is_an_offset_for_every_part(seed, width, units):
+    _, parts, columns, signal = drawn(seed, width, units)
+    signal += 50 * np.arange(signal.size) / signal.size
+    with_ones = np.concatenate([columns, np.ones((signal.size, 1))], axis=1)
+    fast = sums_of(with_ones, signal, parts).without_drift().held_out()
+    slow = slow_without_drift(columns, signal, parts)
+    np.testing.assert_allclose(fast, slow, rtol=1e-5, atol=1e-6)
+    single = [b - a == 1 for a, b in parts.slices]
+    np.testing.assert_allclose(fast[single], 0, atol=1e-6)
+
+
+@settings(max_examples=20, deadline=None)
+@given(*SIZES)
+def test_appended_regressors_are_those_that_were_there_from_the_start(seed, width, units):
+    rng, parts, columns, signal = drawn(seed, width, units)
+    more = rng.normal(size=(signal.size, 2))
+    left, right = parts.taken(columns), parts.taken(more)
+    target = parts.taken(signal)[:, None]
+    beside = sums_of(columns, signal, parts).beside(
+        parts.products(left, right), parts.products(right, right),
+        parts.products(right, target)[:, :, 0],
+    )  # fmt: skip
+    together = sums_of(np.concatenate([columns, more], axis=1), signal, parts)
+    for name in ("gram", "moment", "power"):
+        np.testing.assert_allclose(getattr(beside, name), getattr(together, name), rtol=1e-9)
+    kept = together.columns([width + 1, 0])
+    swapped = sums_of(np.stack([more[:, 1], columns[:, 0]], axis=1), signal, parts)
+    np.testing.assert_allclose(kept.held_out(), swapped.held_out(), rtol=1e-7)
+
+
+@pytest.mark.parametrize(("groups", "units"), [(1, 8), (2, 8), (3, 9), (5, 10), (8, 8), (11, 11)])
+def test_few_groups_are_cut_until_there_are_eight_units(groups, units):
+    clear = np.ones(groups * 100, dtype=bool)
+    clear[::7] = False
+    rows = [np.arange(k * 100, k * 100 + 90) for k in range(groups)]
+    parts = parts_of(SimpleNamespace(rows=[*rows, np.arange(0)]), clear)
+    assert parts.units == units >= FEWEST_UNITS
+    np.testing.assert_array_equal(np.sort(parts.rows), np.concatenate(rows))
+    assert np.bincount(parts.unit[parts.judged]).tolist() == [PARTS_PER_UNIT] * units
+    for (start, stop), judged in zip(parts.slices, parts.judged, strict=True):
+        members = parts.rows[start:stop]
+        assert np.all(clear[members] == judged)
+        assert np.ptp(members // 100) == 0
+
+
+def test_a_group_of_two_samples_gives_units_of_one():
+    rows = [np.array([3, 4]), np.arange(10, 90)]
+    parts = parts_of(SimpleNamespace(rows=rows), np.ones(100, dtype=bool))
+    assert parts.units == 6
+    np.testing.assert_array_equal(parts.rows[:2], [3, 4])

@@ -1,0 +1,63 @@
+"""Products that are kept, against products that are computed, whatever was forgotten between."""
+
+import numpy as np
+import pytest
+from test_parts import random_parts
+
+from opamc_cli.joint.fit import regressor_cache
+from opamc_cli.joint.fit.regressor_cache import RegressorCache
+
+
+def check(sums, blocks, current, parts):
+    columns = np.concatenate(blocks, axis=1)
+    for k, (start, stop) in enumerate(parts.slices):
+        rows = parts.rows[start:stop]
+        np.testing.assert_allclose(sums.gram[k], columns[rows].T @ columns[rows], atol=1e-9)
+        np.testing.assert_allclose(sums.moment[k], columns[rows].T @ current[rows], atol=1e-9)
+        assert sums.power[k] == pytest.approx(current[rows] @ current[rows])
+
+
+@pytest.mark.parametrize("most_bytes", [0.0, 1e4, 1e9])
+def test_sums_are_right_after_anything_was_forgotten(monkeypatch, most_bytes):
+    monkeypatch.setattr(regressor_cache, "MOST_BYTES", most_bytes)
+    rng = np.random.default_rng(2)
+    grids = {}
+    for fine in (True, False):
+        parts = random_parts(rng, 8)
+        size = parts.rows.max() + 1
+        columns = {k: rng.normal(size=(size, 1 + k % 3)) for k in range(12)}
+        grids[fine] = parts, columns, rng.normal(size=size)
+    cache = RegressorCache()
+    computed = 0
+    for _ in range(60):
+        fine = bool(rng.random() < 0.5)
+        parts, columns, current = grids[fine]
+        chosen = rng.choice(12, size=4, replace=False)
+        blocks = []
+        for key in chosen:
+
+            def compute(key=key, columns=columns):
+                nonlocal computed
+                computed += 1
+                return columns[key].copy()
+
+            blocks.append(cache.columns((int(key), fine), compute))
+        # Blocks that nobody keeps: another one may get their place in memory.
+        blocks.append(rng.normal(size=(current.size, 2)))
+        check(cache.sums(blocks, current, parts, fine), blocks, current, parts)
+    assert (computed == 24) == (most_bytes == 1e9)
+
+
+def test_after_clearing_everything_is_computed_again():
+    rng = np.random.default_rng(3)
+    parts = random_parts(rng, 8)
+    block, current = (
+        rng.normal(size=(parts.rows.max() + 1, 2)),
+        rng.normal(size=parts.rows.max() + 1),
+    )
+    cache = RegressorCache()
+    check(cache.sums([block], current, parts, True), [block], current, parts)
+    cache.clear()
+    check(cache.sums([block], 2 * current, parts, True), [block], 2 * current, parts)
+    other = random_parts(rng, 8)
+    assert cache.sums([], current, other, False).held_out().size == len(other.slices)

@@ -1,0 +1,122 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulator import simulate
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit import model, thinning
+from opamc_cli.joint.fit.declared import declared_fit
+from opamc_cli.joint.fit.model import Term, fit_terms, open_session
+from opamc_cli.joint.fit.regressor_cache import RegressorCache
+from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.motion.groups import group_samples
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import grouped_track
+from opamc_cli.joint.motion.track import Joint
+
+DECLARED = ("inertia", "gravity", "coulomb", "viscous")
+LIMIT = 20_000
+
+
+@pytest.fixture
+def low_limit(monkeypatch):
+    monkeypatch.setattr(thinning, "TAKEN_SAMPLES", LIMIT)
+    monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
+
+
+def long_track(seed=5, effects=("load_friction",), cycles=12, kind="trapezoid"):
+    made = simulate(seed, effects, 0.8, rate=500.0, cycles=cycles, kind=kind)
+    recording = Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
+    return grouped_track([recording], Joint(made.gear_ratio, made.pole_pairs))
+
+
+def terms(*effects):
+    library = built_in_library()
+    return tuple(Term(library[name], parameters) for name, parameters in effects)
+
+
+def test_cycles_are_taken_whole_and_begin_at_the_same_place(low_limit):
+    track, grouping = long_track(cycles=30)
+    session = open_session(track, grouping)
+    taken = np.unique(session.fine.track.group[session.fine.fit])
+    assert grouping.kind == "cycles"
+    assert thinning.FEWEST_GROUPS <= taken.size < len(session.fit_groups)
+    for group in taken:
+        there = np.count_nonzero(session.fine.fit & (session.fine.track.group == group))
+        assert there == np.count_nonzero(track.moving & (grouping.group == group))
+    first = [session.fine.track.position_rad[start] for start, _ in session.fine.track.bounds]
+    np.testing.assert_allclose(first, first[0], atol=1e-6)
+
+
+def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
+    track, _ = long_track(cycles=30, kind="sines")
+    blocks = group_samples(track.moving, track.bounds, None, track.rate_hz, ("run",))
+    assert blocks.kind == "blocks"
+    session = open_session(replace(track, period_samples=None), blocks)
+    fine = session.fine
+    assert np.count_nonzero(fine.fit) == pytest.approx(LIMIT * 0.75, rel=0.02)
+    for group in session.fit_groups:
+        whole = track.time_s[track.moving & (blocks.group == group)]
+        part = fine.track.time_s[fine.fit & (fine.track.group == group)]
+        assert part[0] == whole[0]
+        assert part[-1] == whole[-1]
+    outside = fine.track.group == -1
+    assert not (fine.fit & outside).any()
+    # What comes before a piece lets the effects with a memory settle.
+    for start, stop in fine.track.bounds[1:]:
+        held = np.flatnonzero(fine.track.group[start:stop] >= 0)
+        assert held[0] >= thinning.LEAD_S * track.rate_hz - 1
+
+
+def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end(low_limit):
+    track, grouping = long_track(cycles=20)
+    session = open_session(track, grouping)
+    assert not session.fine.sealed.any()
+    fitted = fit_terms(session, terms(*((name, {}) for name in DECLARED)))
+    opened = fitted.opened
+    sealed = track.moving & np.isin(grouping.group, grouping.sealed)
+    np.testing.assert_array_equal(
+        opened.session.fine.track.current_a[opened.session.fine.sealed], track.current_a[sealed]
+    )
+    np.testing.assert_allclose(
+        np.concatenate(opened.coefficients), np.concatenate(fitted.coefficients), rtol=1e-9
+    )
+
+
+def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells(monkeypatch):
+    track, grouping = long_track(cycles=20)
+    library = built_in_library()
+    declared = tuple((library[name], None) for name in DECLARED)
+    whole = close_loop(declared_fit(open_session(track, grouping), declared), library)
+    monkeypatch.setattr(thinning, "TAKEN_SAMPLES", LIMIT)
+    monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
+    part = close_loop(declared_fit(open_session(track, grouping), declared), library)
+    assert [s.term.effect.name for s in part.steps] == [s.term.effect.name for s in whole.steps]
+    assert part.verdict == whole.verdict == "closed"
+    assert part.rmse_before_a == pytest.approx(whole.rmse_before_a, rel=0.02)
+    assert part.rmse_after_a == pytest.approx(whole.rmse_after_a, rel=0.02)
+
+
+def test_fits_that_share_regressors_are_those_that_compute_their_own():
+    track, grouping = long_track(cycles=6)
+    ripple = ("ripple", {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0})
+    everything = terms(
+        *((name, {}) for name in DECLARED), ("load_friction", {}), ripple, ("offset", {})
+    )
+    shared = own = fit_terms(open_session(track, grouping), everything[:4])
+    for chosen in (everything[:5], everything[:6], everything, everything[:4] + everything[5:]):
+        shared = fit_terms(shared.session, chosen)
+        own = fit_terms(replace(own.session, cache=RegressorCache()), chosen)
+        for ours, theirs in zip(shared.coefficients, own.coefficients, strict=True):
+            np.testing.assert_allclose(ours, theirs, rtol=1e-8)
+        for term in chosen:
+            np.testing.assert_allclose(
+                shared.session.columns(term, fine=False),
+                term_columns(own.session, term),
+                atol=1e-9,
+            )
+
+
+def term_columns(session, term):
+    return replace(session, cache=RegressorCache()).columns(term, fine=False)

@@ -1,0 +1,45 @@
+import numpy as np
+
+from opamc_cli.joint.motion.groups import cycle_length, group_samples
+
+
+def test_cycle_is_the_lag_at_which_the_path_repeats():
+    rng = np.random.default_rng(3)
+    cycle = np.convolve(rng.normal(size=1234), np.hanning(101), mode="same")
+    assert cycle_length(np.tile(cycle, 5), 1000.0) == 1234
+
+
+def test_a_path_that_never_repeats_has_no_cycle():
+    rng = np.random.default_rng(3)
+    assert cycle_length(np.convolve(rng.normal(size=9000), np.hanning(101), "same"), 500.0) is None
+
+
+def test_sealed_cycles_are_the_last_and_at_least_one():
+    moving = np.ones(8000, dtype=bool)
+    grouping = group_samples(moving, ((0, 8000),), 1000, 100.0, ("run",))
+    assert grouping is not None
+    assert grouping.kind == "cycles"
+    assert [grouping.names[g] for g in grouping.sealed] == ["run:6", "run:7"]
+    assert np.all(grouping.group[6000:] >= 6)
+
+
+def test_a_single_stroke_is_cut_into_blocks_and_some_of_its_middle_is_sealed():
+    moving = np.ones(6000, dtype=bool)
+    grouping = group_samples(moving, ((0, 6000),), None, 1000.0, ("run",))
+    assert grouping is not None
+    assert grouping.kind == "blocks"
+    assert grouping.sealed == (2, 5, 9)
+
+
+def test_recordings_are_groups_where_nothing_repeats_inside_them():
+    moving = np.ones(5000, dtype=bool)
+    bounds = tuple((k * 1000, k * 1000 + 1000) for k in range(5))
+    grouping = group_samples(moving, bounds, None, 100.0, tuple("abcde"))
+    assert grouping is not None
+    assert [grouping.names[g] for g in grouping.sealed] == ["e"]
+
+
+def test_too_little_motion_seals_nothing():
+    moving = np.zeros(6000, dtype=bool)
+    moving[100:150] = True
+    assert group_samples(moving, ((0, 6000),), None, 1000.0, ("run",)) is None

@@ -1,0 +1,92 @@
+import numpy as np
+import pytest
+from simulator import simulate
+
+from opamc_cli.joint.motion.smoothing import (
+    SHORTEST_WINDOW,
+    averaging_kernel,
+    derivatives,
+    measurement_noise,
+    smoothing_window,
+    taken_noise_gain,
+    unstepped,
+)
+from opamc_cli.joint.motion.track import averaged
+
+
+def slow_derivative(path, rate, window, order):
+    half = window // 2
+    values = np.full(path.size, np.nan)
+    times = np.arange(-half, half + 1) / rate
+    for i in range(half, path.size - half):
+        fitted = np.polynomial.polynomial.polyfit(times, path[i - half : i + half + 1], 3)
+        values[i] = fitted[order] * (1, 1, 2)[order]
+    return values
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("window", [5, 9, 21])
+def test_derivative_is_that_of_a_cubic_fitted_around_each_sample(order, window):
+    path = np.cumsum(np.random.default_rng(1).normal(size=80))
+    slow = slow_derivative(path, 100.0, window, order)
+    fast = derivatives(path, 100.0, window, order)
+    inside = np.isfinite(slow)
+    np.testing.assert_allclose(fast[inside], slow[inside], rtol=1e-6, atol=1e-6)
+
+
+@pytest.mark.parametrize("window", [7, 13, 51])
+def test_second_derivative_is_the_average_of_the_plain_one(window):
+    path = np.cumsum(np.cumsum(np.random.default_rng(2).normal(size=400)))
+    plain = np.zeros_like(path)
+    plain[1:-1] = np.diff(path, 2)
+    smooth = averaged(plain, ((0, 400),), averaging_kernel(window, 2))
+    inside = slice(window, -window)
+    np.testing.assert_allclose(smooth[inside], derivatives(path, 1.0, window, 2)[inside])
+
+
+def test_noise_of_a_quantised_ramp_is_about_the_quantum():
+    path = np.round(np.linspace(0, 1, 5000) ** 1.7 / 1e-3) * 1e-3
+    assert 1e-4 < measurement_noise(path) < 2e-3
+
+
+def test_clean_paths_get_the_shortest_window_and_noisy_ones_a_longer():
+    t = np.arange(5000) / 1000
+    clean = np.sin(3 * t)
+    noisy = clean + np.random.default_rng(0).normal(size=t.size) * 1e-5
+    assert smoothing_window(clean, 1000.0) == 5
+    assert smoothing_window(noisy, 1000.0) > 21
+
+
+def test_noise_of_a_quantised_path_at_high_rate_is_not_the_rounding_of_the_computer():
+    # A hundred samples per step of the encoder: most fourth differences are rounding alone.
+    path = np.round(np.linspace(0.3, 0.4, 20_000) / 5e-4) * 5e-4
+    assert measurement_noise(path) > 1e-5
+    assert measurement_noise(np.linspace(0.3, 0.4, 20_000)) == 0.0
+
+
+@pytest.mark.parametrize("derivative", [1, 2])
+def test_noise_of_what_a_window_takes_twice_is_that_of_noise_put_through_it(derivative):
+    noise = np.random.default_rng(4).normal(size=40_000)
+    values = derivatives(noise, 100.0, 21, derivative)
+    taken = values - averaged(values, ((0, noise.size),), averaging_kernel(21, derivative))
+    expected = taken_noise_gain(100.0, 21, derivative)
+    np.testing.assert_allclose(np.std(taken[50:-50]), expected, rtol=0.03)
+
+
+def test_steps_of_a_coarse_temperature_are_bridged():
+    true = 25 + 8 * (1 - np.exp(-np.arange(20_000) / 6000))
+    logged = np.round(true / 0.5) * 0.5
+    assert np.max(np.abs(logged - true)) > 0.24
+    # Beyond the last step nobody knows.
+    inside = slice(500, np.flatnonzero(np.diff(logged))[-1])
+    assert np.max(np.abs(unstepped(logged) - true)[inside]) < 0.05
+    noisy = np.random.default_rng(0).normal(size=100)
+    assert unstepped(noisy) is noisy
+
+
+def test_a_motion_that_is_measured_without_fault_has_no_noise():
+    # Corners of the acceleration, four in every move, are no noise, and a slow rate has few samples
+    # beside them.
+    made = simulate(22324, (), rate=100.0, kind="trapezoid")
+    assert measurement_noise(made.position) < 1e-8
+    assert smoothing_window(made.position, 100.0) == SHORTEST_WINDOW
