@@ -26,12 +26,12 @@ from numpy.typing import NDArray
 from sklearn.ensemble import IsolationForest
 
 from opamc_cli.config import load_config
-from opamc_cli.signal.ordinal import ordinal_counts
-from opamc_cli.stages.cause import explain
-from opamc_cli.stages.cells import bundles
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.side import Side, Sides, read_side
-from opamc_cli.stats.decision import Bundle, Judgement, judge
+from opamc_cli.decision.judge import Bundle, Judgement, judge
+from opamc_cli.signal.ordinal.patterns import ordinal_counts
+from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.verdict.cause import explain
+from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import RunInfo, save_run
 
 DATA = Path(__file__).parents[2] / "shared" / "data" / "linear_actuator"

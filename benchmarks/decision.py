@@ -29,17 +29,17 @@ from scipy.stats import kstest, rankdata
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.signal.analytic import clarke
-from opamc_cli.stages import identify, patterns
-from opamc_cli.stages.cells import bundles
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.patterns import aligned_span
-from opamc_cli.stages.side import Side, Sides
-from opamc_cli.stages.witnesses import WITNESSES
-from opamc_cli.stats.decision import Bundle, judge
-from opamc_cli.stats.discriminant import fit
-from opamc_cli.stats.divergence import divergences_from_pool
-from opamc_cli.stats.features import compare
+from opamc_cli.decision.divergence.discriminant import fit
+from opamc_cli.decision.divergence.features import compare
+from opamc_cli.decision.divergence.jensen_shannon import divergences_from_pool
+from opamc_cli.decision.judge import Bundle, judge
+from opamc_cli.signal.transform.analytic import clarke
+from opamc_cli.stages.chain import identify, patterns
+from opamc_cli.stages.chain.compared.side import Side, Sides
+from opamc_cli.stages.chain.patterns import aligned_span
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.chain.witnesses import WITNESSES
+from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import Run, RunInfo, save_run
 from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import MOTIONS, read_table, write_table

@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import spearmanr
 
-from opamc_cli.app import main as opamc
+from opamc_cli.__main__ import main as opamc
 from opamc_cli.config import load_config
-from opamc_cli.stages import score
-from opamc_cli.stages.chain import run_chain
+from opamc_cli.stages.chain import score
+from opamc_cli.stages.chain.to_patterns import run_chain
 
 ROOT = Path(__file__).parents[1]
 DATA = ROOT.parent / "shared" / "data" / "itsc_phase_current"

@@ -25,9 +25,9 @@ import numpy as np
 import ordpy
 import ssqueezepy
 
-from opamc_cli.signal.analytic import clarke, temporal_fine_structure
-from opamc_cli.signal.motion import MotionBand, MotionStream, join_frames
-from opamc_cli.signal.ordinal import ordinal_counts
+from opamc_cli.signal.motion.motion_signal import MotionBand, MotionStream, join_frames
+from opamc_cli.signal.ordinal.patterns import ordinal_counts
+from opamc_cli.signal.transform.analytic import clarke, temporal_fine_structure
 
 FS_HZ = 2048.0
 STEP = 16

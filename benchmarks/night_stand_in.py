@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 from opamc_cli.errors import UsageError
-from opamc_cli.stages.nightly.night import AxisResult, NightJob, ProgramResult
+from opamc_cli.stages.nightly.workers.night import AxisResult, NightJob, ProgramResult
 
 
 def stand_in(job: NightJob) -> tuple[ProgramResult, ...]:

@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 import cell_logs
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 from opamc_cli.stages.nightly import run as stage
 from opamc_cli.storage.history import dump
 

@@ -19,10 +19,10 @@ from scipy.stats import kstest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.stages.cells import bundles
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.side import Side, Sides, read_side
-from opamc_cli.stats.decision import judge
+from opamc_cli.decision.judge import judge
+from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.testbed.robot import simulate
 

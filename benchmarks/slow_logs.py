@@ -19,9 +19,10 @@ from scipy.stats import rankdata
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.errors import OpamcError
-from opamc_cli.stages import score, verdict
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.side import Sides, read_side
+from opamc_cli.stages.chain import score
+from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.verdict import verdict
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.testbed.robot import simulate
 

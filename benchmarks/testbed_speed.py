@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.stages import simulate as stage
+from opamc_cli.stages.recordings import simulate as stage
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).parents[1]

@@ -29,9 +29,11 @@ from thesis_figures import draw_all
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.stages import patterns, score, simulate, sweep
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stats.discriminant import fit
+from opamc_cli.decision.divergence.discriminant import fit
+from opamc_cli.stages.chain import patterns, score
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.recordings import simulate
+from opamc_cli.stages.tuning import sweep
 
 ROOT = Path(__file__).parents[1]
 FAULT_AXIS, NORMAL_AXIS = 3, 2

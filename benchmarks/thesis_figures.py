@@ -6,7 +6,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from opamc_cli.stats.discriminant import fit
+from opamc_cli.decision.divergence.discriminant import fit
 
 mpl.use("Agg")
 from matplotlib import pyplot as plt

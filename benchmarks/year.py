@@ -26,11 +26,11 @@ import numpy as np
 from opamc_cli.config import load_config
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.config.testbed import load_testbed
-from opamc_cli.stages import identify, patterns, segment
-from opamc_cli.stages.kept import KeptResults
+from opamc_cli.stages.chain import identify, patterns, segment
+from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.nightly.alarms import settle_robot
-from opamc_cli.stages.side import Sides, read_side
-from opamc_cli.stages.verdict import decide
+from opamc_cli.stages.verdict.verdict import decide
 from opamc_cli.storage.history import AlarmRow
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.testbed.robot import simulate

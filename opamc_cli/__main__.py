@@ -1,5 +1,79 @@
-"""`python -m opamc_cli`."""
+"""The `opamc` command, and the one place where errors become exit codes.
 
-from opamc_cli.app import main
+Nothing but the interpreter's own is imported before the signals are in hand: an interruption in
+the first millisecond ends as one in the last.
+"""
 
-main()
+import os
+import sys
+from collections.abc import Sequence
+
+from opamc_cli.commands.terminal.streams import open_streams, say
+from opamc_cli.errors import ExitCode, OpamcError, UsageError
+from opamc_cli.stages.processes.interruption import Interrupted, interruptible
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run `opamc` and exit with one of `ExitCode`, or 128 and the number of a signal."""
+    with interruptible():
+        open_streams()
+        given = sys.argv[1:] if arguments is None else list(arguments)
+        try:
+            _run(given)
+        except OpamcError as error:
+            _tell(str(error), error.exit_code, given)
+            sys.exit(error.exit_code)
+        except Interrupted as error:
+            _tell(str(error), error.code, given)
+            raise
+        except MemoryError:
+            message = "out of memory; use fewer --jobs, shorter recordings, or another machine"
+            _tell(message, ExitCode.USAGE, given)
+            sys.exit(ExitCode.USAGE)
+        except OSError as error:
+            # what the system refuses is no bug of ours: no space, no permission, too many files
+            where = f"{error.filename}: " if error.filename is not None else ""
+            message = f"{where}{error.strerror or error}; check space, permissions and limits"
+            _tell(message, ExitCode.USAGE, given)
+            sys.exit(ExitCode.USAGE)
+        except Exception as error:  # noqa: BLE001 - the last resort; everything known is above
+            if os.environ.get("OPAMC_DEBUG"):
+                import traceback
+
+                traceback.print_exc()
+            told = f"a bug: {type(error).__name__}: {error} (set OPAMC_DEBUG=1 for the traceback)"
+            _tell(told, ExitCode.BUG, given)
+            sys.exit(ExitCode.BUG)
+
+
+def _run(given: list[str]) -> None:
+    for argument in given:
+        if not argument.isprintable() and any("\ud800" <= c <= "\udfff" for c in argument):
+            msg = f"{argument!r}: is not UTF-8; rename the file or write the option in UTF-8"
+            raise UsageError(msg)
+    from opamc_cli.commands.command_line import run
+
+    sys.exit(run(given))
+
+
+def _tell(message: str, code: int, given: Sequence[str]) -> None:
+    """Print an error on stderr, and as JSON on stdout where the result would have been JSON."""
+    say(f"opamc: {message}\n", sys.stderr)
+    if "--json" in given:
+        import json
+
+        values = {"error": {"message": message, "exit_code": int(code)}}
+        say(json.dumps(values, indent=2) + "\n", sys.stdout)
+
+
+def __getattr__(name: str) -> object:
+    """Hand out the subcommands without importing them before they are asked for."""
+    if name == "app":
+        from opamc_cli.commands.command_line import app
+
+        return app
+    raise AttributeError(name)
+
+
+if __name__ == "__main__":
+    main()

@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from opamc_cli.commands.options import ConfigFile, Json, Overrides
-from opamc_cli.commands.output import Output
+from opamc_cli.commands.terminal.options import ConfigFile, Json, Overrides
+from opamc_cli.commands.terminal.output import Output
 
 if TYPE_CHECKING:
     from pydantic import BaseModel
@@ -18,7 +18,7 @@ app = typer.Typer(help="Show or check the configuration.", no_args_is_help=True)
 def show(config: ConfigFile = None, overrides: Overrides = None, as_json: Json = False) -> None:
     """Print the effective configuration, every key with what it does."""
     from opamc_cli.config import load_config
-    from opamc_cli.config.document import to_yaml
+    from opamc_cli.config.yaml.document import to_yaml
 
     effective = load_config(config, overrides or ())
     if as_json:
@@ -43,9 +43,9 @@ def check(
     """Check a file or options; exit 2 with the first key that is wrong."""
     from opamc_cli.config import load_config
     from opamc_cli.config.files import read_values
-    from opamc_cli.config.kinds import USES, kind_of
+    from opamc_cli.config.yaml.kinds import USES, kind_of
     from opamc_cli.errors import UsageError
-    from opamc_cli.storage.ingest.axes import protect
+    from opamc_cli.storage.ingest.map.axes import protect
 
     if file is not None and config is not None:
         msg = f"check {file} or {config}, one at a time"
@@ -67,7 +67,7 @@ def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
     from opamc_cli.config.cell import load_cell
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.config.testbed import load_testbed
-    from opamc_cli.storage.ingest.map import load_map
+    from opamc_cli.storage.ingest.map.map_file import load_map
 
     if kind == "testbed":
         return load_testbed(file, overrides)
@@ -91,4 +91,6 @@ def schema(
     if name not in ("verdict.schema.json", "loop.schema.json"):
         msg = f"schema {document}: write verdict or loop"
         raise UsageError(msg)
-    typer.echo(resources.files("opamc_cli.schemas").joinpath(name).read_text("utf-8"), nl=False)
+    typer.echo(
+        resources.files("opamc_cli.storage.schemas").joinpath(name).read_text("utf-8"), nl=False
+    )

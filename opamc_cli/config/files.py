@@ -7,11 +7,11 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from opamc_cli.config.kinds import KEYS, USES, kind_of
 from opamc_cli.config.models import Config
 from opamc_cli.config.reading import read_text, shown
 from opamc_cli.config.shipped import shipped_file
-from opamc_cli.config.yaml_values import YamlError, plain_values
+from opamc_cli.config.yaml.kinds import KEYS, USES, kind_of
+from opamc_cli.config.yaml.values import YamlError, plain_values
 from opamc_cli.errors import ConfigError
 
 Model = TypeVar("Model", bound=BaseModel)

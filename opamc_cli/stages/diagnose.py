@@ -8,18 +8,20 @@ from typing import Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, OpamcError
-from opamc_cli.stages import cause, chain, findings, report, score, verdict
-from opamc_cli.stages.agreement.common import far_together
-from opamc_cli.stages.agreement.compare import Agreement
-from opamc_cli.stages.agreement.duplicates import repeated
-from opamc_cli.stages.agreement.unjudged import refuse_all, with_reasons
-from opamc_cli.stages.chain import run_chain
-from opamc_cli.stages.kept import KeptResults
-from opamc_cli.stages.latent import LatentModels
-from opamc_cli.stages.parallel import Steps, unshown
-from opamc_cli.stages.side import Sides, read_side
-from opamc_cli.stages.verdict_header import header
-from opamc_cli.storage.result import published_text, result
+from opamc_cli.stages import report
+from opamc_cli.stages.chain import score, to_patterns
+from opamc_cli.stages.chain.compared.discriminants import LatentModels
+from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.processes.parallel import Steps, unshown
+from opamc_cli.stages.verdict import cause, findings, verdict
+from opamc_cli.stages.verdict.agreement.common import far_together
+from opamc_cli.stages.verdict.agreement.compare import Agreement
+from opamc_cli.stages.verdict.agreement.duplicates import repeated
+from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
+from opamc_cli.stages.verdict.header import header
+from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.sources import RunSource, check_comparable
 
@@ -28,7 +30,7 @@ FILES = (
     report.FILE_NAME,
     *score.FILES,
     findings.FILE_NAME,
-    *(f"{role}/{name}" for role in ("baseline", "target") for name in chain.FILES),
+    *(f"{role}/{name}" for role in ("baseline", "target") for name in to_patterns.FILES),
 )
 """What a diagnosis leaves in its folder; the verdict vouches for the others."""
 

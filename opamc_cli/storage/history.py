@@ -17,7 +17,7 @@ from typing import Any, Self, get_args, get_type_hints
 import pyarrow as pa
 
 from opamc_cli.errors import InputError, UsageError
-from opamc_cli.storage.atomic import ensure_directory
+from opamc_cli.storage.files.atomic import ensure_directory
 
 FILE_NAME = "history.sqlite"
 SCHEMA_VERSION = 1

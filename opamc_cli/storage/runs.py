@@ -22,10 +22,10 @@ from pydantic import BeforeValidator, Field
 
 from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
-from opamc_cli.storage.atomic import atomic_path
-from opamc_cli.storage.json_documents import Document, parsed
-from opamc_cli.storage.parquet import read_schema, reading, shown_line
-from opamc_cli.storage.paths import expand_patterns
+from opamc_cli.storage.files.atomic import atomic_path
+from opamc_cli.storage.files.json_documents import Document, parsed
+from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
+from opamc_cli.storage.files.paths import expand_patterns
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18

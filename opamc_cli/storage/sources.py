@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.parquet import read_schema
-from opamc_cli.storage.result import published
+from opamc_cli.storage.files.parquet import read_schema
+from opamc_cli.storage.files.result import published
 from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
 from opamc_cli.storage.tables import table_record
 

@@ -24,10 +24,10 @@ from pydantic import ConfigDict, Field, field_validator
 from opamc_cli import __version__
 from opamc_cli.config.models import Config, digest
 from opamc_cli.errors import InputError
-from opamc_cli.storage.atomic import atomic_path
-from opamc_cli.storage.json_documents import LARGEST, Document, parsed
-from opamc_cli.storage.parquet import read_schema, read_whole
-from opamc_cli.storage.result import published
+from opamc_cli.storage.files.atomic import atomic_path
+from opamc_cli.storage.files.json_documents import LARGEST, Document, parsed
+from opamc_cli.storage.files.parquet import read_schema, read_whole
+from opamc_cli.storage.files.result import published
 from opamc_cli.storage.runs import MOST_HZ, RunMetadata, file_sha256
 
 TABLE_KEY = b"opamc_table"

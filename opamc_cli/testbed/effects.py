@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from opamc_cli.testbed.kernel import AxisConstants
+from opamc_cli.testbed.mechanics.kernel import AxisConstants
 from opamc_cli.testbed.parameters import Effect
 
 Constants = dict[str, float]

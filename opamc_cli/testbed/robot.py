@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter
 
-from opamc_cli.testbed.constants import axis_constants
 from opamc_cli.testbed.effects import (
     apply_to_constants,
     apply_to_reported,
     apply_to_sensors,
     complete,
 )
-from opamc_cli.testbed.kernel import SIGNALS, AxisConstants, run_axis
+from opamc_cli.testbed.mechanics.constants import axis_constants
+from opamc_cli.testbed.mechanics.kernel import SIGNALS, AxisConstants, run_axis
 from opamc_cli.testbed.parameters import Damage, Effect, Joint, Robot
 from opamc_cli.testbed.program import Program, Schedule, reference, schedule
 from opamc_cli.testbed.sensors import phase_currents

@@ -15,10 +15,10 @@ import bad_runs
 import numpy as np
 import pytest
 
-from opamc_cli.app import main
-from opamc_cli.commands import COMMANDS
+from opamc_cli.__main__ import main
+from opamc_cli.commands.command_line import COMMANDS
 from opamc_cli.errors import ExitCode
-from opamc_cli.storage.lock import output_lock
+from opamc_cli.storage.files.lock import output_lock
 
 ROOT = Path(__file__).parents[2]
 MAP = "sampling_rate_hz: 10\nheader: false\ncolumns: {axis1_a: {source: 0, unit: A}}\n"

@@ -9,9 +9,9 @@ import sys
 import bad_runs
 import pytest
 
-from opamc_cli.app import main
-from opamc_cli.commands import COMMANDS
-from opamc_cli.commands.progress import steps_shown
+from opamc_cli.__main__ import main
+from opamc_cli.commands.command_line import COMMANDS
+from opamc_cli.commands.terminal.progress import steps_shown
 
 ALL = [[name] for name in COMMANDS] + [
     ["model", "fit"],
@@ -40,7 +40,7 @@ def test_help_speaks_of_files_and_numbers_not_of_types(capsys, command):
 @pytest.mark.parametrize("arguments", [["--help"], ["--show-completion", "bash"]])
 def test_help_and_completion_import_nothing_heavy(arguments):
     code = (
-        "import sys\nfrom opamc_cli.app import main\n"
+        "import sys\nfrom opamc_cli.__main__ import main\n"
         f"try: main({arguments})\nexcept SystemExit: pass\n"
         f"print([name for name in {EXTRAS} if name in sys.modules], file=sys.stderr)"
     )

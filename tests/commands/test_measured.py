@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 from opamc_cli.errors import ExitCode
 
 ROOT = Path(__file__).parents[2]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 from opamc_cli.config.shipped import shipped_folder
 from opamc_cli.storage.runs import find_runs
 

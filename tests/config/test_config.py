@@ -6,7 +6,7 @@ import yaml
 from pydantic import BaseModel
 
 from opamc_cli.config import Config, load_config
-from opamc_cli.config.document import to_yaml
+from opamc_cli.config.yaml.document import to_yaml
 from opamc_cli.errors import ConfigError
 
 PACKAGE = Path(__file__).parents[2] / "opamc_cli"

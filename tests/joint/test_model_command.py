@@ -12,7 +12,7 @@ import pytest
 import yaml
 from simulator import simulate
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 
 MODEL = (
     "joint: {gear_ratio: null, pole_pairs: null}\neffects: [inertia, gravity, coulomb, viscous]\n"
@@ -60,7 +60,9 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     assert close(folder, "--axis", "1") == 0
     shown = capsys.readouterr().out
     written = json.loads((folder / "out" / "loop.json").read_text())
-    text = resources.files("opamc_cli.schemas").joinpath("loop.schema.json").read_text("utf-8")
+    text = (
+        resources.files("opamc_cli.storage.schemas").joinpath("loop.schema.json").read_text("utf-8")
+    )
     jsonschema.Draft202012Validator.check_schema(json.loads(text))
     jsonschema.validate(written, json.loads(text))
     loop = written["axes"][0]

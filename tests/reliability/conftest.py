@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from recordings import record
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 
 
 @dataclass(frozen=True)

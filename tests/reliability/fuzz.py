@@ -34,7 +34,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from mutations import ODD_YAML, damaged, mutated, table_mutated
 from recordings import columns, record
 
-from opamc_cli.app import main
+from opamc_cli.__main__ import main
 
 ROOT = Path(__file__).parents[2]
 LONGEST_S = 30

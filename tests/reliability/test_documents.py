@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from mutations import ODD_YAML
 from recordings import record
 
-from opamc_cli.config.yaml_values import MOST_VALUES, YamlError, plain_values
+from opamc_cli.config.yaml.values import MOST_VALUES, YamlError, plain_values
 from opamc_cli.errors import InputError
-from opamc_cli.storage.json_documents import parsed
+from opamc_cli.storage.files.json_documents import parsed
 from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
 
 SCALARS = (

@@ -9,8 +9,8 @@ import pytest
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.stages import diagnose as stage
-from opamc_cli.storage import result as storage
-from opamc_cli.storage.result import clear, published, result
+from opamc_cli.storage.files import result as storage
+from opamc_cli.storage.files.result import clear, published, result
 
 NAMES = ("verdict.json", "tables/a", "tables/b")
 
@@ -88,9 +88,9 @@ class Killed(BaseException):
 def test_a_kill_at_any_step_leaves_one_whole_result(tmp_path, monkeypatch):
     """Every call that changes the disk is once the last one."""
     calls = {
-        "opamc_cli.storage.result.Path": ("hardlink_to", "symlink_to", "replace", "rename"),
-        "opamc_cli.storage.result": ("_exchange", "flush"),
-        "opamc_cli.storage.result.shutil": ("rmtree",),
+        "opamc_cli.storage.files.result.Path": ("hardlink_to", "symlink_to", "replace", "rename"),
+        "opamc_cli.storage.files.result": ("_exchange", "flush"),
+        "opamc_cli.storage.files.result.shutil": ("rmtree",),
     }
     states = set()
     for start in ("plain", "linked"):

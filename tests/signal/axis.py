@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from opamc_cli.signal.analytic import clarke, temporal_fine_structure
-from opamc_cli.signal.boundaries import refine_boundaries
-from opamc_cli.signal.motion import MotionBand, motion_frames
-from opamc_cli.signal.noise import noise_level
-from opamc_cli.signal.rotation import RotationStream, join_rotation
-from opamc_cli.signal.segmentation import Evidence, MotionRule, find_motions
+from opamc_cli.signal.motion.boundaries import refine_boundaries
+from opamc_cli.signal.motion.motion_signal import MotionBand, motion_frames
+from opamc_cli.signal.motion.noise import noise_level
+from opamc_cli.signal.motion.rotation import RotationStream, join_rotation
+from opamc_cli.signal.motion.segmentation import Evidence, MotionRule, find_motions
+from opamc_cli.signal.transform.analytic import clarke, temporal_fine_structure
 
 
 def gather(z, fs_hz=2048.0, step=16, has_direction=True):

@@ -6,7 +6,7 @@ import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.analytic import (
+from opamc_cli.signal.transform.analytic import (
     AnalyticStream,
     analytic_signal,
     clarke,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.blocks import OverlappingBlocks
+from opamc_cli.signal.transform.blocks import OverlappingBlocks
 
 
 def blocks_of_whole(x, core, overlap):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from opamc_cli.signal.course import mean_course
+from opamc_cli.signal.motion.reported import fluctuation_frequency, lacks_sign, signed_by_speed
 from opamc_cli.signal.quality import clipped_share
-from opamc_cli.signal.reported import fluctuation_frequency, lacks_sign, signed_by_speed
 
 
 @pytest.mark.parametrize(("n", "parts"), [(64, 8), (65, 8), (7, 8), (100, 33)])

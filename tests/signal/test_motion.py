@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 import ssqueezepy
 
-from opamc_cli.signal.motion import MotionBand, MotionStream, join_frames, motion_frames
-from opamc_cli.signal.wavelet import FilterBank, Morse, scale_frequencies
+from opamc_cli.signal.motion.motion_signal import (
+    MotionBand,
+    MotionStream,
+    join_frames,
+    motion_frames,
+)
+from opamc_cli.signal.transform.wavelet import FilterBank, Morse, scale_frequencies
 
 FS_HZ = 2048.0
 STEP = 16

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from opamc_cli.signal.ordinal import (
+from opamc_cli.signal.ordinal.patterns import (
     n_windows,
     ordinal_codes,
     ordinal_counts,

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from carriers import Move, record
 
-from opamc_cli.signal.analytic import clarke
-from opamc_cli.signal.noise import noise_level
+from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.quality import clipped_share, is_constant
+from opamc_cli.signal.transform.analytic import clarke
 
 
 @pytest.mark.parametrize("noise", [0.01, 0.05, 0.1])

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.reported import find_joint_motions, quiet_velocity, velocity_from_position
+from opamc_cli.signal.motion.reported import (
+    find_joint_motions,
+    quiet_velocity,
+    velocity_from_position,
+)
 
 
 def slow_program(seed, noise):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.reported import (
+from opamc_cli.signal.motion.reported import (
     find_joint_motions,
     motor_frequency,
     velocity_from_position,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.rotation import RotationStream, join_rotation
+from opamc_cli.signal.motion.rotation import RotationStream, join_rotation
 
 
 def rotation_of(z, step=16):

@@ -5,12 +5,11 @@ import pytest
 from axis import errors_s, gather, segments_of
 from carriers import Move, Torque, record
 
-from opamc_cli.signal import segmentation
-from opamc_cli.signal.analytic import clarke
-from opamc_cli.signal.boundaries import refine_boundaries
-from opamc_cli.signal.motion import MotionFrames
-from opamc_cli.signal.rotation import Rotation
-from opamc_cli.signal.segmentation import (
+from opamc_cli.signal.motion import segmentation
+from opamc_cli.signal.motion.boundaries import refine_boundaries
+from opamc_cli.signal.motion.motion_signal import MotionFrames
+from opamc_cli.signal.motion.rotation import Rotation
+from opamc_cli.signal.motion.segmentation import (
     Evidence,
     MotionRule,
     clear_motion,
@@ -18,6 +17,7 @@ from opamc_cli.signal.segmentation import (
     hysteresis,
     largest_frequency,
 )
+from opamc_cli.signal.transform.analytic import clarke
 
 HELD = Torque(hold=1.0)
 NO_HOLDING = Torque(hold=0.0, swing=0.0, friction=0.3)
@@ -129,8 +129,8 @@ def test_a_changing_torque_at_standstill_is_no_motion():
 
 def test_a_single_phase_has_no_direction_but_the_same_motions():
     recording = record(moves(157), noise=0.02)
-    from opamc_cli.signal.analytic import AnalyticStream
-    from opamc_cli.signal.noise import noise_level
+    from opamc_cli.signal.motion.noise import noise_level
+    from opamc_cli.signal.transform.analytic import AnalyticStream
 
     stream = AnalyticStream(2048.0, 8.0)
     z = np.concatenate([stream.push(recording.phases[0]), stream.finish()])

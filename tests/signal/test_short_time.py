@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.short_time import FLOOR_A2, short_time_log_power
+from opamc_cli.signal.transform.short_time import FLOOR_A2, short_time_log_power
 
 
 @pytest.mark.parametrize("n", [4, 33, 100, 1000, 1001])

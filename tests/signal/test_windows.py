@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opamc_cli.signal.windows import carrier_windows
+from opamc_cli.signal.motion.windows import carrier_windows
 
 
 def test_four_windows_of_whole_periods():

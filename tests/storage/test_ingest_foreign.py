@@ -8,9 +8,9 @@ import pytest
 import yaml
 
 from opamc_cli.errors import ConfigError, InputError
-from opamc_cli.stages import ingest
+from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
-from opamc_cli.storage.ingest.map import load_map
+from opamc_cli.storage.ingest.map.map_file import load_map
 from opamc_cli.storage.runs import Run
 
 LATE = 0.6

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from opamc_cli.stages import ingest
-from opamc_cli.storage.ingest.map import load_map
+from opamc_cli.stages.recordings import ingest
+from opamc_cli.storage.ingest.map.map_file import load_map
 from opamc_cli.storage.runs import Run
 
 ROOT = Path(__file__).parents[2]

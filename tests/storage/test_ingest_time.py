@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages import ingest
+from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.convert import convert
-from opamc_cli.storage.ingest.map import IngestMap, load_map
-from opamc_cli.storage.ingest.resample import resample
-from opamc_cli.storage.ingest.stamps import examine
+from opamc_cli.storage.ingest.map.map_file import IngestMap, load_map
+from opamc_cli.storage.ingest.time.resample import resample
+from opamc_cli.storage.ingest.time.stamps import examine
 from opamc_cli.storage.runs import Run
 
 FILE = Path("r.csv")

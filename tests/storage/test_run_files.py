@@ -13,8 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opamc_cli.errors import InputError, LockedError, UsageError
-from opamc_cli.storage.atomic import ensure_directory, write_text
-from opamc_cli.storage.lock import output_lock
+from opamc_cli.storage.files.atomic import ensure_directory, write_text
+from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, find_runs, save_run, write_run
 
 INFO = RunInfo(2048.0, "R1", "pick", 50.0, 1.0, "2022-10-26T08:17:21Z", "ab" * 32)
@@ -303,7 +303,7 @@ def test_files_are_for_everybody_the_umask_lets_read(tmp_path):
 HOLDER = """
 import sys, time
 from pathlib import Path
-from opamc_cli.storage.lock import output_lock
+from opamc_cli.storage.files.lock import output_lock
 with output_lock(Path({folder!r})):
     print("held", flush=True)
     time.sleep(60)

@@ -7,9 +7,9 @@ import pytest
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
-from opamc_cli.stages.model_tables import CANDIDATES, FIT, RESIDUALS, SPECTRUM
-from opamc_cli.stages.score import FEATURES, SCORES
-from opamc_cli.stages.sweep import SWEEP
+from opamc_cli.stages.chain.score import FEATURES, SCORES
+from opamc_cli.stages.model.tables import CANDIDATES, FIT, RESIDUALS, SPECTRUM
+from opamc_cli.stages.tuning.sweep import SWEEP
 from opamc_cli.storage.tables import (
     MOTIONS,
     PATTERNS,

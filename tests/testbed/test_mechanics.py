@@ -12,9 +12,9 @@ from robot_variations import (
     with_joint,
 )
 
-from opamc_cli.testbed.constants import GRAVITY_M_S2, axis_constants
-from opamc_cli.testbed.kernel import AxisConstants, motor_friction, run_axis, smooth_sign
-from opamc_cli.testbed.mesh import damaged_share, zone_torque
+from opamc_cli.testbed.mechanics.constants import GRAVITY_M_S2, axis_constants
+from opamc_cli.testbed.mechanics.kernel import AxisConstants, motor_friction, run_axis, smooth_sign
+from opamc_cli.testbed.mechanics.mesh import damaged_share, zone_torque
 from opamc_cli.testbed.parameters import Damage, Robot
 from opamc_cli.testbed.program import Program
 from opamc_cli.testbed.robot import AxisRecording, Recording, simulate

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-from opamc_cli.app import app, main
+from opamc_cli.__main__ import app, main
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.errors import ConfigError, ExitCode
 from opamc_cli.storage.runs import Run, find_runs

@@ -6,7 +6,6 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from opamc_cli.errors import ConfigError
-from opamc_cli.interruption import Interrupted
 from opamc_cli.joint.effects.asymmetric_friction import AsymmetricFriction
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.coulomb import Coulomb
@@ -31,6 +30,7 @@ from opamc_cli.joint.effects.thermal_viscous import ThermalViscous
 from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.effects.viscous import Viscous
 from opamc_cli.joint.effects.warmup import Warmup
+from opamc_cli.stages.processes.interruption import Interrupted
 
 BUILT_IN: tuple[type[Effect], ...] = (
     Inertia,

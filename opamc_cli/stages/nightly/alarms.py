@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.decision.trend.alarm import Episode, Night, episodes
+from opamc_cli.decision.trend.chart import control_chart
+from opamc_cli.decision.trend.onset import onset
+from opamc_cli.decision.trend.slope import nights_until, robust_slope
 from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow
-from opamc_cli.trend.alarm import Episode, Night, episodes
-from opamc_cli.trend.chart import control_chart
-from opamc_cli.trend.onset import onset
-from opamc_cli.trend.slope import nights_until, robust_slope
 
 LIMIT = 4.0
 """Standard deviations of the chart's average that count as a signal. On six virtual robots over

@@ -13,8 +13,12 @@ from pathlib import Path
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
-from opamc_cli.stages.nightly import cluster
-from opamc_cli.stages.nightly.night import (
+from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
+from opamc_cli.stages.nightly.recordings import CellRecordings, Recording, find_recordings
+from opamc_cli.stages.nightly.settle import settle_cell
+from opamc_cli.stages.nightly.summary import Summary
+from opamc_cli.stages.nightly.workers import cluster
+from opamc_cli.stages.nightly.workers.night import (
     COMPUTE,
     REPORT,
     Input,
@@ -22,13 +26,9 @@ from opamc_cli.stages.nightly.night import (
     ProgramJob,
     ProgramResult,
 )
-from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
-from opamc_cli.stages.nightly.recordings import CellRecordings, Recording, find_recordings
-from opamc_cli.stages.nightly.settle import settle_cell
-from opamc_cli.stages.nightly.summary import Summary
-from opamc_cli.stages.nightly.workers import Broken, run_all
-from opamc_cli.stages.parallel import Steps, unshown
-from opamc_cli.storage.folders import remove_folder, replace_folder
+from opamc_cli.stages.nightly.workers.workers import Broken, run_all
+from opamc_cli.stages.processes.parallel import Steps, unshown
+from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history import (
     FILE_NAME,
     History,

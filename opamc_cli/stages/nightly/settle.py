@@ -5,11 +5,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.alarms import LIMIT, settle_robot
-from opamc_cli.stages.nightly.metrics import write_metrics
-from opamc_cli.stages.nightly.page import write_page
 from opamc_cli.stages.nightly.plan import NIGHTS_AGAIN
+from opamc_cli.stages.nightly.publish.metrics import write_metrics
+from opamc_cli.stages.nightly.publish.page import write_page
 from opamc_cli.stages.nightly.summary import Summary, summarise
-from opamc_cli.storage.folders import remove_folder
+from opamc_cli.storage.files.folders import remove_folder
 from opamc_cli.storage.history import Event, History, NightRow
 
 

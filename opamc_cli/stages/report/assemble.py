@@ -10,7 +10,6 @@ from typing import Any
 import jinja2
 
 from opamc_cli.stages.report import wording
-from opamc_cli.stages.report.figure import Figure
 from opamc_cli.stages.report.figures import (
     envelopes,
     feature_space,
@@ -23,12 +22,13 @@ from opamc_cli.stages.report.figures import (
     residual,
     similarity,
 )
+from opamc_cli.stages.report.figures.figure import Figure
+from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.focus import by_severity, choose_focus
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs, read_inputs
-from opamc_cli.stages.report.palette import custom_properties, state_role, state_sign
-from opamc_cli.stages.report.provenance import provenance
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs, read_inputs
+from opamc_cli.stages.report.results.provenance import provenance
 from opamc_cli.stages.report.views import axis_view, compared, heading, headline, loop_view
-from opamc_cli.storage.atomic import write_text
+from opamc_cli.storage.files.atomic import write_text
 
 FILE_NAME = "report.html"
 
@@ -199,4 +199,4 @@ def _environment() -> jinja2.Environment:
 
 
 def _resource(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return resources.files(__package__).joinpath("page", name).read_text(encoding="utf-8")

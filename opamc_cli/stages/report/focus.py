@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from opamc_cli.stages.report.columns import Columns, select
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
+from opamc_cli.stages.report.results.columns import Columns, select
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 SEVERITY = ("insufficient-data", "healthy", "changed", "fault")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.stages.report.focus import axis_scores
-from opamc_cli.stages.report.inputs import ReportInputs, time_order
+from opamc_cli.stages.report.results.inputs import ReportInputs, time_order
 
 
 @dataclass(frozen=True)

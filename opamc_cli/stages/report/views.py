@@ -5,8 +5,8 @@ from typing import Any
 
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.focus import Focus, pooled_features
-from opamc_cli.stages.report.inputs import ROLES, ReportInputs
 from opamc_cli.stages.report.onset import Onset, find_onset
+from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs
 from opamc_cli.storage.runs import RunInfo
 
 CONDITIONS = (

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from opamc_cli.stages.reasons import CHECK_FIRST, FOUND, INSPECT
+from opamc_cli.stages.verdict.reasons import CHECK_FIRST, FOUND, INSPECT
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from opamc_cli.config.reading import require_regular_file
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import is_ros2_bag
-from opamc_cli.storage.ingest.map import IngestMap, format_of
+from opamc_cli.storage.ingest.map.map_file import IngestMap, format_of
 from opamc_cli.storage.ingest.source import Block, Listed, Name, Selection, Source
 
 LIBRARY_ERRORS = (

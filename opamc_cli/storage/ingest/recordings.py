@@ -12,8 +12,8 @@ import pyarrow as pa
 from pyarrow import fs
 
 from opamc_cli.errors import InputError
+from opamc_cli.storage.files.paths import expand_patterns
 from opamc_cli.storage.ingest.formats import format_by_ending, is_ros2_bag, known_endings
-from opamc_cli.storage.paths import expand_patterns
 
 REMOTE_MARK = "://"
 

@@ -8,10 +8,13 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 
-from opamc_cli.signal.analytic import clarke, envelope
-from opamc_cli.signal.ordinal import ordinal_counts
-from opamc_cli.stats.divergence import divergences_from_pool, leave_cycle_out_divergences
-from opamc_cli.stats.features import compare
+from opamc_cli.decision.divergence.features import compare
+from opamc_cli.decision.divergence.jensen_shannon import (
+    divergences_from_pool,
+    leave_cycle_out_divergences,
+)
+from opamc_cli.signal.ordinal.patterns import ordinal_counts
+from opamc_cli.signal.transform.analytic import clarke, envelope
 from opamc_cli.storage.runs import Run, RunInfo, save_run
 from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import MOTIONS, PATTERNS, table_input, write_table

@@ -7,11 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opamc_cli.stages.report import wording
-from opamc_cli.stages.report.columns import extremes, to_columns
-from opamc_cli.stages.report.figure import canvas, style, to_svg
-from opamc_cli.stages.report.inputs import ReportInputs, RoleTables, merged_config
+from opamc_cli.stages.report.figures.figure import canvas, style, to_svg
+from opamc_cli.stages.report.figures.palette import PALETTE, colour
 from opamc_cli.stages.report.onset import find_onset
-from opamc_cli.stages.report.palette import PALETTE, colour
+from opamc_cli.stages.report.results.columns import extremes, to_columns
+from opamc_cli.stages.report.results.inputs import ReportInputs, RoleTables, merged_config
 
 
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(math.nan), max_size=300), st.integers(4, 60))

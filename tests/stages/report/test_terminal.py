@@ -8,8 +8,8 @@ import output_folder
 import pytest
 from rich.console import Console, RenderableType
 
-from opamc_cli import app
-from opamc_cli.commands.tables import loop_table, verdict_lines, verdict_table
+from opamc_cli import __main__
+from opamc_cli.commands.terminal.tables import loop_table, verdict_lines, verdict_table
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -89,7 +89,7 @@ def test_report_command_prints_verdict_and_loop(
     output_folder.make(out)
     output_folder.add_loop(out)
     with pytest.raises(SystemExit) as ended:
-        app.main(["report", "--out", str(out)])
+        __main__.main(["report", "--out", str(out)])
     captured = capsys.readouterr()
     assert ended.value.code == 0
     assert "Axis 3 at fault" in captured.out
@@ -97,14 +97,14 @@ def test_report_command_prints_verdict_and_loop(
     assert str(out / "report.html") in captured.out.replace("\n", "")
     assert captured.err == ""
     with pytest.raises(SystemExit):
-        app.main(["report", "--out", str(out), "--json"])
+        __main__.main(["report", "--out", str(out), "--json"])
     result = json.loads(capsys.readouterr().out)
     assert result["verdict"]["axes"][2]["state"] == "fault"
 
 
 def test_report_of_no_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
-        app.main(["report", "--out", str(tmp_path / "nowhere")])
+        __main__.main(["report", "--out", str(tmp_path / "nowhere")])
     assert ended.value.code == 3
     assert "nowhere: no such folder" in capsys.readouterr().err
     assert not (tmp_path / "nowhere").exists()
@@ -114,7 +114,7 @@ def test_report_of_no_folder_is_refused(tmp_path: Path, capsys: pytest.CaptureFi
 def test_a_narrow_terminal_leaves_out_columns_and_never_digits(width: int) -> None:
     from rich.console import Console
 
-    from opamc_cli.commands.tables import verdict_table
+    from opamc_cli.commands.terminal.tables import verdict_table
 
     axes = [
         {
@@ -139,8 +139,8 @@ def test_a_narrow_terminal_leaves_out_columns_and_never_digits(width: int) -> No
 
 
 def test_piped_text_has_no_trailing_blanks(capsys) -> None:
-    from opamc_cli.commands.output import Output
-    from opamc_cli.commands.tables import verdict_table
+    from opamc_cli.commands.terminal.output import Output
+    from opamc_cli.commands.terminal.tables import verdict_table
 
     axes = [{"axis": 1, "state": "fault", "reasons": ["It has changed. " * 20]}]
     Output().result({}, verdict_table({"axes": axes}), "a line")

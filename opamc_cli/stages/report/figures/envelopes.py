@@ -7,12 +7,19 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from opamc_cli.stages.envelope import read_envelope
-from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
-from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, short, style
+from opamc_cli.stages.recordings.envelope import read_envelope
+from opamc_cli.stages.report.figures.figure import (
+    MAX_TRACE_POINTS,
+    Figure,
+    canvas,
+    finish,
+    short,
+    style,
+)
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus, axis_scores
-from opamc_cli.stages.report.inputs import ROLES, NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.columns import Columns, extremes, n_rows, select
+from opamc_cli.stages.report.results.inputs import ROLES, NothingToDrawError, ReportInputs
 
 CLOSE_UP_WINDOWS = 12
 """Ordinal windows that the close-up spans."""

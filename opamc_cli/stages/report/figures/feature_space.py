@@ -6,10 +6,10 @@ coordinates are shown beside each other.
 
 import numpy as np
 
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour, state_role, state_sign
 from opamc_cli.stages.report.focus import Focus, pooled_features
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour, state_role, state_sign
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 MARKERS = {"healthy": "o", "changed": "^", "fault": "X", "insufficient-data": "s"}
 PANELS = (

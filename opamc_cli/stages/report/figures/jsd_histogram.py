@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.stages.report.figure import (
+from opamc_cli.stages.report.figures.figure import (
     Figure,
     canvas,
     finish,
@@ -10,9 +10,9 @@ from opamc_cli.stages.report.figure import (
     hide_surplus,
     style,
 )
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus, axis_scores, need_divergences, pooled_features
-from opamc_cli.stages.report.inputs import ROLES, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs
 
 MAX_BINS = 40
 

@@ -4,8 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 
-from opamc_cli.stages.report.columns import extremes
-from opamc_cli.stages.report.figure import (
+from opamc_cli.stages.report.figures.figure import (
     Figure,
     canvas,
     finish,
@@ -13,9 +12,10 @@ from opamc_cli.stages.report.figure import (
     hide_surplus,
     style,
 )
+from opamc_cli.stages.report.figures.palette import colour, state_sign
 from opamc_cli.stages.report.focus import Focus, axis_scores, need_divergences
-from opamc_cli.stages.report.inputs import ROLES, ReportInputs, time_order
-from opamc_cli.stages.report.palette import colour, state_sign
+from opamc_cli.stages.report.results.columns import extremes
+from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs, time_order
 
 MAX_POINTS = 400
 """Of one role in one panel; more would only hide each other."""

@@ -2,10 +2,10 @@
 
 import math
 
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour, state_role, state_sign
 from opamc_cli.stages.report.focus import Focus, pooled_features
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour, state_role, state_sign
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:

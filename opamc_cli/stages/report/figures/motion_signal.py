@@ -7,16 +7,23 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from opamc_cli.config.models import SegmentConfig
-from opamc_cli.signal.analytic import analytic_signal, clarke, temporal_fine_structure
-from opamc_cli.signal.motion import MotionBand, motion_frames
-from opamc_cli.signal.noise import noise_level
-from opamc_cli.signal.wavelet import Morse
-from opamc_cli.stages.carrier_segments import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
-from opamc_cli.stages.report.columns import Columns, extremes, n_rows, select
-from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, short, style
+from opamc_cli.signal.motion.motion_signal import MotionBand, motion_frames
+from opamc_cli.signal.motion.noise import noise_level
+from opamc_cli.signal.transform.analytic import analytic_signal, clarke, temporal_fine_structure
+from opamc_cli.signal.transform.wavelet import Morse
+from opamc_cli.stages.chain.segments.carrier import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
+from opamc_cli.stages.report.figures.figure import (
+    MAX_TRACE_POINTS,
+    Figure,
+    canvas,
+    finish,
+    short,
+    style,
+)
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.columns import Columns, extremes, n_rows, select
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 from opamc_cli.storage.runs import Run
 
 MARGIN_S = 1.0

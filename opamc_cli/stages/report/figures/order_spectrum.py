@@ -4,11 +4,11 @@ import math
 
 import numpy as np
 
-from opamc_cli.stages.report.columns import extremes, select
-from opamc_cli.stages.report.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.figure import MAX_TRACE_POINTS, Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.figures.residual import loop_axis
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.columns import extremes, select
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 MAX_LABELS = 8
 

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.signal.ordinal import pattern_of_code
-from opamc_cli.stages.report.columns import select
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.signal.ordinal.patterns import pattern_of_code
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus, axis_scores, by_severity
-from opamc_cli.stages.report.inputs import ROLES, NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.columns import select
+from opamc_cli.stages.report.results.inputs import ROLES, NothingToDrawError, ReportInputs
 
 MAX_AXES = 8
 N_NAMED = 3

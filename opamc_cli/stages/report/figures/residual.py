@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from opamc_cli.stages.report.columns import Columns, select
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour
+from opamc_cli.stages.report.results.columns import Columns, select
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 N_STRETCHES = 400
 N_BINS = 60

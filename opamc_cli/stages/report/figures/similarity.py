@@ -5,11 +5,16 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from opamc_cli.signal.identification import sliding_similarity
-from opamc_cli.stages.report.columns import Columns, n_rows, select
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus
-from opamc_cli.stages.report.inputs import ROLES, NothingToDrawError, ReportInputs, time_order
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.columns import Columns, n_rows, select
+from opamc_cli.stages.report.results.inputs import (
+    ROLES,
+    NothingToDrawError,
+    ReportInputs,
+    time_order,
+)
 
 MAX_SEGMENTS = 240
 """Of one role; the ones after that are left out, which the panel says."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import pyarrow as pa
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import utc_text
+from opamc_cli.storage.ingest.time.dates import utc_text
 
 LOOKED_AT_BYTES = 1 << 17
 """Some hundred rows: enough to see a header and where the numbers begin."""

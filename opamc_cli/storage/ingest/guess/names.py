@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from opamc_cli.storage.ingest.axes import has_placeholder
+from opamc_cli.storage.ingest.map.axes import has_placeholder
 from opamc_cli.storage.ingest.source import Listed, Name
 
 WORDS = {

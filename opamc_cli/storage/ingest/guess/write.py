@@ -24,11 +24,11 @@ from opamc_cli.storage.ingest.guess.values import (
     time_unit,
     wraps,
 )
-from opamc_cli.storage.ingest.map import ColumnMap, IngestMap
+from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torque
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.source import Array, Name, Selection, Source
-from opamc_cli.storage.ingest.stamps import RATE_WITHIN, Clock, examine
-from opamc_cli.storage.ingest.units import CONVERSIONS, conversion, is_torque
+from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
 
 LOOKED_AT_ROWS = 1 << 16
 """Rows whose values are looked at: minutes of a robot's log."""

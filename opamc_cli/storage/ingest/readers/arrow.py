@@ -16,7 +16,6 @@ import pyarrow.feather
 import pyarrow.parquet as pq
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Array,
@@ -26,6 +25,7 @@ from opamc_cli.storage.ingest.source import (
     Selection,
     missing_channel,
 )
+from opamc_cli.storage.ingest.time.dates import parse_dates
 
 RUN_KEY = b"opamc"
 """Metadata key of what is a run already."""

@@ -15,9 +15,9 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates, timestamp_type, utc_text
-from opamc_cli.storage.ingest.map import IngestMap
+from opamc_cli.storage.ingest.map.map_file import IngestMap
 from opamc_cli.storage.ingest.source import Block, Listed, Name, Selection, missing_channel
+from opamc_cli.storage.ingest.time.dates import parse_dates, timestamp_type, utc_text
 
 BLOCK_BYTES = 1 << 22
 FIELD_MARK = "\x1f"

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Array,
@@ -22,6 +21,7 @@ from opamc_cli.storage.ingest.source import (
     samples_of,
     width_of,
 )
+from opamc_cli.storage.ingest.time.dates import parse_dates
 
 ATTRIBUTE_MARK = "@"
 """Separates an object's path from the name of its attribute: ``motor/current@unit``."""

@@ -14,7 +14,6 @@ import scipy.io
 from scipy.io.matlab import MatReadError
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates
 from opamc_cli.storage.ingest.readers.hdf5 import Hdf5Source, open_hdf5
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
@@ -28,6 +27,7 @@ from opamc_cli.storage.ingest.source import (
     samples_of,
     width_of,
 )
+from opamc_cli.storage.ingest.time.dates import parse_dates
 
 HDF5_MARK = b"\x89HDF\r\n\x1a\n"
 HDF5_OFFSET = 512

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.dates import parse_dates
 from opamc_cli.storage.ingest.source import (
     BLOCK_ROWS,
     Block,
@@ -19,6 +18,7 @@ from opamc_cli.storage.ingest.source import (
     missing_channel,
     missing_library,
 )
+from opamc_cli.storage.ingest.time.dates import parse_dates
 
 
 @contextmanager

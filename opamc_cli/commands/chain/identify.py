@@ -1,0 +1,74 @@
+"""`opamc identify`: which segment is which motion of which cycle."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.terminal.options import (
+    ALL_CORES,
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    MovedRuns,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.terminal.output import Output
+
+
+def identify(
+    segments: Annotated[
+        Path | None,
+        typer.Argument(metavar="[SEGMENTS]", help="Segment table; default: that in --out."),
+    ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option(metavar="MOTIONS", help="Motion table whose reference cycles are taken."),
+    ] = None,
+    reference_run: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Run in which the reference cycle is looked for."),
+    ] = None,
+    runs: MovedRuns = None,
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = ALL_CORES,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find cycles and motions in a segment table; writes motions.parquet."""
+    from opamc_cli.config import load_config
+    from opamc_cli.stages.chain import identify as stage
+    from opamc_cli.stages.chain import segment
+    from opamc_cli.storage.files.lock import output_lock
+
+    output = Output(as_json, quiet)
+    with output_lock(out), output.steps() as steps:
+        outcome = stage.run(
+            segments or out / segment.FILE_NAME,
+            load_config(config, overrides or ()),
+            out,
+            reference=reference,
+            reference_run=reference_run,
+            moved_to=runs or (),
+            jobs=jobs,
+            watch=steps("identify"),
+        )
+    found = [
+        {"run": run, "axis": axis, "cycles": cycles, "unidentified": unidentified}
+        for (run, axis), (cycles, unidentified) in outcome.cycles().items()
+    ]
+    output.result(
+        {"written": str(outcome.path), "series": found},
+        *(
+            f"{f['run']} axis {f['axis']}: {f['cycles']} cycles, "
+            f"{f['unidentified']} segments unidentified"
+            for f in found
+        ),
+        str(outcome.path),
+    )
+    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(found)))

@@ -1,0 +1,67 @@
+"""`opamc patterns`: ordinal patterns of the envelope of every identified segment."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.terminal.options import (
+    ALL_CORES,
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    MovedRuns,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.terminal.output import Output
+
+
+def patterns(
+    motions: Annotated[
+        Path | None,
+        typer.Argument(metavar="[MOTIONS]", help="Motion table; default: that in --out."),
+    ] = None,
+    runs: MovedRuns = None,
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = ALL_CORES,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Count ordinal patterns of identified segments; writes patterns.parquet, spectra.parquet."""
+    from opamc_cli.config import load_config
+    from opamc_cli.stages.chain import identify
+    from opamc_cli.stages.chain import patterns as stage
+    from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.result import published, result
+
+    output = Output(as_json, quiet)
+    with output_lock(out), result(out, *stage.FILES) as staged, output.steps() as steps:
+        outcome = stage.run(
+            motions or out / identify.FILE_NAME,
+            load_config(config, overrides or ()),
+            staged,
+            moved_to=runs or (),
+            jobs=jobs,
+            watch=steps("patterns"),
+        )
+    counted = outcome.by_motion()
+    output.result(
+        {
+            "written": str(published(outcome.path)),
+            "spectra": str(published(outcome.path).with_name("spectra.parquet")),
+            "profiles": str(published(outcome.path).with_name("profiles.parquet")),
+            "motions": counted,
+        },
+        *(
+            f"axis {c['axis']} motion {c['motion']} order {c['order']}: tau {c['tau']}, "
+            f"{c['n_patterns']} patterns in {c['segments']} segments"
+            for c in counted
+        ),
+        str(published(outcome.path)),
+    )
+    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(counted)))

@@ -1,0 +1,54 @@
+"""`opamc segment`: when each joint moves, and how fast its carrier gets."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.terminal.options import (
+    ALL_CORES,
+    DEFAULT_OUT,
+    ConfigFile,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+)
+from opamc_cli.commands.terminal.output import Output
+
+
+def segment(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN...", help="Run files, folders of them, quoted patterns."),
+    ],
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = ALL_CORES,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Cut runs into motions, axis by axis; writes segments.parquet."""
+    from opamc_cli.config import load_config
+    from opamc_cli.stages.chain import segment as stage
+    from opamc_cli.storage.files.lock import output_lock
+
+    output = Output(as_json, quiet)
+    settings = load_config(config, overrides or ())
+    with output_lock(out), output.steps() as steps:
+        outcome = stage.run(runs, settings, out, jobs=jobs, watch=steps("segment"))
+    found = outcome.by_axis()
+    for note in outcome.notes:
+        output.note(note)
+    output.result(
+        {"written": str(outcome.path), "axes": found, "notes": list(outcome.notes)},
+        *(
+            f"{f['run']} axis {f['axis']}: {f['segments']} {f['kind']}s, "
+            f"{f['in_motion_s']:.1f} s, up to {f['f_max_hz']:.1f} Hz"
+            for f in found
+        ),
+        str(outcome.path),
+    )
+    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(found)))

@@ -1,0 +1,292 @@
+"""`opamc model`: fit a declared joint model, trace what it lacks, close the loop."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from opamc_cli.commands.model.effects import effects
+from opamc_cli.commands.terminal.options import DEFAULT_OUT, Json, Out, Overrides, Quiet
+from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import ConfigError, OpamcError
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+app = typer.Typer(
+    help="Fit a joint's declared model to runs, trace what it lacks, close the loop.",
+    no_args_is_help=True,
+)
+
+Runs = Annotated[list[Path], typer.Argument(metavar="RUN...", help="Run files or folders.")]
+ModelFile = Annotated[
+    Path,
+    typer.Option(
+        "--model",
+        "--config",
+        metavar="FILE",
+        help="What is declared; default: the shipped `model`, see configs/model.yaml.",
+    ),
+]
+PACKAGE = Path(__file__).parents[2]
+DECLARED = Path("model")
+"""Inertia, gravity and friction, gear unknown."""
+
+Axis = Annotated[
+    list[int] | None,
+    typer.Option("--axis", min=1, help="Axis, counted from 1; may be repeated. Default: all."),
+]
+
+app.command()(effects)
+
+
+MOST_REJECTED = 3
+
+
+@app.command()
+def fit(
+    runs: Runs,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
+    axis: Axis = None,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit the declared effects jointly; writes fit.parquet."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages.model import model as stage
+    from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.fit(declared, find_runs(runs), axis or (), out, watch=steps("fit"))
+    output.result(
+        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
+        *(shown for result in outcome.results for shown in _fit_tables(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+@app.command()
+def trace(
+    runs: Runs,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
+    axis: Axis = None,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Trace the declared model's residual to its causes; writes candidates.parquet."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages.model import model as stage
+    from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.trace(declared, find_runs(runs), axis or (), out, watch=steps("trace"))
+    output.result(
+        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
+        *(shown for result in outcome.results for shown in _trace_tables(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+@app.command()
+def close(
+    runs: Runs,
+    model: ModelFile = DECLARED,
+    overrides: Overrides = None,
+    axis: Axis = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find and add what the declared model lacks; writes loop.json and the extended model."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages.model import model as stage
+    from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.result import published, result
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model, overrides or ())
+    extended = [path.name for path in out.glob("model_axis*.yaml")]
+    with (
+        output_lock(out),
+        result(out, *stage.CLOSE_FILES, *extended) as staged,
+        _naming(model),
+        output.steps() as steps,
+    ):
+        outcome = stage.close(
+            declared, find_runs(runs), axis or (), staged, seed, watch=steps("close")
+        )
+    output.result(
+        {"axes": list(outcome.results)},
+        *(shown for result in outcome.results for shown in _loop_tables(result)),
+        *(str(published(path)) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
+@contextmanager
+def _naming(model: Path) -> Iterator[None]:
+    """Name the model's file in what is wrong with it, and a line of a user's own effect."""
+    try:
+        yield
+    except ConfigError as error:
+        msg = f"{model}: {error}"
+        raise ConfigError(msg) from error
+    except OpamcError:
+        raise
+    except Exception as error:
+        where = _in_a_users_effect(error)
+        if where is None:
+            raise
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        msg = f"{where}: this effect cannot be used ({what}); correct it"
+        raise ConfigError(msg) from error
+
+
+def _in_a_users_effect(error: BaseException) -> str | None:
+    """Return file and line where an error arose in a user's effect, None where in none."""
+    import traceback
+
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        own = frame.filename.endswith(".py") and Path(frame.filename).is_relative_to(PACKAGE)
+        installed = "site-packages" in frame.filename or "/lib/python" in frame.filename
+        if not own and not installed and Path(frame.filename).is_file():
+            return f"{frame.filename}:{frame.lineno}"
+    return None
+
+
+def _parameters(values: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.4g}" for name, value in values.items())
+
+
+def _table(title: str, *headings: str) -> Any:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", title_style="bold")
+    for heading in headings:
+        table.add_column(heading)
+    return table
+
+
+def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    table = _table(
+        f"Axis {result['axis']}: {result['rmse_a']:.4g} A rms left, condition number "
+        f"{result['condition_number']:.3g}",
+        "effect",
+        "coefficients (95 % interval)",
+        "parameters",
+    )
+    for term in result["terms"]:
+        shown = ", ".join(
+            f"{value:.4g} ({low:.3g} .. {high:.3g})"
+            for value, low, high in zip(
+                term["coefficients"], term["low"], term["high"], strict=True
+            )
+        )
+        table.add_row(term["effect"], shown, _parameters(term["parameters"]))
+    apart = [f"the data cannot tell apart: {', '.join(names)}" for names in result["inseparable"]]
+    return [table, *apart]
+
+
+def _trace_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    explained = result["explained"]
+    domains = ", ".join(dict.fromkeys(explained["domains"]))
+    first = (
+        f"Axis {result['axis']}: {explained['share']:.0%} of the held-out error can be explained "
+        f"without a name, by {domains}"
+        if domains
+        else f"Axis {result['axis']}: nothing can be explained"
+    )
+    table = _table("Candidates", "effect", "parameters", "held-out gain", "p", "why not")
+    for entry in result["candidates"][:10]:
+        table.add_row(
+            entry["effect"],
+            _parameters(entry["parameters"]),
+            f"{entry['gain']:.1%}",
+            f"{entry['p_value']:.2g}",
+            entry["why_not"] or "passes",
+        )
+    return [first, *([table] if result["candidates"] else []), *_untestable(result)]
+
+
+def _headline(result: dict[str, Any]) -> str:
+    """Say in words what was missing."""
+    before, after = result["before"]["rmse_a"], result["after"]["rmse_a"]
+    named = [step for step in result["steps"] if not step["effect"].startswith("unnamed")]
+    words = [
+        step["interpretation"].split(":")[0].split(" (")[0]
+        + (f" ({step['effect']}, approximately)" if step["approximate"] else f" ({step['effect']})")
+        for step in named
+    ]
+    error = f"error {before:.4g} → {after:.4g} A"
+    reached = f"{result['explained_share']:.0%} of what can be explained"
+    if named:
+        listed = "; ".join(words)
+        return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"
+    if result["verdict"] == "nothing-missing":
+        return f"Axis {result['axis']} lacks nothing that the data can show: error {before:.4g} A"
+    curves = [step["interpretation"].split(";")[0] for step in result["steps"]]
+    what = "; ".join(curves) or f"something in the {result['domain']} domain"
+    return f"Axis {result['axis']} lacks {what}, which no effect of the library describes: {error}"
+
+
+def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    before, after, ceiling = result["before"], result["after"], result["ceiling"]
+    shown: list[RenderableType] = [
+        _headline(result),
+        f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; ceiling "
+        f"{ceiling['share']:.0%} ± {ceiling['standard_error']:.0%} of the mean square, floor "
+        f"{result['floor_a']:.4g} A",
+    ]
+    if result["steps"]:
+        table = _table("Steps", "effect", "parameters", "gain", "form", "A before", "A after")
+        for step in result["steps"]:
+            ties = f" (or {', '.join(step['ties'])})" if step["ties"] else ""
+            table.add_row(
+                step["effect"] + ties,
+                _parameters(step["parameters"]),
+                f"{step['gain']:.1%}",
+                f"{step['fit_of_name']:.0%}" if step["fit_of_name"] else "–",
+                f"{step['rmse_before_a']:.4g}",
+                f"{step['rmse_after_a']:.4g}",
+            )
+        shown.append(table)
+    shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
+    shown += [
+        f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"
+        for step in result["steps"]
+        if step["separating_experiment"]
+    ]
+    if result["domain"]:
+        shown.append(f"what remains is structured in the {result['domain']} domain")
+    shown += [
+        f"rejected {entry['effect']}: {entry['why']}"
+        for entry in result["rejected"][:MOST_REJECTED]
+    ]
+    return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
+
+
+def _untestable(result: dict[str, Any]) -> list["RenderableType"]:
+    return [f"untestable {entry['effect']}: {entry['why']}" for entry in result["untestable"]]

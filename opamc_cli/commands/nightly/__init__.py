@@ -1,0 +1,1 @@
+"""A cell, night by night."""

@@ -1,0 +1,110 @@
+"""`opamc history`: what is known of a cell's nights, as a table or a file."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from opamc_cli.commands.nightly.nightly import DEFAULT_CELL, Cell
+from opamc_cli.commands.terminal.options import Json, Quiet
+from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import UsageError
+
+SHOWN = ("robot", "axis", "night", "state", "health_index", "p_value", "cause", "alarm", "n_runs")
+
+
+def history(
+    robot: Annotated[
+        list[str] | None, typer.Option("--robot", metavar="NAME", help="This robot alone.")
+    ] = None,
+    axis: Annotated[int | None, typer.Option("--axis", min=1, help="This joint alone.")] = None,
+    since: Annotated[
+        str | None, typer.Option("--since", metavar="DATE", help="Nights from this one on.")
+    ] = None,
+    events: Annotated[
+        bool, typer.Option("--events", help="What happened, instead of every night's verdict.")
+    ] = False,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Export to a .csv, .parquet or .json file."),
+    ] = None,
+    cell: Cell = DEFAULT_CELL,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Show or export the history of a cell; the whole table is history.sqlite below its `out`."""
+    from opamc_cli.config.cell import load_cell
+    from opamc_cli.stages.nightly.run import open_history
+
+    if out is not None and out.suffix not in (".csv", ".parquet", ".json"):
+        msg = f"--out {out}: the ending tells the format: .csv, .parquet or .json"
+        raise UsageError(msg)
+    output = Output(as_json, quiet)
+    table = "event" if events else "verdict"
+    column = "time" if events else "night"
+    where, values = ["1"], []
+    if robot:
+        where.append(f"robot IN ({', '.join('?' * len(robot))})")
+        values += list(robot)
+    for condition, value in (("axis = ?", axis), (f"{column} >= ?", since)):
+        if value is not None:
+            where.append(condition)
+            values.append(str(value))
+    with open_history(load_cell(cell), read_only=True) as opened:
+        rows = opened.rows(
+            f"SELECT * FROM {table} WHERE {' AND '.join(where)} ORDER BY robot, {column}, axis",
+            values,
+        )
+    if out is not None:
+        _export(out, rows, table)
+        output.result({"written": str(out), "rows": len(rows)}, f"{out}: {len(rows)} rows")
+        return
+    output.result({table: rows}, _table(rows, events) if rows else "nothing of that kind is known")
+
+
+def _table(rows: list[dict[str, Any]], events: bool) -> Any:
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    from opamc_cli.commands.terminal.tables import printable
+    from opamc_cli.stages.report.wording import number, p_value
+
+    names = ("time", "robot", "axis", "kind", "text") if events else SHOWN
+    table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for name in names:
+        table.add_column(name.replace("_", " "))
+    forms = {"health_index": number, "p_value": p_value}
+    for row in rows:
+        table.add_row(
+            *(
+                forms[name](row[name])
+                if name in forms
+                else printable("" if row[name] is None else str(row[name]))
+                for name in names
+            )
+        )
+    return table
+
+
+def _export(path: Path, rows: list[dict[str, Any]], table: str) -> None:
+    import json
+
+    import pyarrow as pa
+    import pyarrow.csv
+    import pyarrow.parquet
+
+    from opamc_cli.storage.files.atomic import atomic_path, write_text
+    from opamc_cli.storage.history import arrow_schema
+
+    if path.suffix == ".json":
+        write_text(path, json.dumps(rows, indent=1, ensure_ascii=False) + "\n")
+        return
+    made = pa.Table.from_pylist(rows, schema=arrow_schema(table))
+    with atomic_path(path) as temporary:
+        if path.suffix == ".csv":
+            pyarrow.csv.write_csv(made, temporary)
+        else:
+            pyarrow.parquet.write_table(made, temporary)
+
+
+__all__ = ["DEFAULT_CELL", "history"]

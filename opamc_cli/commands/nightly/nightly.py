@@ -1,0 +1,224 @@
+"""`opamc nightly`: every night of a cell of robots that is new, and what has changed."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from opamc_cli.commands.terminal.options import Jobs, Json, Quiet
+from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import OpamcError, UsageError
+
+if TYPE_CHECKING:
+    from opamc_cli.config.cell import CellConfig
+
+RUN = "run"
+DEFAULT_CELL = Path("cell.yaml")
+
+
+class _RunByDefault(TyperGroup):
+    """A group whose first argument may be the cell's file instead of a subcommand."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        asks_for_help = args[:1] in (["--help"], ["-h"])
+        if args and args[0] not in self.commands and not asks_for_help:
+            args = [RUN, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_RunByDefault,
+    help="Look after a cell of robots night by night: `opamc nightly cell.yaml`.",
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+Cell = Annotated[Path, typer.Option("--cell", metavar="FILE", help="The cell's file.")]
+Why = Annotated[str, typer.Option("--why", metavar="TEXT", help="Kept in the history.")]
+
+
+def _night(text: str | None) -> str | None:
+    """Check that a night is a date."""
+    if text is None:
+        return None
+    from datetime import date
+
+    try:
+        return date.fromisoformat(text).isoformat()
+    except ValueError:
+        msg = f"{text!r} is no date; write YYYY-MM-DD"
+        raise UsageError(msg) from None
+
+
+@app.command(RUN)
+def run(
+    cell: Annotated[Path, typer.Argument(metavar="CELL", help="The cell's file, cell.yaml.")],
+    night: Annotated[
+        str | None, typer.Option("--night", metavar="DATE", help="This night alone.")
+    ] = None,
+    since: Annotated[
+        str | None, typer.Option("--since", metavar="DATE", help="Nights from this one on.")
+    ] = None,
+    robot: Annotated[
+        list[str] | None, typer.Option("--robot", metavar="NAME", help="This robot alone.")
+    ] = None,
+    dry_run: Annotated[
+        bool, typer.Option("--dry-run", help="Say what would be done, and why; do nothing.")
+    ] = False,
+    jobs: Jobs = 1,
+    scheduler: Annotated[
+        str | None,
+        typer.Option("--scheduler", metavar="ADDRESS", help="Dask scheduler, tcp://host:port."),
+    ] = None,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Judge every robot's nights that are new; print the robots that need a look."""
+    from opamc_cli.config.cell import load_cell
+    from opamc_cli.stages.nightly import run as stage
+    from opamc_cli.stages.nightly.morning import silent, tell
+    from opamc_cli.storage.files.lock import output_lock
+
+    output = Output(as_json, quiet)
+    loaded = load_cell(cell)
+    wanted = stage.Wanted(_night(night), _night(since), tuple(robot) if robot else None)
+    with output_lock(loaded.out), stage.open_history(loaded) as history:
+        if dry_run:
+            _print_plan(output, stage.plan(loaded, str(cell), history, wanted))
+            return
+        with output.steps() as steps:
+            outcome = stage.run(
+                loaded, str(cell), history, wanted, jobs=jobs, scheduler=scheduler, progress=steps
+            )
+        summary = outcome.summary.only(outcome.robots)
+        untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
+        if wanted == stage.Wanted():
+            untold += history.untold([*silent(history, datetime.now(UTC).date())])
+        morning = tell(summary, untold, outcome, loaded.out)
+        if outcome.ended:
+            output.failure(outcome.ended)
+        page = loaded.out / "index.html"
+        output.result(
+            {**morning.values, "page": str(page)},
+            *morning.lines,
+            *([] if quiet and morning.lines else [f"{summary.headline()}; {page}"]),
+            urgent=bool(morning.lines),
+        )
+        # only now: a start that is killed before says it next time
+        history.tell(untold)
+    raise typer.Exit(morning.exit_code)
+
+
+def _print_plan(output: Output, outcome: Any) -> None:
+    todo = [night for night in outcome.planned if night.why]
+    output.result(
+        {
+            "nights": [
+                {
+                    "robot": night.robot,
+                    "night": night.night,
+                    "why": night.why,
+                    "baseline": night.in_baseline,
+                    "runs": sum(len(one.targets) for one in night.comparisons),
+                }
+                for night in todo
+            ],
+            "done": len(outcome.planned) - len(todo),
+        },
+        *(
+            f"{night.robot} {night.night}: {night.why}"
+            + (", part of the baseline" if night.in_baseline else "")
+            for night in todo
+        ),
+        f"{len(todo)} nights to be done, {len(outcome.planned) - len(todo)} are done",
+    )
+
+
+@app.command("acknowledge")
+def acknowledge(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")],
+    axis: Annotated[int, typer.Option("--axis", min=1, help="The joint.")],
+    why: Why,
+    cell: Cell = DEFAULT_CELL,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Silence the alarm that stands on a joint, until it is over."""
+    from opamc_cli.storage.history import Declared
+
+    def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
+        standing = [
+            alarm
+            for alarm in history.alarms(standing=True)
+            if (alarm.robot, alarm.axis) == (robot, axis)
+        ]
+        if not standing:
+            msg = f"no alarm stands on axis {axis} of {robot}; `opamc history` shows what does"
+            raise UsageError(msg)
+        night = max(alarm.raised for alarm in standing)
+        text = f"axis {axis}: alarm since {standing[0].since} acknowledged: {why}"
+        return Declared(_now(), robot, axis, "acknowledged", night, why), text
+
+    _declare(cell, said, Output(as_json, quiet))
+
+
+@app.command("rebaseline")
+def rebaseline(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")],
+    begin: Annotated[
+        str, typer.Option("--from", metavar="DATE", help="First night of the new baseline.")
+    ],
+    why: Why,
+    cell: Cell = DEFAULT_CELL,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Begin a new baseline for a robot, such as after maintenance."""
+    from opamc_cli.storage.history import Declared
+
+    night = _night(begin)
+    assert night is not None
+
+    def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
+        known = {name for name, _ in history.nights()}
+        known |= set() if loaded.robots == "auto" else set(loaded.robots)
+        if robot not in known:
+            msg = f"{robot} is none of the cell's robots; it has {', '.join(sorted(known)[:8])}"
+            raise UsageError(msg)
+        text = f"new baseline from {night} on: {why}"
+        return Declared(_now(), robot, None, "rebaselined", night, why), text
+
+    _declare(cell, said, Output(as_json, quiet))
+
+
+def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:
+    """Keep what a user declares, and bring alarms and pages up to date where nobody else does."""
+    from opamc_cli.config.cell import load_cell
+    from opamc_cli.errors import LockedError
+    from opamc_cli.stages.nightly.run import open_history
+    from opamc_cli.stages.nightly.settle import settle_cell
+    from opamc_cli.storage.files.lock import output_lock
+
+    loaded = load_cell(path)
+    open_history(loaded, read_only=True)._db.close()
+    with open_history(loaded) as history:
+        declared, text = said(history, loaded)
+        history.declare(declared, text)
+        history.tell(one for one in history.events(untold=True) if one.kind == declared.kind)
+        try:
+            with output_lock(loaded.out):
+                settle_cell(loaded, str(path), history, ())
+        except LockedError:
+            output.note("the pages follow when the run that is under way ends")
+    output.result({"robot": declared.robot, "text": text}, f"{declared.robot} {text}")
+
+
+def _now() -> str:
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
+__all__ = ["OpamcError", "app"]

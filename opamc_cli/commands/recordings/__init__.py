@@ -1,0 +1,1 @@
+"""Where runs come from: foreign files, the virtual robot, what is shipped."""

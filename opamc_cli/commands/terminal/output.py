@@ -1,0 +1,127 @@
+"""What a subcommand prints: results on stdout, notes on stderr."""
+
+import json
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from io import StringIO
+from typing import TYPE_CHECKING, Any
+
+from opamc_cli.commands.terminal.streams import say
+from opamc_cli.errors import ExitCode
+
+if TYPE_CHECKING:
+    from contextlib import AbstractContextManager
+
+    from rich.console import RenderableType
+
+    from opamc_cli.commands.terminal.progress import Steps
+
+
+@dataclass(frozen=True)
+class Output:
+    """Where results and notes go.
+
+    Attributes
+    ----------
+    as_json
+        Print the machine-readable result alone on stdout.
+    quiet
+        Print nothing but errors (and the JSON result, if asked for).
+    """
+
+    as_json: bool = False
+    quiet: bool = False
+
+    def note(self, text: str) -> None:
+        """Print something worth knowing that is not the result."""
+        if not self.quiet:
+            say(f"{text}\n", sys.stderr)
+
+    def notes(self, texts: Sequence[str], verbose: bool = False) -> None:
+        """Print notes, those that differ in nothing but the recording and numbers as one."""
+        for text in texts if verbose else folded(texts):
+            self.note(text)
+
+    def failure(self, text: str) -> None:
+        """Print why one of several runs could not be used."""
+        say(f"opamc: {text}\n", sys.stderr)
+
+    def steps(self) -> "AbstractContextManager[Steps]":
+        """Show which step is how far, on a terminal only."""
+        from opamc_cli.commands.terminal.progress import steps_shown
+
+        return steps_shown(self.quiet)
+
+    def result(
+        self, values: Mapping[str, Any], *shown: "RenderableType", urgent: bool = False
+    ) -> None:
+        """Print the result: `values` as JSON, or `shown` for people.
+
+        An urgent result, such as a joint at fault, is printed even if quiet.
+        """
+        if self.as_json:
+            say(json.dumps(values, indent=2, sort_keys=True, allow_nan=False) + "\n", sys.stdout)
+        elif urgent or not self.quiet:
+            from rich.console import Console
+
+            # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched;
+            # brackets in a path are brackets, not markup
+            shown_text = StringIO()
+            console = Console(
+                file=shown_text,
+                force_terminal=sys.stdout.isatty() or None,
+                width=None if sys.stdout.isatty() else 120,
+                markup=False,
+                emoji=False,
+                highlight=False,
+            )
+            for item in shown:
+                console.print(item, soft_wrap=isinstance(item, str))
+            text = shown_text.getvalue()
+            if not sys.stdout.isatty():
+                text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
+            say(text, sys.stdout)
+
+    def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
+        """Print the runs that failed and return the exit code that they make."""
+        for failure in failures:
+            self.failure(failure)
+        if failures and n_done:
+            self.note(f"{len(failures)} of {len(failures) + n_done} runs failed, the rest are done")
+            return ExitCode.PARTIAL
+        return ExitCode.BAD_INPUT if failures else ExitCode.DONE
+
+
+def folded(texts: Sequence[str]) -> list[str]:
+    """Return notes with those that repeat for many runs as one line.
+
+    Examples
+    --------
+    >>> folded(["a.parquet: no ratio", "b.parquet: no ratio", "rate differs"])
+    ['2 runs: no ratio', 'rate differs']
+    >>> folded(["a.parquet: 3 samples lost", "b.parquet: 8 samples lost"])
+    ['a.parquet: 3 samples lost; 1 more run likewise']
+    """
+    groups: dict[str, list[str]] = {}
+    for text in dict.fromkeys(texts):
+        subject, colon, rest = text.partition(": ")
+        if colon and subject.endswith(".parquet"):
+            text_of_all = re.sub(r"[0-9]+", "#", rest)
+        else:
+            text_of_all = re.sub(r"[0-9]+", "#", text) if subject.startswith("axis ") else text
+        groups.setdefault(text_of_all, []).append(text)
+    lines = []
+    for alike in groups.values():
+        more = len(alike) - 1
+        rests = {text.partition(": ")[2] for text in alike}
+        if more and alike[0].startswith("axis "):
+            lines.append(f"{alike[0]} (and {more} more like this)")
+        elif more and len(rests) == 1:
+            lines.append(f"{len(alike)} runs: {rests.pop()}")
+        elif more:
+            lines.append(f"{alike[0]}; {more} more run{'s' if more > 1 else ''} likewise")
+        else:
+            lines.append(alike[0])
+    return lines

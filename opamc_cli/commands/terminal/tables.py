@@ -1,0 +1,223 @@
+"""Verdicts, features and loops as tables for the terminal."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from opamc_cli.commands.terminal.fitted import FittedTable
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+    from rich.padding import Padding
+    from rich.text import Text
+
+    from opamc_cli.stages.report.results.inputs import ReportInputs
+
+STYLES = {"healthy": "green", "changed": "yellow", "fault": "bold red", "unknown": "dim"}
+
+
+def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
+    """Return a verdict for the terminal: one line if all is well, else a table and what to do.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+    """
+    from rich.console import Group
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    axes = list(verdict.get("axes", ()))
+    states = wording.by_state(verdict)
+    worst = next(iter(states), None)
+    title = Text(wording.headline(verdict), style=_style(worst or "unknown"))
+    if set(states) <= {"healthy"}:
+        known = [a for a in axes if isinstance(a.get("health_index"), int | float)]
+        if known:
+            top = max(known, key=lambda a: float(a["health_index"]))
+            title.append(
+                f" (largest health index {wording.number(top['health_index'])}, "
+                f"axis {top['axis']})",
+                style="dim",
+            )
+        return title
+    table = FittedTable(
+        ("axis", "state", "health index", "p", "corrected", "Δμ", "Δσ²", "KS"),
+        right=(0, 2, 3, 4, 5, 6, 7),
+        dropped=("Δσ²", "Δμ", "KS", "p", "health index"),
+    )
+    for entry in axes:
+        features = entry.get("features") or {}
+        state = str(entry.get("state"))
+        table.add_row(
+            str(entry.get("axis")),
+            _state(state),
+            wording.number(entry.get("health_index")),
+            wording.p_value(entry.get("p_value")),
+            wording.p_value(entry.get("p_adjusted")),
+            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+        )
+    unhealthy = [entry for entry in axes if entry.get("state") != "healthy"]
+    shared = wording.shared_reasons(unhealthy)
+    lines = [line for entry in unhealthy for line in _explanation(entry, set(shared))]
+    for reason, numbers in shared.items():
+        lines += [Text(f"{wording.axes_phrase(numbers)}:", style="bold"), _indented(reason)]
+    return Group(title, Text(), table, Text(), *lines)
+
+
+def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
+    """Return a verdict in few lines: for each joint that is not healthy what, how sure, what to do.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+
+    Returns
+    -------
+    list of Text
+        One line if all is well; a faulty joint has five at most.
+    """
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    unhealthy = [entry for entry in verdict.get("axes", ()) if entry.get("state") != "healthy"]
+    worst = next(iter(wording.by_state(verdict)), "unknown")
+    if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
+        lines = [Text(wording.headline(verdict), style=_style(worst))]
+    else:
+        lines = []  # the one joint's own line says it
+    healthy = len(verdict.get("axes", ())) - len(unhealthy)
+    for entry in unhealthy:
+        known = entry.get("brief")
+        if not known:
+            said = next(iter(entry.get("reasons", ())), wording.advice(entry) or "not judged")
+            lines.append(Text(printable(f"axis {entry.get('axis')}: {said}")))
+            continue
+        others = f"; {healthy} other axes healthy" if len(unhealthy) == 1 and healthy > 1 else ""
+        ratio = (entry.get("distance") or {}).get("ratio")
+        state = {"fault": "at fault"}.get(str(entry.get("state")), str(entry.get("state")))
+        title = Text(f"Axis {entry.get('axis')} {state}", style=_style(str(entry.get("state"))))
+        title.append(
+            f": p {wording.p_phrase(entry.get('p_adjusted'))}, {wording.number(ratio)} times as "
+            f"far from the baseline as a healthy session{others}",
+            style="not bold",
+        )
+        lines.append(title)
+        lines.append(Text(printable(f"  do first: {known['inspect']}")))
+        lines += [Text(printable(f"  seen: {text}")) for text in known["evidence"]]
+        lines.append(Text(printable(f"  against: {known['against']}")))
+    return lines
+
+
+def feature_table(inputs: "ReportInputs") -> "RenderableType":
+    """Return the features of every axis, for a folder without a verdict."""
+    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.focus import choose_focus, pooled_features
+
+    focus = choose_focus(inputs)
+    table = FittedTable(
+        ("axis", "order", "Δμ", "Δσ²", "KS"), right=(0, 1, 2, 3, 4), dropped=("Δσ²", "Δμ")
+    )
+    for axis in inputs.axes:
+        features = pooled_features(inputs, axis, focus.order[axis]) or {}
+        table.add_row(
+            str(axis),
+            str(focus.order[axis]),
+            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+        )
+    return table
+
+
+def loop_table(loop: Mapping[str, Any]) -> "RenderableType":
+    """Return what the loop found on each axis.
+
+    Parameters
+    ----------
+    loop
+        Content of loop.json.
+    """
+    from rich.console import Group
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    parts: list[RenderableType] = []
+    for entry in loop.get("axes", ()):
+        before = (entry.get("before") or {}).get("rmse_a")
+        after = (entry.get("after") or {}).get("rmse_a")
+        parts.append(
+            Text(
+                printable(
+                    f"Model of axis {entry.get('axis')}: {entry.get('verdict')}, sealed error "
+                    f"{wording.number(before)} {entry.get('unit', 'A')} before, "
+                    f"{wording.number(after)} {entry.get('unit', 'A')} after"
+                ),
+                style="bold",
+            )
+        )
+        steps = entry.get("steps", ())
+        if steps:
+            unit = entry.get("unit", "A")
+            table = FittedTable(
+                ("step", "effect", "meaning", "gain", "decoy", f"{unit} before", f"{unit} after"),
+                right=(0, 3, 4, 5, 6),
+                dropped=("decoy", "gain", "meaning"),
+                wraps=("effect", "meaning"),
+            )
+            for number, step in enumerate(steps, start=1):
+                table.add_row(
+                    str(number),
+                    Text(printable(wording.effect_phrase(step))),
+                    Text(printable(str(step.get("interpretation") or "–"))),
+                    *(
+                        wording.number(step.get(name))
+                        for name in ("gain", "decoy_gain", "rmse_before_a", "rmse_after_a")
+                    ),
+                )
+            parts.append(table)
+    return Group(*parts)
+
+
+def printable(text: str) -> str:
+    """Return text from a file without the control characters that steer a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
+
+
+def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":
+    from rich.text import Text
+
+    from opamc_cli.stages.report import wording
+
+    sentences = [str(r) for r in entry.get("reasons", ()) if str(r) not in said_below]
+    cause = entry.get("cause")
+    if cause and not any(str(cause.get("interpretation")) in said for said in sentences):
+        sentences.append(f"cause: {wording.cause_phrase(cause)}")
+    advice = wording.advice(entry)
+    if advice:
+        sentences.append(advice)
+    if not sentences:
+        return []
+    heading = Text(f"axis {entry.get('axis')}:", style="bold")
+    return [heading, *(_indented(sentence) for sentence in sentences)]
+
+
+def _indented(text: str) -> "Padding":
+    from rich.padding import Padding
+    from rich.text import Text
+
+    return Padding(Text(printable(text)), (0, 0, 0, 2), expand=False)
+
+
+def _state(state: str) -> "Text":
+    from rich.text import Text
+
+    from opamc_cli.stages.report.figures.palette import state_sign
+
+    return Text(f"{state_sign(state)} {printable(state)}", style=_style(state))
+
+
+def _style(state: str) -> str:
+    return STYLES.get(state, STYLES["unknown"])

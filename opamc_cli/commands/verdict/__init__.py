@@ -1,0 +1,1 @@
+"""Verdicts: from runs, from tables, and as a report."""

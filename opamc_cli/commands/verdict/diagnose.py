@@ -1,0 +1,84 @@
+"""`opamc diagnose`: which joint has changed against a baseline, how sure, and why."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from opamc_cli.commands.terminal.options import (
+    ALL_CORES,
+    DEFAULT_OUT,
+    ConfigFile,
+    ExitZero,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+    Verbose,
+)
+from opamc_cli.commands.terminal.output import Output
+from opamc_cli.errors import ExitCode
+
+
+def diagnose(
+    baseline: Annotated[
+        list[Path],
+        typer.Option(
+            "--baseline",
+            metavar="RUNS",
+            help="Runs of the healthy state: files, folders, quoted patterns; may be repeated.",
+        ),
+    ],
+    target: Annotated[
+        list[Path],
+        typer.Option("--target", metavar="RUNS", help="Runs to be judged; may be repeated."),
+    ],
+    model: Annotated[
+        Path | None,
+        typer.Option("--lda", metavar="FILE", help="Trained discriminant, from `score --learn`."),
+    ] = None,
+    out: Out = DEFAULT_OUT,
+    config: ConfigFile = None,
+    overrides: Overrides = None,
+    jobs: Jobs = ALL_CORES,
+    exit_zero: ExitZero = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
+    from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
+    from opamc_cli.config import load_config
+    from opamc_cli.stages import diagnose as stage
+    from opamc_cli.stages.chain.compared import discriminants
+    from opamc_cli.storage.files.lock import output_lock
+
+    output = Output(as_json, quiet)
+    effective = load_config(config, overrides or ())
+    with output_lock(out), output.steps() as progress:
+        outcome = stage.run(
+            baseline,
+            target,
+            effective,
+            out,
+            models=discriminants.read_models(model) if model else None,
+            jobs=jobs,
+            progress=progress,
+        )
+    output.notes(outcome.notes, verbose)
+    output.result(
+        {
+            **outcome.verdict,
+            "verdict": str(outcome.verdict_path),
+            "report": str(outcome.report_path),
+        },
+        *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
+        f"report: {outcome.report_path}",
+        urgent=outcome.exit_code is not ExitCode.DONE,
+    )
+    failed = output.failures([str(error) for error in outcome.errors], outcome.n_runs)
+    if exit_zero and outcome.exit_code is ExitCode.UNHEALTHY:
+        raise typer.Exit(ExitCode.DONE)
+    # what could not be judged weighs more than a run that failed: the verdict is incomplete
+    raise typer.Exit(outcome.exit_code or failed)

@@ -1,0 +1,1 @@
+"""Divergences of ordinal patterns, and what is made of them."""

@@ -1,0 +1,1 @@
+"""What each witness says of how far sessions lie apart."""

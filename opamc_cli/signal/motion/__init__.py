@@ -1,0 +1,1 @@
+"""When a joint moves, and in which sense."""

@@ -1,0 +1,1 @@
+"""Transforms of a stream: analytic signal, wavelets, short-time spectra."""

@@ -1,0 +1,1 @@
+"""Baseline and target: sessions, rows that can be compared, trained discriminants."""

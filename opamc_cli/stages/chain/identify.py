@@ -1,0 +1,410 @@
+"""Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
+
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import IdentifyConfig
+from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
+from opamc_cli.signal.align import align
+from opamc_cli.signal.identification import (
+    UNIDENTIFIED,
+    MatchRule,
+    SegmentFeatures,
+    find_reference,
+    identify,
+)
+from opamc_cli.signal.motion.reported import fluctuation_frequency
+from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_envelope
+from opamc_cli.storage.sources import RunSource, read_sources, sources_record
+from opamc_cli.storage.tables import MOTIONS, SEGMENTS, read_table, table_input, write_table
+
+FILE_NAME = "motions.parquet"
+
+MIN_CORRELATION = 0.5
+"""Below this the correlation peak says nothing of time, and the segment's own start is kept."""
+
+REPEATS = 0.75
+"""Share of a recording's motions that a cycle has to find again to be one: noise may hide some."""
+
+SAME_DURATION = 0.1
+"""Relative difference of the durations of motions at the edges of recordings that begin and end
+with the program; where they cut it anywhere, a motion is as often half as whole."""
+
+
+@dataclass(frozen=True)
+class IdentifyOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The table that was written.
+    table
+        Its rows.
+    errors
+        One for each axis of a run that could not be read.
+    """
+
+    path: Path
+    table: pa.Table
+    errors: tuple[OpamcError, ...]
+
+    def cycles(self) -> dict[tuple[str, int], tuple[int, int]]:
+        """Return the numbers of cycles and of unidentified segments by (run, axis)."""
+        counts: dict[tuple[str, int], tuple[int, int]] = {}
+        for row in self.table.select(["run", "axis", "cycle"]).to_pylist():
+            key = (row["run"], row["axis"])
+            cycles, unidentified = counts.get(key, (0, 0))
+            counts[key] = (
+                max(cycles, row["cycle"] + 1),
+                unidentified + (row["cycle"] == UNIDENTIFIED),
+            )
+        return counts
+
+
+@dataclass(frozen=True)
+class _Axis:
+    """The segments of one axis of one run."""
+
+    source: RunSource
+    axis: int
+    rows: pa.Table
+    features: SegmentFeatures
+
+
+@dataclass(frozen=True)
+class _Reference:
+    """The reference cycle of one axis: where its segments are and what they are like.
+
+    `carrier_hz` is what delays are taken from, and `edges` tells whether recordings begin and end
+    with the cycle, so that a motion at their edge is whole.
+    """
+
+    source: RunSource
+    features: SegmentFeatures
+    spans: tuple[tuple[int, int], ...]
+    carrier_hz: npt.NDArray[np.float64]
+    edges: bool
+
+
+@dataclass(frozen=True)
+class _Job:
+    """One axis of one run with the reference that it is identified by."""
+
+    part: _Axis
+    reference: _Reference | None
+    config: IdentifyConfig
+    envelope: EnvelopeKind
+
+
+def run(
+    segments: Path,
+    config: Config,
+    out: Path,
+    *,
+    reference: Path | None = None,
+    reference_run: str | None = None,
+    moved_to: Sequence[Path] = (),
+    without: Collection[tuple[str, int]] = (),
+    jobs: int = 1,
+    watch: Watch = unwatched,
+    kept: KeptResults | None = None,
+) -> IdentifyOutcome:
+    """Identify the cycles and motions of a segment table.
+
+    Parameters
+    ----------
+    segments
+        Table of stage `segment`.
+    config
+        Sections `identify` and `patterns.envelope` are used.
+    out
+        Folder of the motion table.
+    reference
+        Motion table whose reference cycles are taken; None: found in these segments.
+    reference_run
+        Name of the run in which the reference cycle is looked for; None: the run with the most
+        repetitions.
+    moved_to
+        Folders of the runs, if they were moved.
+    without
+        Run and axis of segments that are left out.
+    jobs
+        Worker processes.
+    watch
+        Called as the work gets done.
+    kept
+        Where results of the same work may lie.
+
+    Raises
+    ------
+    InputError
+        If a table or run cannot be used.
+    """
+    table = read_table(segments, "segment", SEGMENTS)
+    sources = {source.name: source for source in read_sources(segments, moved_to)}
+    rule = match_rule(config.identify)
+    parts = [p for p in _parts(table, sources) if (p.source.name, p.axis) not in without]
+    if reference is not None:
+        references = _given_references(reference, moved_to)
+    else:
+        references = {
+            axis: _with_carrier(found, axis, config)
+            for axis, found in _own_references(
+                segments, parts, rule, config.identify, reference_run
+            ).items()
+        }
+    work = [
+        _Job(part, references.get(part.axis), config.identify, config.patterns.envelope)
+        for part in parts
+    ]
+    for source in {part.source for part in parts} | {r.source for r in references.values()}:
+        source.verify()
+    outcome = map_items(remembered(_identify_part, kept), work, jobs, watch)
+    if outcome.errors and not outcome.results:
+        raise outcome.errors[0]
+    motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()
+    inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
+    path = out / FILE_NAME
+    write_table(
+        path,
+        motions,
+        stage="identify",
+        config={
+            **config.canonical("identify"),
+            "patterns": {"envelope": config.patterns.envelope},
+            "reference_run": reference_run,
+        },
+        inputs=inputs,
+        extra=sources_record(list(sources.values()), out),
+    )
+    return IdentifyOutcome(path, motions, outcome.errors)
+
+
+def match_rule(config: IdentifyConfig) -> MatchRule:
+    """Return the rule that the configuration states."""
+    return MatchRule(
+        min_similarity=config.min_similarity,
+        duration_tolerance=config.duration_tolerance,
+        f_max_tolerance=config.f_max_tolerance,
+        use_direction=config.use_direction,
+    )
+
+
+def _parts(table: pa.Table, sources: dict[str, RunSource]) -> Iterator[_Axis]:
+    """Cut a segment table into the series of each axis of each run, in the table's order."""
+    names = table.column("run").to_pylist()
+    axes = table.column("axis").to_pylist()
+    keys = list(zip(names, axes, strict=True))
+    for key in dict.fromkeys(keys):
+        rows = table.take([i for i, other in enumerate(keys) if other == key])
+        yield _Axis(sources[key[0]], key[1], rows, segment_features(rows))
+
+
+def segment_features(rows: pa.Table) -> SegmentFeatures:
+    """Return what segments of one axis of one run are identified by, in the table's order."""
+    start = _column(rows, "start")
+    stop = _column(rows, "stop")
+    rate = _column(rows, "sampling_rate_hz")
+    pause = np.full(len(start), np.nan)
+    pause[1:] = (start[1:] - stop[:-1]) / rate[1:]
+    return SegmentFeatures(
+        variance=_column(rows, "variance").astype(np.float64),
+        duration_s=(stop - start) / rate,
+        f_max_hz=_column(rows, "f_max_hz"),
+        direction=_column(rows, "direction").astype(np.int64),
+        pause_s=pause,
+    )
+
+
+def _column(rows: pa.Table, name: str) -> npt.NDArray[Any]:
+    return np.asarray(rows.column(name).to_numpy())
+
+
+def _whole(part: _Axis) -> npt.NDArray[np.int64]:
+    """Return the indices of the segments that no edge of the recording has cut."""
+    return np.flatnonzero(~_column(part.rows, "edge").astype(bool))
+
+
+def _own_references(
+    path: Path,
+    parts: Sequence[_Axis],
+    rule: MatchRule,
+    config: IdentifyConfig,
+    reference_run: str | None,
+) -> dict[int, _Reference]:
+    """Find the reference cycle of each axis: in the run that repeats itself most."""
+    if reference_run is not None and all(p.source.name != reference_run for p in parts):
+        names = ", ".join(sorted({p.source.name for p in parts}))
+        msg = f"{path}: has no run {reference_run!r} to take the reference from; it has {names}"
+        raise InputError(msg)
+    executions = {
+        axis: _executions([part for part in parts if part.axis == axis], rule)
+        for axis in {part.axis for part in parts}
+    }
+    best: dict[int, tuple[int, _Reference]] = {}
+    for part in parts:
+        if reference_run not in (None, part.source.name):
+            continue
+        edges = executions[part.axis]
+        usable = np.arange(part.rows.num_rows) if edges else _whole(part)
+        if usable.size == 0:
+            continue
+        features = part.features.take(usable)
+        if part.rows.column("kind")[0].as_py() == "window":
+            start, stop = 0, 1
+        else:
+            start, stop = find_reference(features, rule, config.segments_per_cycle)
+        cycle = features.part(start, stop)
+        found = identify(cycle, features, rule).cycle
+        count = int(found.max(initial=-1)) + 1
+        repeats = count > 1 and np.mean(found >= 0) >= REPEATS
+        if edges and not repeats and config.segments_per_cycle is None:
+            start, stop, cycle, count = 0, len(features), features, 1
+        if part.axis not in best or count > best[part.axis][0]:
+            spans = tuple(_span(part.rows, i) for i in usable[start:stop].tolist())
+            best[part.axis] = (
+                count,
+                _Reference(part.source, cycle, spans, cycle.f_max_hz, edges),
+            )
+    return {axis: reference for axis, (_, reference) in best.items()}
+
+
+def _executions(parts: Sequence[_Axis], rule: MatchRule) -> bool:
+    """Tell whether every recording holds the same motions from its beginning to its end.
+
+    Then each is one execution of the program or several whole ones, and what touches its edge has
+    not been cut by it.
+    """
+    if len(parts) < 2 or parts[0].rows.column("kind")[0].as_py() == "window":
+        return False
+    first = parts[0].features
+    at_edge = _column(parts[0].rows, "edge").astype(bool)
+    for part in parts[1:]:
+        own = part.features
+        if len(own) != len(first) or (identify(first, own, rule).cycle < 0).any():
+            return False
+        ratio = own.duration_s[at_edge] / first.duration_s[at_edge]
+        if (np.abs(ratio - 1) > SAME_DURATION).any():
+            return False
+    return True
+
+
+def _with_carrier(reference: _Reference, axis: int, config: Config) -> _Reference:
+    """Let the current's own fluctuations tell the delay where nothing else does."""
+    with reference.source.open() as run:
+        if run.channels(axis).phases or config.joint.gear_ratio is not None:
+            return reference
+        wanted = config.patterns.envelope
+        found = [
+            fluctuation_frequency(read_envelope(run, axis, *span, wanted), run.sampling_rate_hz)
+            for span in reference.spans
+        ]
+    # one delay for all motions: of short ones the fluctuations are known badly
+    return replace(reference, carrier_hz=np.full(len(found), float(np.median(found))))
+
+
+def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Reference]:
+    """Take the reference cycles of a motion table."""
+    table = read_table(path, "identify", MOTIONS)
+    sources = {source.name: source for source in read_sources(path, moved_to)}
+    rows = table.filter(table.column("reference"))
+    if rows.num_rows == 0:
+        msg = (
+            f"{path}: holds no reference cycle: no motion repeats; record at least two cycles of "
+            "the baseline, or set identify.segments_per_cycle"
+        )
+        raise NotEnoughDataError(msg)
+    return {
+        part.axis: _Reference(
+            part.source,
+            part.features,
+            tuple(_span(part.rows, i) for i in range(part.rows.num_rows)),
+            _column(part.rows, "reference_f_max_hz"),
+            bool(_column(part.rows, "edge").any()),
+        )
+        for part in _parts(rows, sources)
+    }
+
+
+def _span(rows: pa.Table, index: int) -> tuple[int, int]:
+    return rows.column("start")[index].as_py(), rows.column("stop")[index].as_py()
+
+
+def _identify_part(job: _Job) -> pa.Table:
+    part, reference = job.part, job.reference
+    n = part.rows.num_rows
+    cycle = np.full(n, UNIDENTIFIED, dtype=np.int64)
+    motion = np.full(n, UNIDENTIFIED, dtype=np.int64)
+    similarity = np.zeros(n)
+    lag = np.zeros(n, dtype=np.int64)
+    f_max_hz = np.full(n, np.nan)
+    samples = np.zeros(n, dtype=np.int64)
+    is_reference = np.zeros(n, dtype=bool)
+    # motions at the recording's edge are whole if those of the reference are
+    whole = np.arange(n) if reference is not None and reference.edges else _whole(part)
+    if reference is not None and whole.size:
+        found = identify(reference.features, part.features.take(whole), match_rule(job.config))
+        cycle[whole], motion[whole] = found.cycle, found.motion
+        similarity[whole] = found.similarity
+        for i in np.flatnonzero(motion >= 0).tolist():
+            span = reference.spans[motion[i]]
+            f_max_hz[i] = reference.carrier_hz[motion[i]]
+            samples[i] = span[1] - span[0]
+            own = _span(part.rows, i)
+            is_reference[i] = part.source == reference.source and own == span
+        # windows of a steady signal have no beginning that could be synchronised
+        moving = _column(part.rows, "kind") == "motion"
+        lag[moving] = _lags(job, motion[moving], _spans(part.rows, moving))
+    columns = {
+        "cycle": cycle,
+        "motion": motion,
+        "similarity": similarity,
+        "lag": lag,
+        "reference": is_reference,
+        "reference_f_max_hz": f_max_hz,
+        "reference_samples": samples,
+    }
+    rows = part.rows
+    for name, values in columns.items():
+        rows = rows.append_column(MOTIONS.field(name), pa.array(values, MOTIONS.field(name).type))
+    return rows.select(MOTIONS.names).replace_schema_metadata(None).cast(MOTIONS)
+
+
+def _spans(rows: pa.Table, which: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    return [_span(rows, i) for i in np.flatnonzero(which).tolist()]
+
+
+def _lags(
+    job: _Job, motion: npt.NDArray[np.int64], spans: Sequence[tuple[int, int]]
+) -> npt.NDArray[np.int64]:
+    """Synchronise each identified segment with the reference segment of its motion."""
+    part, reference = job.part, job.reference
+    assert reference is not None
+    lags = np.zeros(len(spans), dtype=np.int64)
+    wanted = job.envelope
+    axis = part.axis
+    with part.source.open() as run, reference.source.open() as reference_run:
+        max_lag = round(job.config.max_lag_s * run.sampling_rate_hz)
+        envelopes = [
+            read_envelope(reference_run, axis, start, stop, wanted)
+            for start, stop in reference.spans
+        ]
+        for i, (m, span) in enumerate(zip(motion.tolist(), spans, strict=True)):
+            own = part.source == reference.source and span == reference.spans[m]
+            if m == UNIDENTIFIED or own:
+                continue
+            segment = read_envelope(run, axis, *span, wanted)
+            found = align(envelopes[m], segment, max_lag)
+            if found.correlation >= MIN_CORRELATION:
+                lags[i] = found.lag
+    return lags

@@ -1,0 +1,331 @@
+"""Stage `patterns`: motions and runs in, ordinal pattern counts out (thesis 4.2).
+
+Beside them it keeps what the other witnesses look at, which the thesis does not.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.errors import OpamcError
+from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
+from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.chain.witnesses import WITNESSES
+from opamc_cli.stages.chain.witnesses.kept_rows import PLACE
+from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import current_offset, read_course
+from opamc_cli.storage.sources import RunSource, read_sources, sources_record
+from opamc_cli.storage.tables import (
+    MOTIONS,
+    PATTERNS,
+    read_table,
+    table_input,
+    write_table,
+)
+
+FILE_NAME = "patterns.parquet"
+FILES = (FILE_NAME, *(witness.FILE_NAME for witness in WITNESSES))
+
+
+@dataclass(frozen=True)
+class PatternsOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The pattern table; those of the witnesses lie beside it.
+    table
+        The patterns' rows.
+    errors
+        One for each axis of a run that could not be read.
+    notes
+        Which delays are not those of (4-2), and why.
+    """
+
+    path: Path
+    table: pa.Table
+    errors: tuple[OpamcError, ...]
+    notes: tuple[str, ...]
+
+    def by_motion(self) -> list[dict[str, Any]]:
+        """Return delay, patterns and segments by axis, motion and order."""
+        rows = self.table.group_by(["axis", "motion", "order", "tau"]).aggregate(
+            [("n_patterns", "sum"), ("segment", "count")]
+        )
+        named = rows.rename_columns({"n_patterns_sum": "n_patterns", "segment_count": "segments"})
+        keys = [(key, "ascending") for key in ("axis", "motion", "order", "tau")]
+        listed: list[dict[str, Any]] = named.sort_by(keys).to_pylist()
+        return listed
+
+
+@dataclass(frozen=True)
+class _Job:
+    """The identified segments of one axis of one run."""
+
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+    config: PatternsConfig
+
+
+def run(
+    motions: Path,
+    config: Config,
+    out: Path,
+    *,
+    moved_to: Sequence[Path] = (),
+    jobs: int = 1,
+    watch: Watch = unwatched,
+    kept: KeptResults | None = None,
+) -> PatternsOutcome:
+    """Count the ordinal patterns of every identified segment's envelope; feed the witnesses.
+
+    Parameters
+    ----------
+    motions
+        Table of stage `identify`.
+    config
+        Section `patterns` is used.
+    out
+        Folder of the tables.
+    moved_to
+        Folders of the runs, if they were moved.
+    jobs
+        Worker processes.
+    watch
+        Called as the work gets done.
+    kept
+        Where results of the same work may lie.
+
+    Raises
+    ------
+    InputError
+        If a table or run cannot be used.
+    """
+    table = read_table(motions, "identify", MOTIONS)
+    sources = read_sources(motions, moved_to)
+    work = [
+        _Job(part.source, part.axis, part.rows, config.patterns)
+        for part in identified_parts(table, sources)
+    ]
+    outcome = map_items(remembered(_analyse, kept), work, jobs, watch)
+    if outcome.errors and not outcome.results:
+        raise outcome.errors[0]
+    patterns = pa.concat_tables(
+        [PATTERNS.empty_table(), *(result[FILE_NAME] for result in outcome.results)]
+    ).combine_chunks()
+    beside = {
+        witness.FILE_NAME: pa.concat_tables(
+            [
+                witness.SCHEMA.empty_table(),
+                *(result[witness.FILE_NAME] for result in outcome.results),
+            ]
+        ).combine_chunks()
+        for witness in WITNESSES
+    }
+    inputs, used = [table_input(motions)], config.canonical("patterns")
+    for name, rows in {FILE_NAME: patterns, **beside}.items():
+        write_table(
+            out / name,
+            rows,
+            stage="patterns",
+            config=used,
+            inputs=inputs,
+            extra=sources_record(sources, out),
+        )
+    notes = _delays_in_words(table, patterns, config)
+    return PatternsOutcome(out / FILE_NAME, patterns, outcome.errors, tuple(notes))
+
+
+def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> list[str]:
+    """Say which delays were not those of (4-2), by axis."""
+    length = {
+        (row["axis"], row["motion"]): row["reference_samples"]
+        for row in motions.select(["axis", "motion", "reference_samples"]).to_pylist()
+    }
+    columns = ["axis", "motion", "order", "tau", "f_max_hz", "signal"]
+    found = patterns.select(columns).group_by(columns).aggregate([]).to_pylist()
+    notes = []
+    for axis in sorted({row["axis"] for row in found}):
+        own = [row for row in found if row["axis"] == axis]
+        used = ", ".join(
+            f"{lengths[0]} to {lengths[-1]}" if len(lengths) > 1 else f"{lengths[0]}"
+            for lengths in [sorted({row["tau"] for row in own})]
+        )
+        if own[0]["signal"] == "reported" and not (config.patterns.tau or config.joint.gear_ratio):
+            notes.append(
+                f"axis {axis}: no carrier and no joint.gear_ratio tell the patterns' delay; it is "
+                f"chosen from the baseline's own current ({used} samples)"
+            )
+        shortened = [
+            row
+            for row in own
+            if row["tau"] * (row["order"] - 1) * 2 + 2 * row["order"] > length[axis, row["motion"]]
+        ]
+        if shortened:
+            motions_of = sorted({row["motion"] for row in shortened})
+            notes.append(
+                f"axis {axis}: motion {', '.join(map(str, motions_of))} is short for its patterns, "
+                f"whose delay was limited to {used} samples so that half of it is left to count"
+            )
+    return notes
+
+
+@dataclass(frozen=True)
+class IdentifiedPart:
+    """The identified segments of one axis of one run.
+
+    Attributes
+    ----------
+    source
+        Where their samples are.
+    axis
+        Counted from 1.
+    rows
+        Rows of the motion table, in its order.
+    """
+
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+
+
+def identified_parts(motions: pa.Table, sources: Sequence[RunSource]) -> list[IdentifiedPart]:
+    """Group the identified segments of a motion table by run and axis.
+
+    Raises
+    ------
+    InputError
+        If a run that is needed is gone or has changed.
+    """
+    by_name = {source.name: source for source in sources}
+    rows_of: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in motions.to_pylist():
+        if row["motion"] >= 0:
+            rows_of.setdefault((row["run"], row["axis"]), []).append(row)
+    for name in dict.fromkeys(name for name, _ in rows_of):
+        by_name[name].verify()
+    return [
+        IdentifiedPart(by_name[name], axis, tuple(rows)) for (name, axis), rows in rows_of.items()
+    ]
+
+
+def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
+    """Return the samples of a segment that correspond to its reference segment's.
+
+    The segment's own ends are where a threshold was crossed; synchronised with the reference
+    and of its length, every cycle is cut at the same places of the motion (thesis 4.1.1).
+    """
+    if row["kind"] == "window":
+        return row["start"], row["stop"]
+    start = max(row["start"] + row["lag"], 0)
+    return start, start + row["reference_samples"]
+
+
+LARGEST_SHARE = 0.5
+"""Of a motion that a pattern's window may span: longer ones leave hardly any to count."""
+
+
+def delay(
+    config: PatternsConfig, fs_hz: float, f_max_hz: float, order: int, samples: int
+) -> int | None:
+    """Return the time delay of a motion.
+
+    Parameters
+    ----------
+    config
+        A fixed delay, or γ of (4-2).
+    fs_hz, f_max_hz
+        Sampling rate, and frequency of the motion's carrier or of its current's fluctuations.
+    order
+        Of the patterns.
+    samples
+        Of the motion, as its reference has them.
+
+    Returns
+    -------
+    int or None
+        In samples; shortened until the window spans no more than `LARGEST_SHARE` of the motion,
+        None if even neighbouring samples do not fit.
+    """
+    wanted = config.tau or time_delay(fs_hz, f_max_hz, order, config.gamma)
+    longest = int(LARGEST_SHARE * samples) // (order - 1)
+    return min(wanted, longest) if longest else None
+
+
+def _analyse(job: _Job) -> dict[str, pa.Table]:
+    """Return the patterns of the segments of one axis and what each witness keeps of them."""
+    config = job.config
+    patterns: list[dict[str, Any]] = []
+    kept: dict[str, list[dict[str, Any]]] = {witness.FILE_NAME: [] for witness in WITNESSES}
+    with job.source.open() as run:
+        offset = 0j
+        if config.remove_offset:
+            spans = [aligned_span(row) for row in job.rows]
+            offset = current_offset(run, job.axis, spans, config.envelope)
+        for row in job.rows:
+            start, stop = aligned_span(row)
+            whole = stop <= run.n_samples
+            stop = min(stop, run.n_samples)
+            current = _finite(read_course(run, job.axis, start, stop, config.envelope, offset))
+            place = {**row, "start": start, "stop": stop}
+            patterns += _pattern_rows(place, np.abs(current), run.sampling_rate_hz, config)
+            # cut short, a segment's parts would not be those of the others
+            if whole:
+                for witness in WITNESSES:
+                    kept[witness.FILE_NAME] += witness.rows(
+                        place, current, run.sampling_rate_hz, config
+                    )
+    patterns.sort(key=lambda row: (row["segment"], row["order"]))
+    return {
+        FILE_NAME: pa.Table.from_pylist(patterns, schema=PATTERNS),
+        **{
+            witness.FILE_NAME: pa.Table.from_pylist(kept[witness.FILE_NAME], schema=witness.SCHEMA)
+            for witness in WITNESSES
+        },
+    }
+
+
+def _pattern_rows(
+    row: dict[str, Any],
+    envelope: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> list[dict[str, Any]]:
+    """Count the patterns of one segment, for every order."""
+    delays = {}
+    for order in sorted(set(config.orders)):
+        tau = delay(config, fs_hz, row["reference_f_max_hz"], order, row["reference_samples"])
+        if tau is not None:
+            delays[order] = tau
+    rows = []
+    for tau in sorted(set(delays.values())):
+        orders = [order for order, other in delays.items() if other == tau]
+        for order, counts in ordinal_counts(envelope, orders, tau).items():
+            counted = int(counts.sum())
+            rows.append(
+                {
+                    **{name: row[name] for name in (*PLACE, "signal", "temperature_c")},
+                    "order": order,
+                    "tau": tau,
+                    "gamma": None if config.tau else config.gamma,
+                    "f_max_hz": row["reference_f_max_hz"],
+                    "n_patterns": counted,
+                    "n_masked": n_windows(envelope.size, order, tau) - counted,
+                    "counts": counts,
+                }
+            )
+    return rows
+
+
+def _finite(envelope: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
+    """Turn infinities into NaN: a current without bound is a fault of the logger, not a rank."""
+    return np.where(np.isinf(envelope), np.nan, envelope)

@@ -1,0 +1,1 @@
+"""Segments of one axis, by what was recorded."""

@@ -1,0 +1,165 @@
+"""Segments of an axis whose drive reports torque current: by the joint's velocity."""
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.config.models import JointConfig, SegmentConfig
+from opamc_cli.errors import InputError
+from opamc_cli.signal.motion.reported import (
+    JointMotion,
+    find_joint_motions,
+    lacks_sign,
+    motor_frequency,
+    quiet_velocity,
+)
+from opamc_cli.signal.motion.windows import carrier_windows
+from opamc_cli.signal.quality import clipped_share
+from opamc_cli.stages.chain.segments.rows import AxisSegments, Segment, make_rows, mean_variance
+from opamc_cli.storage.runs import AxisChannels, Run
+
+USUAL_GEAR_RATIO = 100.0
+"""Stands in for an unknown ratio in f_d,max, which motions are then compared by: strain wave gears
+of robot arms have 50 to 160. Delays are chosen by the current itself, see stage `identify`."""
+
+STILL_SHARE = 0.05
+"""A recording that stands still for less than this share never stands still."""
+
+
+def joint_segments(
+    run: Run, channels: AxisChannels, config: SegmentConfig, joint: JointConfig
+) -> AxisSegments:
+    """Find the motions of an axis from its velocity, or from its position if there is none.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    channels
+        Columns of the axis, with a reported current.
+    config, joint
+        Sections `segment` and `joint`.
+
+    Raises
+    ------
+    InputError
+        If there is neither velocity nor position, or the current holds no numbers.
+    """
+    name = channels.current
+    assert name is not None
+    velocity = _velocity(run, channels)
+    current = run.read([name])[name]
+    known = current[np.isfinite(current)]
+    if not known.size:
+        msg = (
+            f"{run.path}: column {name} holds no number in {run.n_samples} samples; "
+            "check the drive's log or leave the axis out"
+        )
+        raise InputError(msg)
+    motions = find_joint_motions(
+        velocity,
+        run.sampling_rate_hz,
+        config.min_motion_s,
+        config.min_still_s,
+        config.min_speed_rad_s,
+    )
+    if motions and known.min() == known.max():
+        msg = (
+            f"{run.path}: column {name} is constant at {known[0]:g} {run.info.current_unit} while "
+            "the joint moves; check the drive's log or leave the axis out"
+        )
+        raise InputError(msg)
+    notes = []
+    if known.size < current.size:
+        notes.append(
+            f"{run.path}: column {name} has {current.size - known.size} samples that are no "
+            "numbers; patterns that touch them are left out"
+        )
+    share = clipped_share(current) if motions else 0.0
+    if share > 0:
+        notes.append(
+            f"{run.path}: column {name} looks clipped: {share:.1%} of its samples sit at its limit"
+        )
+    unsigned = lacks_sign(current, velocity) if motions else False
+    if unsigned or unsigned is None:
+        what = (
+            "it is taken for a modulus, and a model of the joint gives it the speed's"
+            if unsigned
+            else "the joint does not rest long enough to tell a modulus from a load; it is taken "
+            "as it is"
+        )
+        notes.append(f"{run.path}: column {name} keeps its sign though the joint reverses: {what}")
+    segments = _segments(run, current, motions, config, joint)
+    return AxisSegments(
+        run.name,
+        make_rows(run, channels, segments, "reported"),
+        tuple(notes),
+        f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
+        f"{config.min_speed_rad_s:g} is motion",
+    )
+
+
+def _segments(
+    run: Run,
+    current: npt.NDArray[np.floating],
+    motions: list[JointMotion],
+    config: SegmentConfig,
+    joint: JointConfig,
+) -> list[Segment]:
+    def frequency(motion: JointMotion) -> float:
+        ratio = joint.gear_ratio or USUAL_GEAR_RATIO
+        return motor_frequency(motion.speed_rad_s, ratio, joint.pole_pairs)
+
+    never_stands = (
+        len(motions) == 1
+        and motions[0].stop - motions[0].start >= (1 - STILL_SHARE) * run.n_samples
+    )
+    if not never_stands:
+        return [
+            Segment(
+                m.start,
+                m.stop,
+                frequency(m),
+                m.direction,
+                mean_variance([current[m.start : m.stop]]),
+            )
+            for m in motions
+        ]
+    only = motions[0]
+    # Whole revolutions of the motor where they are known and fit; else equal parts.
+    carriers = (frequency(only), run.sampling_rate_hz)
+    for carrier_hz in carriers:
+        spans = carrier_windows(
+            only.start,
+            only.stop,
+            carrier_hz,
+            run.sampling_rate_hz,
+            config.windows,
+            config.min_window_samples,
+        )
+        if spans:
+            break
+    return [
+        Segment(a, b, frequency(only), only.direction, mean_variance([current[a:b]]), kind="window")
+        for a, b in spans
+    ]
+
+
+def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
+    # One column at the drive's rate: 8 h at 1 kHz are 230 MB.
+    if channels.velocity is not None:
+        velocity = run.read([channels.velocity])[channels.velocity].astype(np.float64)
+    elif channels.position is not None:
+        position = run.read([channels.position])[channels.position]
+        velocity = quiet_velocity(position, run.sampling_rate_hz)
+    else:
+        axis = channels.axis
+        msg = (
+            f"{run.path}: axis {axis} has axis{axis}_current only; its motions need "
+            f"axis{axis}_velocity or axis{axis}_position, or phase currents axis{axis}_a, _b, _c"
+        )
+        raise InputError(msg)
+    if not np.isfinite(velocity).any():
+        column = channels.velocity or channels.position
+        msg = f"{run.path}: column {column} holds no number; check the drive's log"
+        raise InputError(msg)
+    return velocity

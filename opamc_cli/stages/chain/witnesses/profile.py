@@ -1,0 +1,45 @@
+"""Third witness: the course of the current over a motion."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
+from opamc_cli.signal.course import mean_course
+from opamc_cli.stages.chain.witnesses.kept_rows import PLACE, PLACE_SCHEMA, Names, rows_by_motion
+
+NAME = "profile"
+FILE_NAME = "profiles.parquet"
+SCHEMA = pa.schema(
+    [
+        *PLACE_SCHEMA,
+        pa.field("parts", pa.int32()),
+        pa.field("current_a", pa.list_(pa.float32())),
+    ]
+)
+
+
+def rows(
+    place: Mapping[str, Any],
+    current: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> list[dict[str, Any]]:
+    """Return the mean current in each part of a segment; none if it is too short for any."""
+    del fs_hz
+    course = mean_course(current, config.parts)
+    if not course.size:
+        return []
+    own = {name: place[name] for name in PLACE}
+    return [{**own, "parts": course.size, "current_a": course}]
+
+
+def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> ProfileEvidence:
+    """Average the current of each session's cycles, part by part, for every motion of an axis."""
+    found = rows_by_motion(baseline, target, axis, names, "current_a", ("parts",))
+    cells = [profile_cell(one.key[0], one.values, one.session, one.n_sessions) for one in found]
+    return ProfileEvidence(cells, len(names.sessions[0]))

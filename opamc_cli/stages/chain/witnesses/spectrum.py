@@ -1,0 +1,67 @@
+"""Second witness: the short-time spectrum of the envelope."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.decision.witnesses.spectra import (
+    SpectrumCell,
+    SpectrumEvidence,
+    variance_within_sessions,
+)
+from opamc_cli.signal.transform.short_time import short_time_log_power
+from opamc_cli.stages.chain.witnesses.kept_rows import PLACE, PLACE_SCHEMA, Names, rows_by_motion
+
+NAME = "spectrum"
+FILE_NAME = "spectra.parquet"
+SCHEMA = pa.schema(
+    [
+        *PLACE_SCHEMA,
+        pa.field("frames", pa.int32()),
+        pa.field("bins", pa.int32()),
+        pa.field("bin_hz", pa.float64()),
+        pa.field("log_power", pa.list_(pa.float32())),
+    ]
+)
+
+
+def rows(
+    place: Mapping[str, Any],
+    current: npt.NDArray[np.floating],
+    fs_hz: float,
+    config: PatternsConfig,
+) -> list[dict[str, Any]]:
+    """Return the spectrum of a segment's envelope; none if it is too short for any."""
+    if not config.frames:
+        return []
+    power = short_time_log_power(np.abs(current), config.frames, config.bins)
+    if not power.size:
+        return []
+    frames, bins = power.shape
+    bin_hz = fs_hz / (2 * current.size // (frames + 1))
+    shape = {"frames": frames, "bins": bins, "bin_hz": bin_hz}
+    return [{**{name: place[name] for name in PLACE}, **shape, "log_power": power.ravel()}]
+
+
+def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> SpectrumEvidence:
+    """Average the log power of each session's cycles, for every motion of an axis."""
+    cells = []
+    for found in rows_by_motion(baseline, target, axis, names, "log_power", ("frames", "bins")):
+        means, counts = found.means()
+        cells.append(
+            SpectrumCell(
+                motion=found.key[0],
+                sessions=means,
+                cycles=counts,
+                # of all sessions: of the baseline's alone it would tell the target from them
+                within=variance_within_sessions(found.values, found.session),
+                frames=found.key[1],
+                bins=found.key[2],
+                bin_hz=found.first["bin_hz"],
+            )
+        )
+    return SpectrumEvidence(cells, len(names.sessions[0]))

@@ -1,0 +1,1 @@
+"""A declared model on recorded axes: fit, trace, close."""

@@ -1,0 +1,140 @@
+"""A declared model laid on one axis's recordings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
+from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.effects.library import (
+    Library,
+    built_in_library,
+    effect_named,
+    load_user_effects,
+)
+from opamc_cli.joint.explain.saturated import unnamed_library
+from opamc_cli.joint.fit.declared import Declared, best_fit
+from opamc_cli.joint.fit.model import Fit, Session
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.track import Joint
+from opamc_cli.stages.model.declared_terms import declared_term
+from opamc_cli.stages.recordings.axis_recording import read_recording
+from opamc_cli.storage.runs import Run
+
+
+@dataclass(frozen=True)
+class AxisModel:
+    """A declared model laid on one axis's recordings.
+
+    Attributes
+    ----------
+    axis : int
+        Counted from 1.
+    fit : Fit
+        The declared model, fitted to the open data; parameters that were not given are found.
+    declared : tuple of (Effect, DeclaredEffect)
+        Model as declared.
+    library : Library
+        Effects that may be added.
+    """
+
+    axis: int
+    fit: Fit
+    declared: tuple[tuple[Effect, DeclaredEffect], ...]
+    library: Library
+
+    @property
+    def session(self) -> Session:
+        """Recordings, groups, sealed ones."""
+        return self.fit.session
+
+
+def library_of(model: JointModelConfig) -> Library:
+    """Return the library with the user's effects, without those that the model excludes.
+
+    Raises
+    ------
+    ConfigError
+        If a file defines no effect, or a name is unknown.
+    """
+    library = built_in_library()
+    for path in model.library:
+        for effect in load_user_effects(path):
+            library[effect.name] = effect
+    for name in model.without:
+        effect_named(library, name)
+    return library
+
+
+def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
+    """Lay a declared model on one axis of some runs.
+
+    Raises
+    ------
+    ConfigError
+        If an effect is unknown, or needs what the runs do not have.
+    InputError
+        If rates differ or a channel is missing.
+    NotEnoughDataError
+        If the axis does not move, or too little to seal anything off.
+    """
+    library = library_of(model)
+    # A closed model may hold functions without a name; the loop itself adds them only at its end.
+    known = {**unnamed_library(), **library}
+    declared = tuple((effect_named(known, d.effect), d) for d in model.declared())
+    recordings = [read_recording(run, axis) for run in runs]
+    rates = {recording.rate_hz for recording in recordings}
+    if len(rates) > 1:
+        msg = (
+            f"{runs[0].path}: the runs have different rates "
+            f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate"
+        )
+        raise InputError(msg)
+    if all(recording.started_s is not None for recording in recordings):
+        recordings.sort(key=lambda recording: recording.started_s or 0.0)
+    for recording, run in zip(recordings, runs, strict=True):
+        if recording.size < 64:
+            msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
+            raise NotEnoughDataError(msg)
+    joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
+    named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
+    _check_motion(recordings, joint, axis, named)
+
+    def on(session: Session) -> Declared:
+        for effect, _ in declared:
+            why = None if effect.name == "load_friction" else effect.untestable(session.fine.track)
+            if why is not None:
+                msg = (
+                    f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show "
+                    f"it: {why}; log the channel or drop the effect from the model"
+                )
+                raise ConfigError(msg)
+        track = session.coarse.track
+        return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
+
+    fit = best_fit(recordings, joint, on)
+    if fit is None:
+        msg = f"{named}: axis {axis} moves too little to seal a part off; record more motion"
+        raise NotEnoughDataError(msg)
+    allowed = {name: effect for name, effect in library.items() if name not in model.without}
+    return AxisModel(axis, fit, declared, allowed)
+
+
+def _check_motion(recordings: list[Recording], joint: Joint, axis: int, named: str) -> None:
+    track, grouping = grouped_track(recordings, joint)
+    if not is_moving(track):
+        msg = (
+            f"{named}: axis {axis} does not move (travel {np.ptp(track.position_rad):.2g} rad); "
+            "give runs in which it does"
+        )
+        raise NotEnoughDataError(msg)
+    if grouping is None:
+        moving = np.count_nonzero(track.moving) / track.rate_hz
+        msg = (
+            f"{named}: axis {axis} moves for {moving:.2g} s in all, too little to seal a part off; "
+            "record at least two cycles, or 3 s of motion"
+        )
+        raise NotEnoughDataError(msg)

@@ -1,0 +1,295 @@
+"""What the model commands write: tables, loop.json's entries, the extended model."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from opamc_cli.config.joint_model import JointModelConfig
+from opamc_cli.joint.fit.intervals import Certainty
+from opamc_cli.joint.fit.model import Fit, Session, Term
+from opamc_cli.joint.loop import Loop, Step
+from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.search import Trial
+from opamc_cli.joint.noise.spectra import order_spectrum
+from opamc_cli.stages.model.axis_model import AxisModel
+
+MOST_RESIDUALS = 20_000
+MOST_ORDERS = 4_000
+
+FIT = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("effect", pa.string()),
+        ("parameters", pa.string()),
+        ("regressor", pa.int16()),
+        ("coefficient", pa.float64()),
+        ("standard_error", pa.float64()),
+        ("low", pa.float64()),
+        ("high", pa.float64()),
+        ("condition_number", pa.float64()),
+        ("rmse_a", pa.float64()),
+    ]
+)
+CANDIDATES = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("round", pa.int16()),
+        ("effect", pa.string()),
+        ("domain", pa.string()),
+        ("parameters", pa.string()),
+        ("score", pa.float64()),
+        ("p_value", pa.float64()),
+        ("gain", pa.float64()),
+        ("t_value", pa.float64()),
+        ("added", pa.bool_()),
+        ("why_not", pa.string()),
+    ]
+)
+RESIDUALS = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("time_s", pa.float64()),
+        ("position_rad", pa.float64()),
+        ("velocity_rad_s", pa.float64()),
+        ("residual_before_a", pa.float64()),
+        ("residual_after_a", pa.float64()),
+    ]
+)
+SPECTRUM = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("order", pa.float64()),
+        ("before_a", pa.float64()),
+        ("after_a", pa.float64()),
+    ]
+)
+
+
+def fit_rows(axis: int, result: Fit, known: Certainty) -> list[dict[str, Any]]:
+    """Rows of fit.parquet, one per regressor."""
+    rows = []
+    rmse = result.rmse(sealed=False)
+    for term, values, errors in zip(
+        result.terms, result.coefficients, known.standard_errors, strict=True
+    ):
+        for k, (value, error) in enumerate(zip(values, errors, strict=True)):
+            rows.append(
+                {
+                    "axis": axis,
+                    "effect": term.effect.name,
+                    "parameters": json.dumps(shown_parameters(term), sort_keys=True),
+                    "regressor": k,
+                    "coefficient": float(value),
+                    "standard_error": float(error),
+                    "low": float(value - known.factor * error),
+                    "high": float(value + known.factor * error),
+                    "condition_number": known.condition_number,
+                    "rmse_a": rmse,
+                }
+            )
+    return rows
+
+
+def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any]:
+    """Summarise one axis for the terminal and `--json`."""
+    return {
+        "axis": laid.axis,
+        "groups": _groups_entry(laid.session),
+        "condition_number": known.condition_number,
+        "inseparable": [list(names) for names in known.inseparable],
+        "rmse_a": result.rmse(sealed=False),
+        "terms": [
+            {
+                "effect": term.effect.name,
+                "parameters": shown_parameters(term),
+                "coefficients": [float(value) for value in values],
+                "low": [float(v - known.factor * e) for v, e in zip(values, errors, strict=True)],
+                "high": [float(v + known.factor * e) for v, e in zip(values, errors, strict=True)],
+            }
+            for term, values, errors in zip(
+                result.terms, result.coefficients, known.standard_errors, strict=True
+            )
+        ],
+    }
+
+
+def _groups_entry(session: Session) -> dict[str, Any]:
+    grouping = session.grouping
+    return {
+        "kind": grouping.kind,
+        "fit": [grouping.names[g] for g in session.fit_groups],
+        "sealed": [grouping.names[g] for g in grouping.sealed],
+    }
+
+
+def candidate_row(axis: int, number: int, trial: Trial, added: bool) -> dict[str, Any]:
+    """Row of candidates.parquet."""
+    term = trial.term
+    return {
+        "axis": axis,
+        "round": number,
+        "effect": term.effect.name,
+        "domain": term.effect.domain,
+        "parameters": json.dumps(shown_parameters(term), sort_keys=True),
+        "score": trial.chain.score - trial.parent.score,
+        "p_value": trial.p_value,
+        "gain": trial.gain,
+        "t_value": trial.t_value,
+        "added": added,
+        "why_not": trial.why_not,
+    }
+
+
+def shown_parameters(term: Term) -> dict[str, float]:
+    """Non-linear parameters, rounded to six digits."""
+    return {name: float(f"{value:.6g}") for name, value in term.parameters.items()}
+
+
+def explained_entry(start: Chain, explained: Chain) -> dict[str, Any]:
+    """Say what functions without a name take off the held-out error, and in which domains."""
+    share, t_value = explained.gain_over(start)
+    return {
+        "share": share,
+        "t_value": t_value if explained.added else 0.0,
+        "domains": [term.effect.domain for term in explained.terms],
+    }
+
+
+def step_entry(step: Step) -> dict[str, Any]:
+    """One entry of `steps`."""
+    curve = step.curve
+    return {
+        "effect": step.term.effect.name,
+        "domain": step.term.effect.domain,
+        "parameters": shown_parameters(step.term),
+        "interpretation": step.interpretation,
+        "gain": step.gain,
+        "t_value": step.t_value,
+        "p_value": step.p_value,
+        "decoy_gain": step.decoy_gain,
+        "ties": list(step.ties),
+        "separating_experiment": step.experiment,
+        "fit_of_name": step.fit_of_name,
+        "approximate": step.approximate,
+        "rmse_before_a": step.rmse_before_a,
+        "rmse_after_a": step.rmse_after_a,
+        "curve": {
+            "covariate": curve.covariate,
+            "unit": curve.unit,
+            "x": [float(f"{x:.6g}") for x in curve.x],
+            "residual_a": [float(f"{y:.6g}") for y in curve.residual_a],
+            "named_a": [float(f"{y:.6g}") for y in curve.named_a],
+        },
+    }
+
+
+def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
+    """One axis's object in loop.json."""
+    grouping = laid.session.grouping
+    return {
+        "axis": laid.axis,
+        "declared": [effect.name for effect, _ in laid.declared],
+        "sealed": [grouping.names[g] for g in grouping.sealed],
+        "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
+        "steps": [step_entry(step) for step in loop.steps],
+        "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
+        "floor_a": loop.floor_a,
+        "explained_share": loop.explained_share,
+        "rejected": [
+            {
+                "effect": rejected.effect,
+                "domain": rejected.domain,
+                "parameters": rejected.parameters,
+                "gain": rejected.gain,
+                "p_value": rejected.p_value,
+                "why": rejected.why,
+            }
+            for rejected in loop.rejected
+        ],
+        "untestable": [{"effect": u.effect, "why": u.why} for u in loop.untestable],
+        "verdict": loop.verdict,
+        "domain": loop.remaining_domain,
+        "remains": [
+            {"domain": step.term.effect.domain, "gain": step.gain, "t_value": step.t_value}
+            for step in loop.steps
+            if not step.named
+        ],
+        "ceiling": {
+            "share": loop.ceiling.share,
+            "standard_error": loop.ceiling.standard_error,
+        },
+        "groups": grouping.kind,
+        "orders": loop.orders_note,
+    }
+
+
+def extended_model(model: JointModelConfig, after: Fit) -> dict[str, Any]:
+    """Write the extended model as a mapping."""
+    effects: list[Any] = []
+    for term in after.terms:
+        if term.parameters or term.keep is not None:
+            entry: dict[str, Any] = {
+                "effect": term.effect.name,
+                "parameters": shown_parameters(term),
+            }
+            if term.keep is not None:
+                entry["columns"] = list(term.keep)
+            effects.append(entry)
+        else:
+            effects.append(term.effect.name)
+    return {
+        "joint": {"gear_ratio": model.joint.gear_ratio, "pole_pairs": model.joint.pole_pairs},
+        "effects": effects,
+        "library": [str(path) for path in model.library],
+        "without": list(model.without),
+    }
+
+
+def residual_table(axis: int, loop: Loop) -> pa.Table:
+    """Sealed residuals before and after, at most 20 000 rows."""
+    before, after = loop.before.opened, loop.after.opened
+    grid = after.session.fine
+    rows = np.flatnonzero(grid.sealed)
+    rows = rows[:: max(-(-rows.size // MOST_RESIDUALS), 1)]
+    track = grid.track
+    columns: dict[str, Floats] = {
+        "time_s": track.time_s[rows],
+        "position_rad": track.position_rad[rows],
+        "velocity_rad_s": track.velocity[rows],
+        "residual_before_a": before.residual_a[rows],
+        "residual_after_a": after.residual_a[rows],
+    }
+    axes = pa.array(np.full(rows.size, axis), pa.int16())
+    return pa.table([axes, *(pa.array(values) for values in columns.values())], schema=RESIDUALS)
+
+
+def spectrum_table(axis: int, loop: Loop) -> pa.Table:
+    """Order spectrum of the open residual, before and after, at most 4 000 rows."""
+    grid = loop.after.session.fine
+    amplitudes = []
+    orders = np.empty(0)
+    for result in (loop.before, loop.after):
+        residual = np.where(grid.fit, result.residual_a, 0.0)
+        orders, power, _classes = order_spectrum(grid.track, residual)
+        # Power counts in units of white noise: n/4 of it per class is a sine of this amplitude.
+        level = float(np.mean(residual[grid.fit] ** 2))
+        samples = max(int(grid.fit.sum()), 1)
+        amplitudes.append(2 * np.sqrt(power * level / samples))
+    block = max(-(-orders.size // MOST_ORDERS), 1)
+    usable = orders.size // block * block
+    if usable == 0:
+        return SPECTRUM.empty_table()
+    peaks = [values[:usable].reshape(-1, block).max(axis=1) for values in amplitudes]
+    middle = orders[:usable].reshape(-1, block).mean(axis=1)
+    return pa.table(
+        [
+            pa.array(np.full(middle.size, axis), pa.int16()),
+            pa.array(middle),
+            pa.array(peaks[0]),
+            pa.array(peaks[1]),
+        ],
+        schema=SPECTRUM,
+    )

@@ -1,0 +1,1 @@
+"""What others read in the morning: page and metrics."""

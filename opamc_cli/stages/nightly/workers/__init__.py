@@ -1,0 +1,1 @@
+"""Nights judged by processes of their own, here or in a cluster."""

@@ -1,0 +1,167 @@
+"""Judges one robot's night: what workers of this machine and of a cluster call."""
+
+import math
+import shutil
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+
+from opamc_cli import __version__
+from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
+from opamc_cli.stages import diagnose
+from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.nightly.workers.night import (
+    REPORT,
+    VERDICT,
+    AxisResult,
+    Input,
+    NightJob,
+    ProgramJob,
+    ProgramResult,
+)
+from opamc_cli.storage.logs import fetch
+from opamc_cli.storage.runs import know_sha256
+
+
+def compute(job: NightJob) -> tuple[ProgramResult, ...]:
+    """Judge one robot's night.
+
+    Returns
+    -------
+    tuple of ProgramResult
+        The program that is worst off first.
+
+    Raises
+    ------
+    UsageError
+        If the worker is of another version, or cannot write.
+    """
+    if job.version != __version__:
+        msg = f"the worker has version {__version__} of opamc, {job.version} is needed; install it"
+        raise UsageError(msg)
+    folder = _scratch(job)
+    try:
+        return tuple(
+            sorted(
+                (_program(job, one, folder / str(n)) for n, one in enumerate(job.programs)),
+                key=lambda result: result.rank,
+            )
+        )
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _scratch(job: NightJob) -> Path:
+    """Make a folder for what is thrown away: below `out`, or in the system's where that is not.
+
+    Tables name their recordings by relative paths, and the verdict names its tables by hash: on all
+    machines that see `out` the bytes are the same.
+    """
+    try:
+        if job.scratch.parent.is_dir():
+            job.scratch.mkdir(exist_ok=True)
+            return Path(tempfile.mkdtemp(prefix=f"{job.night}-", dir=job.scratch))
+        return Path(tempfile.mkdtemp(prefix=f"{job.night}-"))
+    except OSError as error:
+        msg = f"{job.scratch}: cannot be written ({error.strerror}); check space and permissions"
+        raise UsageError(msg) from error
+
+
+def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
+    if wanted.missing:
+        return ProgramResult(wanted.program, failures=(wanted.missing,))
+    try:
+        sides = [
+            _laid_out(inputs, folder / role, folder / "copies")
+            for role, inputs in (("baseline", wanted.baseline), ("target", wanted.targets))
+        ]
+        outcome = diagnose.run(
+            [sides[0]],
+            [sides[1]],
+            job.config,
+            folder / "out",
+            kept=None if job.kept is None else KeptResults(job.kept),
+            figures_of_healthy=False,
+        )
+        temperatures = _temperatures(folder / "out" / "target" / "patterns.parquet")
+        files = {
+            VERDICT: outcome.verdict_path.read_bytes(),
+            REPORT: outcome.report_path.read_bytes(),
+        }
+    except (InputError, NotEnoughDataError) as error:
+        # the recordings' own fault: it would fail again; all other errors are the caller's
+        return ProgramResult(wanted.program, failures=(_plain(str(error), folder),))
+    axes = tuple(
+        _axis(entry, temperatures.get(entry["axis"]))
+        for entry in outcome.verdict["axes"]
+        if job.axes is None or entry["axis"] in job.axes
+    )
+    return ProgramResult(
+        wanted.program,
+        axes,
+        files,
+        tuple(_plain(str(error), folder) for error in outcome.errors),
+        tuple(_plain(note, folder) for note in outcome.notes),
+    )
+
+
+def _laid_out(inputs: Sequence[Input], folder: Path, copies: Path) -> Path:
+    """Lay recordings out under the names that tables and reports are to call them."""
+    for one in inputs:
+        path = fetch(one.log, copies)
+        if not path.exists():
+            msg = f"{one.log.path}: is gone since the night was planned; put it back"
+            raise InputError(msg)
+        state = path.stat()
+        if one.log.remote or (state.st_size, state.st_mtime_ns) == (one.log.size, one.log.mtime_ns):
+            know_sha256(path, state.st_mtime_ns, state.st_size, one.sha256)
+        link = folder / f"{one.name}.parquet"
+        link.parent.mkdir(parents=True, exist_ok=True)
+        link.symlink_to(path.resolve())
+    return folder
+
+
+def _temperatures(patterns: Path) -> dict[int, float]:
+    """Return the median temperature of each joint, where it is logged."""
+    table = pq.read_table(patterns, columns=["axis", "temperature_c"])
+    axis = table["axis"].to_numpy()
+    warm = table["temperature_c"].to_numpy(zero_copy_only=False).astype(np.float64)
+    return {
+        int(one): float(np.median(known))
+        for one in np.unique(axis)
+        if (known := warm[(axis == one) & np.isfinite(warm)]).size
+    }
+
+
+def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
+    cause = entry.get("cause") or {}
+    distance = entry.get("distance") or {}
+    reasons = entry.get("reasons") or [""]
+    return AxisResult(
+        axis=int(entry["axis"]),
+        state=str(entry["state"]),
+        health_index=entry.get("health_index"),
+        p_value=entry.get("p_value"),
+        cause=cause.get("effect"),
+        harmless=bool(cause.get("harmless")),
+        log_distance=_log(distance.get("ratio")),
+        log_common=_log(distance.get("common")),
+        effect=distance.get("effect"),
+        temperature_c=temperature_c,
+        reason=str(reasons[0]),
+    )
+
+
+def _log(ratio: float | None) -> float | None:
+    return math.log(ratio) if ratio else None
+
+
+def _plain(text: str, folder: Path) -> str:
+    """Take the folder of the work out of a sentence: it is gone, and has another name each time."""
+    for role in ("baseline", "target"):
+        text = text.replace(f"{folder / role}/", "").replace(f"{folder / 'out' / role}/", "")
+    return text.replace(f"{folder}/", "").replace(f"{folder.resolve()}/", "")

@@ -1,0 +1,124 @@
+"""One robot's night: all that its result depends on, and all that comes of it.
+
+The result is a pure function of the job; it knows neither the history nor the other robots, and
+writes nothing but what is kept of the baseline.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from opamc_cli import __version__
+from opamc_cli.config import Config
+from opamc_cli.storage.logs import LogFile
+
+COMPUTE = "opamc_cli.stages.nightly.workers.judge:compute"
+"""What a worker calls; by name, since loading it takes longer than looking at a cell."""
+
+VERDICT, REPORT = "verdict.json", "report.html"
+STATES = ("fault", "changed", "insufficient-data", "healthy")
+
+
+@dataclass(frozen=True)
+class Input:
+    """A recording as a worker needs it: its name in tables, where it lies, what it must be."""
+
+    name: str
+    log: LogFile
+    sha256: str
+
+
+@dataclass(frozen=True)
+class ProgramJob:
+    """The recordings of one program in the night, and its baseline's."""
+
+    program: str
+    condition: str
+    baseline_name: str
+    missing: str
+    targets: tuple[Input, ...]
+    baseline: tuple[Input, ...]
+    speed_percent: float | None
+    payload_kg: float | None
+
+
+@dataclass(frozen=True)
+class NightJob:
+    """What a worker is handed.
+
+    Attributes
+    ----------
+    robot, night
+        Which.
+    programs
+        What is compared.
+    config
+        Options of the diagnosis.
+    axes
+        Joints that are watched; None: all.
+    kept
+        Folder of what is kept of baselines; None where the worker cannot reach it.
+    scratch
+        Folder for what is thrown away.
+    version
+        Of the program that planned the night.
+    """
+
+    robot: str
+    night: str
+    programs: tuple[ProgramJob, ...]
+    config: Config
+    axes: tuple[int, ...] | None
+    kept: Path | None
+    scratch: Path
+    version: str = __version__
+
+
+@dataclass(frozen=True)
+class AxisResult:
+    """What the history learns of one joint."""
+
+    axis: int
+    state: str
+    health_index: float | None
+    p_value: float | None
+    cause: str | None
+    harmless: bool
+    log_distance: float | None
+    log_common: float | None
+    effect: float | None
+    temperature_c: float | None
+    reason: str
+
+
+@dataclass(frozen=True)
+class ProgramResult:
+    """What became of one program's comparison.
+
+    Attributes
+    ----------
+    program
+        Its name.
+    axes
+        Joints; empty where the comparison failed.
+    files
+        Content of verdict.json and report.html.
+    failures
+        One sentence for each recording, or the whole comparison, that failed.
+    notes
+        What is worth knowing.
+    """
+
+    program: str
+    axes: tuple[AxisResult, ...] = ()
+    files: Mapping[str, bytes] = field(default_factory=dict)
+    failures: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rank(self) -> tuple[int, str]:
+        """Worst state first."""
+        return (
+            min((STATES.index(one.state) for one in self.axes), default=len(STATES)),
+            self.program,
+        )

@@ -1,0 +1,187 @@
+"""One worker process per run: the same results for any number of workers."""
+
+import ctypes
+import os
+import signal
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import active_children, get_context, parent_process
+from time import perf_counter
+from typing import Any, Generic, TypeVar
+
+from opamc_cli.errors import OpamcError, UsageError
+from opamc_cli.stages.processes.interruption import held_back
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+Watch = Callable[[int, int], None]
+"""Called with how many items are done and how many there are."""
+
+THREAD_VARIABLES = (
+    "OMP_NUM_THREADS",
+    "OPENBLAS_NUM_THREADS",
+    "MKL_NUM_THREADS",
+    "NUMBA_NUM_THREADS",
+)
+
+
+Steps = Callable[[str], Watch]
+"""Called with the name of a step as it begins; what it returns, with what is done of it."""
+
+
+def unwatched(done: int, total: int) -> None:
+    """Tell nobody."""
+
+
+def unshown(step: str) -> Watch:
+    """Begin a step that nobody watches."""
+    del step
+    return unwatched
+
+
+@dataclass(frozen=True)
+class Outcome(Generic[Result]):
+    """Results in the items' order, and one sentence for each item that could not be used."""
+
+    results: tuple[Result, ...]
+    errors: tuple[OpamcError, ...]
+
+
+def map_items(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    jobs: int = 1,
+    watch: Watch = unwatched,
+) -> Outcome[Result]:
+    """Apply a function to every item, in worker processes if that is asked for.
+
+    A user's error (`OpamcError`) in one item does not stop the others. Workers are spawned, never
+    forked: threads of compiled libraries do not survive a fork. Each computes on one thread, so
+    that workers do not compete for the cores.
+
+    Parameters
+    ----------
+    function
+        Importable by name (workers are spawned).
+    items
+        What it is applied to.
+    jobs
+        Number of workers; 0: one per core, if they are worth their start; 1: this process.
+    watch
+        Called as items get done.
+    """
+    if jobs == 0:
+        return _as_it_pays(function, items, watch)
+    workers = min(jobs, len(items))
+    if workers <= 1:
+        return _gather([_Immediate(function, item) for item in items], watch)
+    saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent, (os.getpid(),))
+    try:
+        with held_back():
+            calls = [pool.submit(function, item) for item in items]
+        return _gather(calls, watch)
+    except BrokenProcessPool as error:
+        msg = "a worker process was killed, most often for want of memory; use fewer --jobs"
+        raise UsageError(msg) from error
+    except BaseException:
+        for worker in active_children():
+            worker.kill()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        for name, value in saved.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+
+
+START_S = 6.0
+"""A worker takes some 3 s to start and to load the kernels: two must save more than that."""
+
+
+def _as_it_pays(
+    function: Callable[[Item], Result], items: Sequence[Item], watch: Watch
+) -> Outcome[Result]:
+    """Work on item after item here, until what is left is worth starting workers for."""
+    cores = os.cpu_count() or 1
+    done: list[_Immediate[Item, Result]] = []
+    for k, item in enumerate(items):
+        watch(k, len(items))
+        call = _Immediate(function, item)
+        begun = perf_counter()
+        call.settle()
+        done.append(call)
+        left = items[k + 1 :]
+        # the first item pays for what is loaded once
+        if k and cores > 1 and (perf_counter() - begun) * len(left) > START_S:
+            first = _gather(done, unwatched)
+            rest = map_items(function, left, cores, lambda n, _: watch(len(done) + n, len(items)))
+            return Outcome(first.results + rest.results, first.errors + rest.errors)
+    return _gather(done, watch)
+
+
+def _end_with_parent(parent: int) -> None:
+    """Have this worker end when its parent does, however that ends."""
+    with suppress(AttributeError, OSError):
+        # at once, where the kernel can; below as soon as the interpreter gets to it
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os._exit(1)
+    threading.Thread(target=_watch_parent, daemon=True).start()
+
+
+def _watch_parent() -> None:
+    process = parent_process()
+    if process is not None:
+        process.join()
+        os._exit(1)
+
+
+_PR_SET_PDEATHSIG = 1
+
+
+class _Immediate(Generic[Item, Result]):
+    """A call that is made when its result is asked for."""
+
+    def __init__(self, function: Callable[[Item], Result], item: Item) -> None:
+        self._function = function
+        self._item = item
+        self._settled: list[Result] = []
+        self._error: OpamcError | None = None
+
+    def settle(self) -> None:
+        """Make the call now, and keep what comes of it."""
+        try:
+            self._settled.append(self._function(self._item))
+        except OpamcError as error:
+            self._error = error
+
+    def result(self) -> Result:
+        if self._error is not None:
+            raise self._error
+        return self._settled[0] if self._settled else self._function(self._item)
+
+
+def _gather(
+    calls: Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]],
+    watch: Watch,
+) -> Outcome[Result]:
+    results: list[Result] = []
+    errors: list[OpamcError] = []
+    pending: Sequence[Future[Result] | _Immediate[Any, Result]] = calls
+    for done, call in enumerate(pending):
+        watch(done, len(calls))
+        try:
+            results.append(call.result())
+        except OpamcError as error:
+            errors.append(error)
+    watch(len(calls), len(calls))
+    return Outcome(tuple(results), tuple(errors))

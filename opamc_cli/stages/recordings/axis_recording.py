@@ -1,0 +1,161 @@
+"""One axis of a run, as a model of the joint needs it."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+
+import numpy as np
+
+from opamc_cli.errors import InputError
+from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
+from opamc_cli.signal.motion.reported import lacks_sign, signed_by_speed, velocity_from_position
+from opamc_cli.storage.runs import Array, Run
+
+UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
+"""Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
+SAME_RATIO = 0.03
+
+
+def axes_of(runs: Sequence[Run]) -> list[int]:
+    """Axes that every run holds."""
+    common = set(runs[0].axes)
+    for run in runs[1:]:
+        common &= set(run.axes)
+    return sorted(common)
+
+
+def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
+    """Read one axis of a run, up to sample `stop` (half-open) if that is given.
+
+    Raises
+    ------
+    InputError
+        If the run has no such axis, or neither a signed current nor three phases.
+    """
+    channels = run.channels(axis)
+    run.check_time()
+    three = len(channels.phases) == 3
+    if channels.current is None and not three:
+        msg = (
+            f"{run.path}: axis {axis} has {len(channels.phases)} phase current(s) and no "
+            f"axis{axis}_current; a model needs the signed current or all three phases"
+        )
+        raise InputError(msg)
+    if not three and channels.position is None and channels.velocity is None:
+        msg = (
+            f"{run.path}: axis {axis} has no axis{axis}_position, no axis{axis}_velocity and not "
+            "three phases; log one of them, a model needs the motion"
+        )
+        raise InputError(msg)
+    named = {
+        "current": None if three else channels.current,
+        "position": channels.position,
+        "velocity": channels.velocity,
+        "temperature": channels.temperature,
+    }
+    wanted = [name for name in named.values() if name] + list(channels.phases if three else ())
+    samples = run.read(wanted, 0, stop)
+    arrays = {
+        key: None if name is None else np.asarray(samples[name], dtype=np.float64)
+        for key, name in named.items()
+    }
+    phases = None
+    if three:
+        phases = np.stack(
+            [np.asarray(samples[name], dtype=np.float64) for name in channels.phases], axis=1
+        )
+    for channel, values in samples.items():
+        _check_channel(run, channel, values)
+    _check_units(run, axis, arrays["position"], arrays["velocity"])
+    if arrays["current"] is not None:
+        arrays["current"] = _with_sign(arrays, run.sampling_rate_hz)
+    return Recording(
+        name=run.name,
+        rate_hz=run.sampling_rate_hz,
+        current_a=arrays["current"],
+        phases_a=phases,
+        position_rad=arrays["position"],
+        velocity_rad_s=arrays["velocity"],
+        temperature_c=arrays["temperature"],
+        started_s=_seconds(run),
+    )
+
+
+def interpolated(recording: Recording, least_hz: float) -> Recording:
+    """Return a slow recording with samples between its own, by straight lines.
+
+    What a model of the joint looks at is laid out for drives that log 100 times a second and more.
+    Nothing is learned between the samples; sessions, not samples, are what is compared.
+    """
+    factor = math.ceil(least_hz / recording.rate_hz)
+    if factor < 2 or recording.current_a is None:
+        return recording
+    place = np.arange(len(recording.current_a))
+    fine = np.arange((len(place) - 1) * factor + 1) / factor
+
+    def between(values: Array | None) -> Array | None:
+        return None if values is None else np.interp(fine, place, values)
+
+    return replace(
+        recording,
+        rate_hz=recording.rate_hz * factor,
+        current_a=between(recording.current_a),
+        position_rad=between(recording.position_rad),
+        velocity_rad_s=between(recording.velocity_rad_s),
+        temperature_c=between(recording.temperature_c),
+    )
+
+
+def _with_sign(arrays: dict[str, Array | None], rate_hz: float) -> Array | None:
+    """Return the reported current, with the speed's sign where it was logged without one."""
+    current, velocity = arrays["current"], arrays["velocity"]
+    if velocity is None and arrays["position"] is not None:
+        velocity = velocity_from_position(arrays["position"], rate_hz)
+    if current is None or velocity is None or not lacks_sign(current, velocity):
+        return current
+    return signed_by_speed(current, velocity)
+
+
+def _check_channel(run: Run, name: str, values: Array) -> None:
+    known = np.isfinite(values)
+    if not known.any():
+        msg = f"{run.path}: column {name} holds no number; check the sensor or leave the column out"
+        raise InputError(msg)
+    is_current = not name.endswith(("position", "velocity", "temperature"))
+    if is_current and np.ptp(values[known]) == 0:
+        level = f"{float(values[known][0]):g} {run.info.current_unit}"
+        msg = (
+            f"{run.path}: column {name} is constant at {level} in all {len(values)} samples; "
+            "check the sensor"
+        )
+        raise InputError(msg)
+
+
+def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | None) -> None:
+    """Refuse a position and a speed that are the same motion in different units."""
+    if position is None or velocity is None:
+        return
+    ratio = speed_ratio(position, velocity, run.sampling_rate_hz)
+    for known, unit in UNITS.items():
+        if ratio is not None and abs(ratio / known - 1) < SAME_RATIO:
+            name, asked = ("position", "rad") if unit == "deg" else ("velocity", "rad/s")
+            msg = (
+                f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
+                f"axis{axis}_position: axis{axis}_{name} seems to be in {unit}; convert it to "
+                f"{asked}, or name its unit in the map of opamc ingest"
+            )
+            raise InputError(msg)
+
+
+def _seconds(run: Run) -> float | None:
+    if run.info.started_at is None:
+        return None
+    try:
+        return datetime.fromisoformat(run.info.started_at).timestamp()
+    except ValueError as error:
+        msg = (
+            f"{run.path}: started_at is {run.info.started_at!r}, an ISO 8601 time is needed; "
+            "correct it or leave it out"
+        )
+        raise InputError(msg) from error

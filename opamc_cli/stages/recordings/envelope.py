@@ -1,0 +1,185 @@
+"""The current of one segment and its envelope, from whichever channels a run holds."""
+
+from collections.abc import Sequence
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from opamc_cli.errors import InputError
+from opamc_cli.signal.transform.analytic import analytic_signal, clarke, envelope
+from opamc_cli.storage.runs import AxisChannels, Run
+
+EnvelopeKind = Literal["auto", "clarke", "hilbert", "reported"]
+
+GUARD_S = 0.25
+"""Read beside a segment of one phase, so that the Hilbert transform's edges fall outside it."""
+
+
+def envelope_kind(path: object, channels: AxisChannels, wanted: EnvelopeKind) -> EnvelopeKind:
+    """Return the kind of envelope that an axis can give.
+
+    Raises
+    ------
+    InputError
+        If the wanted kind needs a current that the run does not hold.
+    """
+    if wanted == "auto":
+        if len(channels.phases) == 3:
+            return "clarke"
+        return "hilbert" if channels.phases else "reported"
+    lacking = {
+        "clarke": len(channels.phases) < 3 and "three phase currents",
+        "hilbert": not channels.phases and "a phase current",
+        "reported": channels.current is None and f"axis{channels.axis}_current",
+    }[wanted]
+    if lacking:
+        msg = (
+            f"{path}: patterns.envelope is {wanted!r} but axis {channels.axis} lacks {lacking}; "
+            "use 'auto'"
+        )
+        raise InputError(msg)
+    return wanted
+
+
+OFFSET_SPANS = 64
+"""Most segments that the sensors' offset is estimated from."""
+
+OFFSET_TURNS = 50.0
+"""Fewest turns of the current vector: fewer leave more of the vector than of the offset."""
+
+
+def current_offset(
+    run: Run, axis: int, spans: Sequence[tuple[int, int]], wanted: EnvelopeKind = "auto"
+) -> complex:
+    """Estimate what the current sensors add to the current vector of an axis.
+
+    The vector turns, its sensors' offset stands still: it is the mean over many turns. Left in,
+    it modulates the envelope once per electrical period, by more than early damage does, and it
+    drifts from session to session.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    axis
+        Counted from 1.
+    spans
+        Half-open intervals of samples in which the axis moves.
+    wanted
+        Which current, see `PatternsConfig.envelope`.
+
+    Returns
+    -------
+    complex
+        In ampere; 0 for a reported current, whose mean is torque, and where the vector turns
+        fewer than `OFFSET_TURNS` times in all.
+    """
+    if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
+        return 0j
+    total, count, turns = 0j, 0, 0.0
+    for start, stop in spans[:: -(-len(spans) // OFFSET_SPANS) or 1]:
+        vector = read_current(run, axis, start, stop, wanted).astype(np.complex128)
+        vector = vector[np.isfinite(vector)]
+        if vector.size < 2:
+            continue
+        # the square's angle does not jump where torque changes its sign
+        squared = vector * vector
+        advance = np.angle(squared[1:] * squared[:-1].conj()).sum()
+        turns += abs(float(advance)) / (4 * np.pi)
+        total += complex(vector.sum())
+        count += vector.size
+    return total / count if turns >= OFFSET_TURNS else 0j
+
+
+def read_envelope(
+    run: Run,
+    axis: int,
+    start: int,
+    stop: int,
+    wanted: EnvelopeKind = "auto",
+    offset: complex = 0j,
+) -> npt.NDArray[np.floating]:
+    """Read the current of an axis and return its envelope over start..stop.
+
+    See `read_course` for what is read.
+    """
+    return np.asarray(np.abs(read_course(run, axis, start, stop, wanted, offset)))
+
+
+def read_course(
+    run: Run,
+    axis: int,
+    start: int,
+    stop: int,
+    wanted: EnvelopeKind = "auto",
+    offset: complex = 0j,
+) -> npt.NDArray[np.floating]:
+    """Read the current of an axis whose course over start..stop repeats with the motion.
+
+    Parameters
+    ----------
+    run
+        Open run.
+    axis
+        Counted from 1.
+    start, stop
+        Half-open interval of samples; what lies outside the run is left out.
+    wanted
+        Which current it is taken from, see `PatternsConfig.envelope`.
+    offset
+        Taken off the current vector first, A; see `current_offset`.
+
+    Returns
+    -------
+    array
+        Shape (stop - start,), A, in the run's own float width: the envelope of phase currents,
+        the reported current itself with its sign.
+
+    Raises
+    ------
+    InputError
+        If the axis lacks the current that is wanted.
+    """
+    current = read_current(run, axis, start, stop, wanted)
+    if not np.iscomplexobj(current):
+        return current
+    vector = current - current.dtype.type(offset) if offset else current
+    return np.asarray(envelope(vector))
+
+
+def read_current(
+    run: Run, axis: int, start: int, stop: int, wanted: EnvelopeKind = "auto"
+) -> npt.NDArray[Any]:
+    """Read the current vector of an axis, or its signed reported current.
+
+    Parameters
+    ----------
+    run, axis, start, stop, wanted
+        As for `read_envelope`.
+
+    Returns
+    -------
+    array
+        Shape (stop - start,), A: the Clarke vector or analytic signal (complex) where phases
+        are known, the reported current (real) else.
+
+    Raises
+    ------
+    InputError
+        If the axis lacks the current that is wanted.
+    """
+    start, stop = max(start, 0), min(stop, run.n_samples)
+    channels = run.channels(axis)
+    kind = envelope_kind(run.path, channels, wanted)
+    if kind == "clarke":
+        phases = run.read(channels.phases, start, stop)
+        return clarke(*(phases[name] for name in channels.phases))
+    if kind == "hilbert":
+        guard = round(GUARD_S * run.sampling_rate_hz)
+        first = max(start - guard, 0)
+        name = channels.phases[0]
+        current = run.read([name], first, stop + guard)[name]
+        return analytic_signal(current)[start - first : stop - first]
+    assert channels.current is not None
+    return run.read([channels.current], start, stop)[channels.current]

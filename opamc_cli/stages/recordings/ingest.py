@@ -1,0 +1,417 @@
+"""Foreign recordings become runs: read, convert, resample where uneven, write."""
+
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+import pyarrow as pa
+
+from opamc_cli.config.models import digest
+from opamc_cli.errors import InputError, OpamcError, UsageError
+from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
+from opamc_cli.storage.files.lock import output_lock
+from opamc_cli.storage.ingest.convert import convert
+from opamc_cli.storage.ingest.map.map_file import (
+    ColumnMap,
+    IngestMap,
+    RateMap,
+    ValueMap,
+    for_axes,
+    quantity_of,
+    rate_hz,
+)
+from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque
+from opamc_cli.storage.ingest.opening import open_source
+from opamc_cli.storage.ingest.recordings import find_recordings, local_copy
+from opamc_cli.storage.ingest.source import Array, Block, Name, Selection, Source
+from opamc_cli.storage.ingest.time.dates import utc_text
+from opamc_cli.storage.ingest.time.resample import resample
+from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
+from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, file_sha256, write_run
+
+_TIME = "time"
+
+EARLIEST_S = 5e8
+"""A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
+
+
+MAP_VERSION = 1
+"""Part of what a run remembers of its map: raised when the same map makes other runs."""
+
+
+@dataclass(frozen=True)
+class Ingested:
+    """One recording that became a run.
+
+    Attributes
+    ----------
+    source, run
+        What was read, and the file that was written.
+    sampling_rate_hz, n_samples
+        Of the run.
+    missing
+        Values that are NaN, by column; columns without are left out.
+    stamps
+        What was found in the time stamps; None where the map names none, or nothing was done.
+    sources
+        The recording's channel by run column.
+    skipped
+        The run was there already, made from the same recording by the same map.
+    replaced
+        The run was there already, made from another recording or by another map.
+    """
+
+    source: str
+    run: Path
+    sampling_rate_hz: float
+    n_samples: int
+    missing: Mapping[str, int]
+    stamps: StampAccount | None
+    sources: Mapping[str, Name] = field(default_factory=dict)
+    skipped: bool = False
+    replaced: bool = False
+
+
+@dataclass(frozen=True)
+class _Task:
+    source: str
+    run: Path
+    channels: IngestMap
+
+
+def run(
+    files: Sequence[Path | str],
+    channels: IngestMap,
+    out: Path,
+    jobs: int = 1,
+    watch: Watch = unwatched,
+) -> Outcome[Ingested]:
+    """Turn every recording into a run below `out`; one that cannot be used stops no other.
+
+    What has become a run already, by the same map, is left alone.
+
+    Parameters
+    ----------
+    files
+        Files, folders, patterns and addresses in object stores.
+    channels
+        The map.
+    out
+        Output folder.
+    jobs
+        Worker processes.
+    watch
+        Called with what is done and what there is to do.
+
+    Raises
+    ------
+    UsageError
+        If two recordings have the same name, or `out` cannot be written. Nothing is written then.
+    InputError
+        If a folder or pattern names no recording.
+    LockedError
+        If another process writes to `out`.
+    """
+    found = find_recordings([str(file) for file in files], channels.format is not None)
+    tasks = [_Task(each.source, out / f"{each.name}.parquet", channels) for each in found]
+    by_run: dict[Path, str] = {}
+    for task in tasks:
+        if task.run in by_run:
+            msg = (
+                f"{by_run[task.run]} and {task.source} would both become {task.run}; "
+                "rename one or ingest them into different folders with --out"
+            )
+            raise UsageError(msg)
+        by_run[task.run] = task.source
+    with output_lock(out):
+        outcome = map_items(ingest_file, tasks, jobs, watch)
+    for error in outcome.errors:
+        if isinstance(error, UsageError):
+            raise error  # what cannot be written for one file cannot be for the next
+    return outcome
+
+
+def rates_note(results: Sequence[Ingested]) -> str | None:
+    """Return what to do about runs of different rates, None where they have one rate.
+
+    Baseline and target are compared at one rate only; to hear of it now saves a refusal later.
+    """
+    rates = sorted({item.sampling_rate_hz for item in results})
+    if len(rates) < 2:
+        return None
+    low, high = (next(i for i in results if i.sampling_rate_hz == r) for r in (rates[0], rates[-1]))
+    said = (
+        f"sampling rates differ, {rates[0]:g} Hz ({low.run}) to {rates[-1]:g} Hz ({high.run}), "
+        "and runs of different rates cannot be compared"
+    )
+    if rates[-1] / rates[0] - 1.0 > RATE_WITHIN:
+        return f"{said}; ingest them into different folders"
+    middle = float(f"{(rates[0] * rates[-1]) ** 0.5:.3g}")
+    return f"{said}: set resample_hz in the map, as with --set resample_hz={middle:g}"
+
+
+def map_digest(channels: IngestMap) -> str:
+    """Return the SHA-256 of what a map says."""
+    return digest({"version": MAP_VERSION, **channels.model_dump(mode="json")})
+
+
+def ingest_file(task: _Task) -> Ingested:
+    """Turn one recording into a run.
+
+    Raises
+    ------
+    InputError
+        If the recording cannot be used; no run is written then.
+    """
+    with local_copy(task.source) as path:
+        return _ingest(path, task)
+
+
+def _ingest(path: Path, task: _Task) -> Ingested:
+    with open_source(path, task.channels) as source:
+        sha256 = _source_sha256(path)
+        replaced = task.run.exists()
+        if replaced:
+            with suppress(OpamcError), Run(task.run) as old:
+                known = (old.info.source_sha256, old.info.map_sha256)
+                if known == (sha256, map_digest(task.channels)):
+                    rate, n = old.sampling_rate_hz, old.n_samples
+                    return Ingested(task.source, task.run, rate, n, {}, None, skipped=True)
+        channels = for_axes(task.channels, source.channels)
+        declared = _declared_rate(path, source, channels)
+        selections = {
+            name: Selection(column.source, cast(int | None, column.index))
+            for name, column in channels.columns.items()
+        }
+        clock = _clock(path, source, channels, declared, selections)
+        blocks: Iterable[Block] = convert(source.blocks(selections), channels)
+        if clock is not None and clock.clock.kept is not None:
+            blocks = _on_grid(blocks, clock.times_s, clock.clock, channels)
+        rate = clock.clock.sampling_rate_hz if clock is not None else cast(float, declared)
+        info = replace(
+            _info(path, source, channels, rate),
+            source_sha256=sha256,
+            map_sha256=map_digest(task.channels),
+        )
+        n_samples, missing = _write(path, task.run, channels, info, blocks)
+        labels = {each.name: each.labels for each in source.channels() if each.labels}
+    return Ingested(
+        task.source,
+        task.run,
+        rate,
+        n_samples,
+        missing,
+        clock.clock.account if clock and channels.time else None,
+        {name: _label(column, labels) for name, column in channels.columns.items()},
+        replaced=replaced,
+    )
+
+
+def _label(column: ColumnMap, labels: Mapping[Name, Sequence[str]]) -> Name:
+    """Return what a column was made from: the joint's name where the map has its place."""
+    if column.source in labels and isinstance(column.index, int):
+        return f"{labels[column.source][column.index]}/{column.source}"
+    return column.source
+
+
+def _source_sha256(path: Path) -> str:
+    """Return the SHA-256 of a recording; of a folder (a ROS 2 bag), that of all its files."""
+    if not path.is_dir():
+        return file_sha256(path)
+    files = [file for file in sorted(path.rglob("*")) if file.is_file()]
+    return digest({str(file.relative_to(path)): file_sha256(file) for file in files})
+
+
+@dataclass(frozen=True)
+class _Stamped:
+    """The time stamps of a recording and the grid made of them."""
+
+    times_s: Seconds
+    clock: Clock
+
+
+def _clock(
+    path: Path,
+    source: Source,
+    channels: IngestMap,
+    declared: float | None,
+    selections: Mapping[str, Selection],
+) -> _Stamped | None:
+    """Return the grid of a recording, None where its rows are taken as they come."""
+    time, grid = channels.time, channels.resample_hz
+    if time is None:
+        if grid is None:
+            return None
+        # evenly spaced rows, by declaration
+        first = next(iter(selections))
+        rows = sum(len(block[first]) for block in source.blocks({first: selections[first]}))
+        times_s = np.arange(rows) / cast(float, declared)
+        return _Stamped(times_s, examine(path, "rows", times_s, declared, 2.5, grid))
+    times_s = _times(source, channels, declared)
+    clock = examine(path, time.source, times_s, declared, time.max_gap_samples, grid)
+    return _Stamped(times_s, clock)
+
+
+def _declared_rate(path: Path, source: Source, channels: IngestMap) -> float | None:
+    declared = channels.sampling_rate_hz
+    if not isinstance(declared, RateMap):
+        return declared
+    value = _number(source.value(declared.source))
+    if value is None or not 0 < value < np.inf:
+        msg = (
+            f"{path}: {declared.source!r} is {source.value(declared.source)!r}; "
+            "a sampling rate is a positive number"
+        )
+        raise InputError(msg)
+    return rate_hz(declared, value)
+
+
+def _times(source: Source, channels: IngestMap, rate: float | None) -> Seconds:
+    """Return all time stamps in seconds: 8 bytes per row are the price of a sound account."""
+    time = channels.time
+    assert time is not None
+    dates = time.unit == ISO8601
+    selection = {_TIME: Selection(time.source, time.index, dates)}
+    stamps = [block[_TIME] for block in source.blocks(selection)]
+    column: Array = np.concatenate(stamps) if stamps else np.empty(0)
+    if dates:
+        seconds = np.full(len(column), np.nan)
+        known = ~np.isnat(column)
+        if known.any():
+            since = column[known] - column[known][0]
+            seconds[known] = since / np.timedelta64(1, "us") * 1e-6
+        return seconds
+    unit = conversion(time.unit, "time")
+    if time.unit == SAMPLES or unit is None:
+        return np.asarray(column / cast(float, rate))
+    return np.asarray(column if unit.factor == 1.0 else column * unit.factor)
+
+
+def _on_grid(
+    blocks: Iterable[Block], times_s: Seconds, clock: Clock, channels: IngestMap
+) -> Iterable[Block]:
+    assert clock.kept is not None
+    linear = channels.time is not None and channels.time.interpolation == "linear"
+    return resample(
+        _stamped(blocks, times_s, clock.kept),
+        clock.start_s,
+        clock.sampling_rate_hz,
+        clock.n_samples,
+        clock.max_gap_s,
+        cubic=not linear,
+    )
+
+
+def _stamped(
+    blocks: Iterable[Block], times_s: Seconds, kept: Array
+) -> Iterator[tuple[Seconds, Block]]:
+    start = 0
+    for block in blocks:
+        stop = start + len(next(iter(block.values())))
+        rows = kept[start:stop]
+        yield times_s[start:stop][rows], {name: values[rows] for name, values in block.items()}
+        start = stop
+
+
+def _info(path: Path, source: Source, channels: IngestMap, rate: float) -> RunInfo:
+    values: dict[str, object] = {}
+    for key in ("robot", "program", "speed_percent", "payload_kg", "started_at", "session"):
+        given = getattr(channels.metadata, key)
+        value = source.value(given.source) if isinstance(given, ValueMap) else given
+        if value is None:
+            continue
+        if key == "started_at":
+            known: object = utc_text(_since_1970(value, given, channels))
+            wanted = "a date and time in ISO 8601, such as 2022-10-26T08:17:21Z"
+        elif key in ("speed_percent", "payload_kg"):
+            known, wanted = _number(value), "a number"
+        else:
+            known, wanted = str(value), "text"
+        if known is None:
+            msg = f"{path}: metadata.{key} is {value!r}; it must be {wanted}"
+            raise InputError(msg)
+        values[key] = known
+    units = {
+        column.unit for name, column in channels.columns.items() if quantity_of(name) == "current"
+    }
+    values["current_unit"] = "Nm" if any(map(is_torque, units)) else "A"
+    return RunInfo(sampling_rate_hz=rate, **values)  # type: ignore[arg-type]
+
+
+def _since_1970(value: object, given: object, channels: IngestMap) -> object:
+    """Return the date that a first time stamp is, where stamps count from 1970."""
+    time = channels.time
+    number = _number(value)
+    if time is None or not isinstance(given, ValueMap) or given.source != time.source:
+        return value
+    unit = conversion(time.unit, "time")
+    if unit is None or number is None or number * unit.factor < EARLIEST_S:
+        return value
+    return np.datetime64(round(number * unit.factor * 1e6), "us")
+
+
+def _number(value: object) -> float | None:
+    try:
+        number = float(str(value).replace(",", "."))
+    except ValueError:
+        return None
+    return number if np.isfinite(number) else None
+
+
+def _write(
+    path: Path, run: Path, channels: IngestMap, info: RunInfo, blocks: Iterable[Block]
+) -> tuple[int, dict[str, int]]:
+    names = list(channels.columns)
+    schema = pa.schema([(name, _width(name)) for name in names])
+    missing = dict.fromkeys(names, 0)
+    n_samples = 0
+    groups = _row_groups(blocks, schema)
+    with closing(groups), write_run(run, info, schema) as writer:
+        for table in groups:
+            for name in names:
+                missing[name] += int(np.isnan(table.column(name).to_numpy()).sum())
+            n_samples += table.num_rows
+            writer.write_table(table)
+        if n_samples == 0:
+            msg = f"{path}: holds no samples; check the map's skip_rows and sources"
+            raise InputError(msg)
+        for name, count in missing.items():
+            if count == n_samples:
+                msg = (
+                    f"{path}: column {name} (source {channels.columns[name].source!r}) has no "
+                    f"value in {n_samples} rows; name another source in the map"
+                )
+                raise InputError(msg)
+    return n_samples, {name: count for name, count in missing.items() if count}
+
+
+def _width(name: str) -> pa.DataType:
+    # float32 resolves a current to 1e-7 of itself; turns of a joint add up and need more
+    return pa.float64() if quantity_of(name) == "position" else pa.float32()
+
+
+def _row_groups(blocks: Iterable[Block], schema: pa.Schema) -> Generator[pa.Table, None, None]:
+    held: list[pa.Table] = []
+    n_held = 0
+    for block in blocks:
+        columns = [pa.array(_measured(block[field.name], field.type)) for field in schema]
+        held.append(pa.Table.from_arrays(columns, schema=schema))
+        n_held += held[-1].num_rows
+        while n_held >= ROW_GROUP_SAMPLES:
+            table = pa.concat_tables(held)
+            yield table.slice(0, ROW_GROUP_SAMPLES)
+            held = [table.slice(ROW_GROUP_SAMPLES)]
+            n_held -= ROW_GROUP_SAMPLES
+    if n_held:
+        yield pa.concat_tables(held)
+
+
+def _measured(values: Array, width: pa.DataType) -> Array:
+    # what float32 cannot hold is as little a measurement as an infinity
+    with np.errstate(over="ignore"):
+        column = values.astype(width.to_pandas_dtype())
+    column[np.isinf(column)] = np.nan
+    return np.asarray(column)

@@ -1,0 +1,1 @@
+"""An output folder as the report reads it."""

@@ -1,0 +1,1 @@
+"""Delay and order of the patterns: sweep and select."""

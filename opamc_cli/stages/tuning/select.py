@@ -1,0 +1,207 @@
+"""Stage `select`: order and scale factor γ from the baseline alone."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.decision.divergence.selection import self_consistency
+from opamc_cli.errors import NotEnoughDataError, OpamcError
+from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
+from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
+from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
+from opamc_cli.storage.sources import RunSource, read_sources
+from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
+
+FILE_NAME = "selection.parquet"
+
+SELECTION = pa.schema(
+    [
+        ("axis", pa.int16()),
+        ("order", pa.int8()),
+        ("gamma", pa.float64()),
+        ("self_consistency", pa.float64()),
+        ("patterns_per_cell", pa.float64()),
+    ]
+)
+
+
+@dataclass(frozen=True)
+class SelectionOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The table that was written.
+    table
+        Self-consistency by axis, order and γ, and how many patterns of the shortest motion fall
+        on each of the α! possible ones.
+    order, gamma
+        The setting whose self-consistency, averaged over axes, is largest.
+    warnings
+        One for each order with fewer patterns than possible ones.
+    errors
+        One for each axis of a run that could not be read.
+    """
+
+    path: Path
+    table: pa.Table
+    order: int
+    gamma: float
+    warnings: tuple[str, ...]
+    errors: tuple[OpamcError, ...]
+
+
+@dataclass(frozen=True)
+class _Job:
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+    orders: tuple[int, ...]
+    gammas: tuple[float, ...]
+    config: PatternsConfig
+
+
+Counts = npt.NDArray[np.int64]
+
+
+def run(
+    motions: Path,
+    config: Config,
+    out: Path,
+    *,
+    orders: Sequence[int] = (3, 4, 5, 6),
+    gammas: Sequence[float] = (0.5, 1.0, 2.0, 4.0),
+    moved_to: Sequence[Path] = (),
+    jobs: int = 1,
+    watch: Watch = unwatched,
+) -> SelectionOutcome:
+    """Rate orders and scale factors by how well healthy segments know their own motion.
+
+    Parameters
+    ----------
+    motions
+        Table of stage `identify`, of the baseline.
+    config
+        `patterns.envelope` and `patterns.remove_offset` are used.
+    out
+        Folder of the table.
+    orders, gammas
+        What to rate.
+    moved_to
+        Folders of the runs, if they were moved.
+    jobs
+        Worker processes.
+    watch
+        Called as the work gets done.
+
+    Raises
+    ------
+    NotEnoughDataError
+        If no axis has two motions and two cycles.
+    """
+    table = read_table(motions, "identify", MOTIONS)
+    work = [
+        _Job(part.source, part.axis, part.rows, tuple(orders), tuple(gammas), config.patterns)
+        for part in identified_parts(table, read_sources(motions, moved_to))
+    ]
+    outcome = map_items(_count, work, jobs, watch)
+    rated = _rate([part for parts in outcome.results for part in parts])
+    known = [row for row in rated if row["self_consistency"] is not None]
+    if not known:
+        msg = (
+            f"{motions}: no axis has two motions in two cycles, which is what orders and γ are "
+            "rated by; record more cycles, or keep the defaults"
+        )
+        raise NotEnoughDataError(msg)
+    table = pa.Table.from_pylist(rated, schema=SELECTION)
+    write_table(
+        out / FILE_NAME,
+        table,
+        stage="select",
+        config=config.canonical("patterns"),
+        inputs=[table_input(motions)],
+    )
+    order, gamma = _best(known)
+    few = {
+        each: fewest
+        for each in sorted(set(orders))
+        if (fewest := min(r["patterns_per_cell"] for r in rated if r["order"] == each)) < 1
+    }
+    warnings = tuple(
+        f"order {each}: {fewest:.2g} patterns for each possible one in the shortest motion; its "
+        "divergence is mostly chance"
+        for each, fewest in few.items()
+    )
+    return SelectionOutcome(out / FILE_NAME, table, order, gamma, warnings, outcome.errors)
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """Counts of one axis of one run at one order and γ."""
+
+    axis: int
+    order: int
+    gamma: float
+    motions: tuple[int, ...]
+    cycles: tuple[str, ...]
+    counts: Counts
+
+
+def _count(job: _Job) -> list[_Counted]:
+    found: dict[tuple[int, float], list[Counts]] = {}
+    with job.source.open() as run:
+        offset = 0j
+        spans = [aligned_span(row) for row in job.rows]
+        if job.config.remove_offset:
+            offset = current_offset(run, job.axis, spans, job.config.envelope)
+        for row, span in zip(job.rows, spans, strict=True):
+            envelope = read_envelope(run, job.axis, *span, job.config.envelope, offset)
+            for order in job.orders:
+                for gamma in job.gammas:
+                    tau = time_delay(run.sampling_rate_hz, row["reference_f_max_hz"], order, gamma)
+                    counts = ordinal_counts(envelope, [order], tau)[order]
+                    found.setdefault((order, gamma), []).append(counts)
+    names = tuple(f"{row['run']}\n{row['cycle']}" for row in job.rows)
+    motions = tuple(int(row["motion"]) for row in job.rows)
+    return [
+        _Counted(job.axis, order, gamma, motions, names, np.array(counts))
+        for (order, gamma), counts in found.items()
+    ]
+
+
+def _rate(parts: Sequence[_Counted]) -> list[dict[str, Any]]:
+    groups: dict[tuple[int, int, float], list[_Counted]] = {}
+    for part in parts:
+        groups.setdefault((part.axis, part.order, part.gamma), []).append(part)
+    rows = []
+    for (axis, order, gamma), own in sorted(groups.items()):
+        counts = np.concatenate([part.counts for part in own])
+        motions = np.concatenate([part.motions for part in own])
+        cycles = np.concatenate([part.cycles for part in own])
+        value = self_consistency(counts, motions, cycles)
+        rows.append(
+            {
+                "axis": axis,
+                "order": order,
+                "gamma": gamma,
+                "self_consistency": value if np.isfinite(value) else None,
+                "patterns_per_cell": float(counts.sum(axis=1).min() / counts.shape[1]),
+            }
+        )
+    return rows
+
+
+def _best(rows: Sequence[dict[str, Any]]) -> tuple[int, float]:
+    values: dict[tuple[int, float], list[float]] = {}
+    for row in rows:
+        values.setdefault((row["order"], row["gamma"]), []).append(row["self_consistency"])
+    return max(sorted(values), key=lambda key: float(np.mean(values[key])))

@@ -1,0 +1,271 @@
+"""Stage `sweep`: divergences over a range of delays and orders (thesis 5.2.1)."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.decision.divergence.features import ks_statistic
+from opamc_cli.decision.divergence.jensen_shannon import (
+    divergences_from_pool,
+    leave_cycle_out_divergences,
+)
+from opamc_cli.errors import OpamcError
+from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
+from opamc_cli.stages.chain.compared.sessions import Sessions, lie_in_folders, sessions_of
+from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
+from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
+from opamc_cli.stages.recordings.envelope import EnvelopeKind, current_offset, read_envelope
+from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
+from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
+
+FILE_NAME = "sweep.parquet"
+
+SWEEP = pa.schema(
+    [
+        ("role", pa.string()),
+        ("run", pa.string()),
+        ("axis", pa.int16()),
+        ("cycle", pa.int32()),
+        ("motion", pa.int32()),
+        ("order", pa.int8()),
+        ("tau", pa.int32()),
+        ("n_patterns", pa.int64()),
+        ("jsd", pa.float64()),
+        ("tau_opt", pa.int32()),
+    ]
+)
+
+Counts = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SweepOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    path
+        The table that was written.
+    table
+        Its rows: one per segment, order and delay.
+    errors
+        One for each axis of a run that could not be read.
+    """
+
+    path: Path
+    table: pa.Table
+    errors: tuple[OpamcError, ...]
+
+    def best(self) -> list[dict[str, Any]]:
+        """Return, by axis and order, the delay that separates target from baseline most.
+
+        The separation is the difference of the mean divergences; the Kolmogorov-Smirnov
+        statistic stands beside it.
+        """
+        rows = self.table.to_pydict()
+        axis, order, tau = (np.asarray(rows[name]) for name in ("axis", "order", "tau"))
+        # unknown divergences are null in the table
+        jsd, target = np.asarray(rows["jsd"], dtype=float), np.asarray(rows["role"]) == "target"
+        tau_opt = np.asarray(rows["tau_opt"])
+        found = []
+        for a, o in sorted(set(zip(axis.tolist(), order.tolist(), strict=True))):
+            here = (axis == a) & (order == o)
+            separation = {}
+            for t in np.unique(tau[here]).tolist():
+                base = jsd[here & (tau == t) & ~target]
+                other = jsd[here & (tau == t) & target]
+                base, other = base[np.isfinite(base)], other[np.isfinite(other)]
+                if base.size and other.size:
+                    gap = float(other.mean() - base.mean())
+                    separation[t] = (gap, float(base.mean()), float(other.mean()), base, other)
+            if not separation:
+                continue
+            best = max(separation, key=lambda t: separation[t][0])
+            _, base_mean, target_mean, base, other = separation[best]
+            found.append(
+                {
+                    "axis": a,
+                    "order": o,
+                    "tau": best,
+                    "tau_opt": sorted(set(tau_opt[here].tolist())),
+                    "jsd_baseline": base_mean,
+                    "jsd_target": target_mean,
+                    "ks": ks_statistic(base, other),
+                }
+            )
+        return found
+
+
+@dataclass(frozen=True)
+class _Job:
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+    taus: tuple[int, ...]
+    orders: tuple[int, ...]
+    envelope: EnvelopeKind
+    remove_offset: bool
+
+
+@dataclass(frozen=True)
+class _Counted:
+    """Counts of every segment of one axis of one run, by (order, tau)."""
+
+    rows: tuple[dict[str, Any], ...]
+    counts: dict[tuple[int, int], list[Counts]]
+
+
+def run(
+    baseline: Path,
+    config: Config,
+    out: Path,
+    *,
+    taus: Sequence[int],
+    orders: Sequence[int],
+    target: Path | None = None,
+    jobs: int = 1,
+    watch: Watch = unwatched,
+) -> SweepOutcome:
+    """Compute the divergence of every segment for every delay and order.
+
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `identify`; without a target only the baseline's own divergences.
+    config
+        `patterns.envelope`, `patterns.remove_offset`, `patterns.gamma`, `score.base` and
+        `score.day_starts_at` are used.
+    out
+        Folder of the sweep table.
+    taus, orders
+        What is swept: samples >= 1, orders 3..7.
+    jobs
+        Worker processes.
+    watch
+        Called as the work gets done.
+
+    Raises
+    ------
+    InputError
+        If a table or run cannot be used.
+    """
+    tables = {"baseline": baseline} | ({"target": target} if target else {})
+    sources = {role: read_sources(path) for role, path in tables.items()}
+    check_comparable(sources["baseline"], sources.get("target", ()))
+    counted: dict[str, list[_Counted]] = {}
+    errors: list[OpamcError] = []
+    for role, path in tables.items():
+        outcome = map_items(_count, _work(path, sources[role], config, taus, orders), jobs, watch)
+        counted[role] = list(outcome.results)
+        errors += outcome.errors
+    own = sources["baseline"]
+    sessions = sessions_of(own, config.score.day_starts_at, lie_in_folders(own))
+    table = pa.Table.from_pylist(_rows(counted, sessions, config), schema=SWEEP)
+    path = out / FILE_NAME
+    write_table(
+        path,
+        table,
+        stage="sweep",
+        config={
+            "patterns": {"envelope": config.patterns.envelope, "gamma": config.patterns.gamma},
+            "score": {
+                "base": config.score.base,
+                "day_starts_at": config.score.day_starts_at,
+            },
+            "sweep": {"tau": list(taus), "order": list(orders)},
+        },
+        inputs=[table_input(path) for path in tables.values()],
+    )
+    return SweepOutcome(path, table, tuple(errors))
+
+
+def _work(
+    path: Path,
+    sources: Sequence[RunSource],
+    config: Config,
+    taus: Sequence[int],
+    orders: Sequence[int],
+) -> list[_Job]:
+    return [
+        _Job(
+            part.source,
+            part.axis,
+            part.rows,
+            tuple(taus),
+            tuple(orders),
+            config.patterns.envelope,
+            config.patterns.remove_offset,
+        )
+        for part in identified_parts(read_table(path, "identify", MOTIONS), sources)
+    ]
+
+
+def _count(job: _Job) -> _Counted:
+    counts: dict[tuple[int, int], list[Counts]] = {
+        (order, tau): [] for order in job.orders for tau in job.taus
+    }
+    with job.source.open() as run:
+        offset = 0j
+        if job.remove_offset:
+            spans = [aligned_span(row) for row in job.rows]
+            offset = current_offset(run, job.axis, spans, job.envelope)
+        for row in job.rows:
+            envelope = read_envelope(run, job.axis, *aligned_span(row), job.envelope, offset)
+            for tau in job.taus:
+                for order, values in ordinal_counts(envelope, job.orders, tau).items():
+                    counts[order, tau].append(values)
+    return _Counted(job.rows, counts)
+
+
+def _rows(
+    counted: dict[str, list[_Counted]], sessions: Sessions, config: Config
+) -> list[dict[str, Any]]:
+    """Turn counts into divergences, motion by motion, as `score` does."""
+    found = []
+    base = config.score.base
+    keys = [key for part in counted["baseline"][:1] for key in part.counts]
+    for order, tau in keys:
+        groups: dict[tuple[int, int], dict[str, list[tuple[dict[str, Any], Counts]]]] = {}
+        for role, parts in counted.items():
+            for part in parts:
+                for row, values in zip(part.rows, part.counts[order, tau], strict=True):
+                    group = groups.setdefault((row["axis"], row["motion"]), {})
+                    group.setdefault(role, []).append((row, values))
+        for (axis, motion), group in sorted(groups.items()):
+            if "baseline" not in group:
+                continue
+            pool = np.stack([values for _, values in group["baseline"]])
+            own = [row for row, _ in group["baseline"]]
+            labels = [sessions.of_run[row["run"]] for row in own]
+            if len(set(labels)) == 1:
+                labels = [f"{row['run']}/{row['cycle']}" for row in own]
+            jsd = {"baseline": leave_cycle_out_divergences(pool, np.asarray(labels), base)}
+            if "target" in group:
+                target = np.stack([values for _, values in group["target"]])
+                jsd["target"] = divergences_from_pool(target, pool, base)
+            for role, values_of_role in jsd.items():
+                for (row, counts), value in zip(group[role], values_of_role, strict=True):
+                    f_max_hz = row["reference_f_max_hz"]
+                    fs_hz = row["sampling_rate_hz"]
+                    found.append(
+                        {
+                            "role": role,
+                            "run": row["run"],
+                            "axis": axis,
+                            "cycle": row["cycle"],
+                            "motion": motion,
+                            "order": order,
+                            "tau": tau,
+                            "n_patterns": int(counts.sum()),
+                            "jsd": float(value) if math.isfinite(value) else None,
+                            "tau_opt": time_delay(fs_hz, f_max_hz, order, config.patterns.gamma),
+                        }
+                    )
+    return found

@@ -1,0 +1,1 @@
+"""From scores to verdict.json: agreement, evidence, cause, reasons."""

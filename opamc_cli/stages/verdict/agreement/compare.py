@@ -1,0 +1,86 @@
+"""The questions of this package in the order of a diagnosis."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from opamc_cli.config.models import IdentifyConfig
+from opamc_cli.stages.chain.segment import SegmentOutcome
+from opamc_cli.stages.verdict.agreement.exchanged import exchanged
+from opamc_cli.stages.verdict.agreement.findings import Finding, Reference, findings, reference_of
+from opamc_cli.stages.verdict.agreement.measured import Measured, measure
+from opamc_cli.stages.verdict.agreement.unjudged import (
+    Side,
+    Unjudged,
+    refuse_all,
+    sentence,
+    unjudged,
+)
+from opamc_cli.storage.sources import read_sources
+from opamc_cli.storage.tables import MOTIONS, read_table
+
+
+@dataclass
+class Agreement:
+    """What is known so far of both sides: first the baseline's runs, then the target's.
+
+    Attributes
+    ----------
+    config
+        When segments are a cycle.
+    measured, found
+        By role.
+    """
+
+    config: IdentifyConfig
+    measured: dict[str, Sequence[Measured]] = field(default_factory=dict)
+    found: dict[str, Sequence[Finding]] = field(default_factory=dict)
+    _reference: Reference | None = None
+
+    def check(
+        self, role: str, segmented: SegmentOutcome, motions: Path | None = None
+    ) -> set[tuple[str, int]]:
+        """Return run and axis of the segments that cannot be compared with the baseline.
+
+        Parameters
+        ----------
+        role
+            "baseline", then "target".
+        segmented
+            Segments of its runs.
+        motions
+            Motion table with the reference cycles, once there is one.
+
+        Raises
+        ------
+        NotEnoughDataError
+            If nothing is left.
+        """
+        own = measure(read_sources(segmented.path), segmented.table)
+        if self._reference is None:
+            self._reference = reference_of(own)
+        self.measured[role] = own
+        found = findings(own, self._reference)
+        if motions is not None:
+            table = read_table(motions, "identify", MOTIONS)
+            cycles = table.filter(table["reference"])
+            found += exchanged(own, segmented.table, cycles, self.config)
+        self.found[role] = found
+        moving = {(each.run, each.axis) for each in own if each.moves}
+        if moving <= {(finding.run, finding.axis) for finding in self.found[role]}:
+            refuse_all({f.axis: (sentence(role, f.why),) for f in found})
+        return {(finding.run, finding.axis) for finding in self.found[role]}
+
+    def unjudged(self, baseline: Path, target: Path) -> Unjudged:
+        """Return what is left out, once the motions of both sides are identified.
+
+        Parameters
+        ----------
+        baseline, target
+            Tables of stage `identify`.
+        """
+        sides = [
+            Side(role, self.measured[role], self.found[role], read_table(path, "identify", MOTIONS))
+            for role, path in (("baseline", baseline), ("target", target))
+        ]
+        return unjudged(sides[0], sides[1])

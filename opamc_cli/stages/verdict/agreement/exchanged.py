@@ -1,0 +1,58 @@
+"""Two phases exchanged: the current vector turns the other way, and motions fit the wrong way."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from opamc_cli.config.models import IdentifyConfig
+from opamc_cli.signal.identification import identify
+from opamc_cli.stages.chain.identify import match_rule, segment_features
+from opamc_cli.stages.verdict.agreement.findings import Finding
+from opamc_cli.stages.verdict.agreement.measured import Measured
+
+
+def exchanged(
+    measured: Sequence[Measured], segments: pa.Table, reference: pa.Table, config: IdentifyConfig
+) -> list[Finding]:
+    """Find axes whose cycles are recognised better with the current turned the other way.
+
+    Parameters
+    ----------
+    measured
+        Axes of the runs.
+    segments
+        Rows of their segment table.
+    reference
+        Rows of the baseline's motion table that are its reference cycles.
+    config
+        When segments are a cycle.
+    """
+    rule = match_rule(config)
+    if not rule.use_direction:
+        return []
+    found = []
+    for own in measured:
+        rows = segments.filter(
+            pc.and_(pc.equal(segments["axis"], own.axis), pc.equal(segments["run"], own.run))
+        )
+        known = reference.filter(pc.equal(reference["axis"], own.axis))
+        if not rows.num_rows or not known.num_rows or len(own.signal) != 3:
+            continue
+        rows = rows.filter(pc.invert(rows["edge"]))
+        features, cycle = segment_features(rows), segment_features(known)
+        turned = replace(features, direction=-features.direction)
+        as_is, reversed_ = (
+            int(np.count_nonzero(identify(cycle, each, rule).cycle >= 0))
+            for each in (features, turned)
+        )
+        if reversed_ > as_is:
+            why = (
+                f"of {rows.num_rows} segments of axis {own.axis} {as_is} fit a motion of the "
+                f"baseline, {reversed_} would if the current turned the other way: are two of its "
+                "phases exchanged?"
+            )
+            found.append(Finding(own.run, own.axis, why))
+    return found

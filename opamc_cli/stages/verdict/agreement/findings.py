@@ -1,0 +1,175 @@
+"""Why an axis of a run cannot be compared with the baseline, rule by rule."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from statistics import median_low
+
+import numpy as np
+
+from opamc_cli.stages.verdict.agreement.measured import Measured
+
+LARGEST_RATIO = 20.0
+"""Of the current's size to the baseline's: a healthy joint's load, warmth and wear change it by
+some tens of per cent, a seized gear by a few times; wrong units by 1000 (mA) or 57 (degrees)."""
+
+LARGEST_IMBALANCE = 0.5
+"""Of the phases' sum to the phases: 0 for a motor without neutral, 1.15 with one phase inverted,
+0.82 with one dead; sensors of equal make leave some per cent."""
+
+DEAD_SHARE = 0.1
+"""Of the baseline's current in motion: noise alone is less than that (0.4 % in the samples)."""
+
+CLIPPED_SHARE = 0.01
+"""Of the samples, beyond the baseline's: from here the clipped crests are patterns of their own."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Why one axis of one run is not compared.
+
+    Attributes
+    ----------
+    run, axis
+        Which.
+    why
+        A clause such as "axis3_b keeps one value".
+    at_rest
+        Whether it is no more than that the axis rests, as most do where axes move in turn.
+    """
+
+    run: str
+    axis: int
+    why: str
+    at_rest: bool = False
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the baseline's runs have in common, by axis."""
+
+    signal: Mapping[int, tuple[str, ...]]
+    size: Mapping[tuple[int, str], float]
+    imbalance: Mapping[int, float]
+    clipped: Mapping[int, float]
+
+
+def reference_of(baseline: Sequence[Measured]) -> Reference:
+    """Take the most frequent signal and the middle of sizes, imbalances and clipping."""
+    by_axis: dict[int, list[Measured]] = {}
+    for own in baseline:
+        if own.moves:
+            by_axis.setdefault(own.axis, []).append(own)
+    return Reference(
+        {
+            axis: Counter(own.signal for own in runs).most_common(1)[0][0]
+            for axis, runs in by_axis.items()
+        },
+        {
+            (axis, kind): median_low([own.size[kind] for own in runs if kind in own.size])
+            for axis, runs in by_axis.items()
+            for kind in sorted({kind for own in runs for kind in own.size})
+        },
+        {axis: _middle([own.imbalance for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([_most_clipped(own)[1] for own in runs]) for axis, runs in by_axis.items()},
+    )
+
+
+def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
+    """Return what forbids the comparison of an axis of a run with the baseline.
+
+    The first rule that applies names the reason.
+    """
+    found = []
+    for own in measured:
+        if own.axis in reference.signal:
+            rules = RULES if own.moves else RULES_AT_REST
+            why = next((why for rule in rules if (why := rule(own, reference))), None)
+            if why is not None:
+                found.append(Finding(own.run, own.axis, why))
+            elif not own.moves:
+                found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
+    return found
+
+
+def _other_signal(own: Measured, reference: Reference) -> str | None:
+    wanted = reference.signal[own.axis]
+    if own.signal == wanted:
+        return None
+    return (
+        f"axis {own.axis} is recorded as {', '.join(own.signal)}, the baseline has "
+        f"{', '.join(wanted)}; record the same channels"
+    )
+
+
+def _frozen(own: Measured, _: Reference) -> str | None:
+    if own.frozen is None:
+        return None
+    name, second = own.frozen
+    return f"{name} keeps one value from {second:.4g} s on while another phase swings; check it"
+
+
+def _other_unit(own: Measured, reference: Reference) -> str | None:
+    for kind, size in own.size.items():
+        usual = reference.size.get((own.axis, kind))
+        if usual is None or (usual == 0 and size == 0):
+            continue
+        if not usual / LARGEST_RATIO <= size <= usual * LARGEST_RATIO:
+            times = f"{size / usual:.3g}" if usual > 0 else "infinitely many"
+            unit = {"current": "mA for A", "position": "degrees", "velocity": "degrees or rpm"}
+            return (
+                f"the {kind} of axis {own.axis} is {times} times the baseline's: another unit "
+                f"({unit[kind]})? Check the map of `opamc ingest`, and the sensor"
+            )
+    return None
+
+
+def _unbalanced(own: Measured, reference: Reference) -> str | None:
+    limit = max(LARGEST_IMBALANCE, 2 * reference.imbalance[own.axis])
+    dead = own.size["current"] <= DEAD_SHARE * reference.size[own.axis, "current"]
+    if own.imbalance is None or own.imbalance <= limit or dead:
+        return None
+    return (
+        f"the three phases of axis {own.axis} do not add up to zero ({own.imbalance:.2g} of a "
+        "phase is left): one is inverted, lost, or of another axis; check the sensors' wiring"
+    )
+
+
+def _still(own: Measured, reference: Reference) -> str:
+    usual = reference.size.get((own.axis, "current"), 0.0)
+    text = f"no motion is found in {', '.join(own.signal)}"
+    if own.size["current"] <= DEAD_SHARE * usual:
+        return (
+            f"{text}: the current of axis {own.axis} is {own.size['current'] / usual:.1%} of the "
+            "baseline's; the joint stands without load, or its sensor is dead"
+        )
+    return f"{text}: axis {own.axis} stands still there"
+
+
+def _clipped(own: Measured, reference: Reference) -> str | None:
+    name, share = _most_clipped(own)
+    if share <= reference.clipped[own.axis] + CLIPPED_SHARE:
+        return None
+    return f"{name} is clipped in {share:.1%} of the motion; check the sensor's range"
+
+
+RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
+    _other_signal,
+    _frozen,
+    _other_unit,
+    _unbalanced,
+    _clipped,
+)
+"""In the order in which they are asked."""
+
+RULES_AT_REST = (_other_signal, _frozen, _unbalanced)
+"""Of an axis in which no motion was found, since its current may be why."""
+
+
+def _most_clipped(own: Measured) -> tuple[str, float]:
+    return max(own.clipped.items(), default=("", 0.0), key=lambda entry: entry[1])
+
+
+def _middle(values: Sequence[float | None]) -> float:
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else 0.0

@@ -1,0 +1,155 @@
+"""Which axes cannot be judged, and the true reason: what no verdict may be silent about."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.compute as pc
+
+from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
+from opamc_cli.stages.verdict.agreement.findings import Finding
+from opamc_cli.stages.verdict.agreement.measured import Measured
+
+
+@dataclass(frozen=True)
+class Side:
+    """Baseline or target, as far as the comparison needs it.
+
+    Attributes
+    ----------
+    role
+        "baseline" or "target".
+    measured
+        Every axis of every run.
+    findings
+        What is left out of the comparison.
+    motions
+        Rows of the motion table.
+    """
+
+    role: str
+    measured: Sequence[Measured]
+    findings: Sequence[Finding]
+    motions: pa.Table
+
+    def moving_axes(self) -> set[int]:
+        """Return the axes that move in any run, whether they are compared or not."""
+        return {own.axis for own in self.measured if own.moves}
+
+    def rows(self, axis: int, run: str) -> pa.Table:
+        """Return the motion table's rows of one axis of one run."""
+        mask = pc.and_(pc.equal(self.motions["axis"], axis), pc.equal(self.motions["run"], run))
+        return self.motions.filter(mask)
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """What is left out, and why.
+
+    Attributes
+    ----------
+    axes
+        Sentences for each axis of which nothing is left on one side.
+    errors
+        One for each axis of a run that was left out while others serve.
+    """
+
+    axes: Mapping[int, tuple[str, ...]]
+    errors: tuple[OpamcError, ...]
+
+
+def unjudged(baseline: Side, target: Side) -> Unjudged:
+    """Find the axes that move on either side but cannot be compared."""
+    axes: dict[int, tuple[str, ...]] = {}
+    errors: list[OpamcError] = []
+    for axis in sorted(baseline.moving_axes() | target.moving_axes()):
+        for side in (target, baseline):
+            lost = _lost(axis, side)
+            idle = _idle(axis, side)
+            runs = {own.run for own in side.measured}
+            if runs <= lost.keys() | idle.keys():
+                whys = dict.fromkeys([*lost.values(), *({} if lost else idle).values()])
+                axes[axis] = axes.get(axis, ()) + tuple(sentence(side.role, why) for why in whys)
+                continue
+            paths = {own.run: own.path for own in side.measured}
+            errors += [InputError(f"{paths[run]}: {why}") for run, why in lost.items()]
+    return Unjudged(axes, tuple(errors))
+
+
+def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
+    """Refuse a diagnosis of which no axis is left.
+
+    Raises
+    ------
+    NotEnoughDataError
+        With the reason of the first axis.
+    """
+    axis, whys = next(iter(axes.items()))
+    others = f"; {len(axes) - 1} more axes likewise" if len(axes) > 1 else ""
+    msg = f"no axis can be judged; axis {axis}: {' '.join(whys).rstrip('.')}{others}"
+    raise NotEnoughDataError(msg)
+
+
+def with_reasons(
+    verdict: Mapping[str, Any], left_out: Mapping[int, Sequence[str]]
+) -> dict[str, Any]:
+    """Return a verdict that names every axis that could not be judged, with its true reason."""
+    named: dict[int, dict[str, Any]] = {entry["axis"]: dict(entry) for entry in verdict["axes"]}
+    for axis, why in left_out.items():
+        entry = named.get(axis, {"axis": axis, **_EMPTY})
+        named[axis] = {**entry, **_UNKNOWN, "reasons": list(why)}
+    return {**verdict, "axes": [named[axis] for axis in sorted(named)]}
+
+
+_UNKNOWN: Mapping[str, Any] = {
+    "state": "insufficient-data",
+    "health_index": None,
+    "p_value": None,
+    "p_adjusted": None,
+    "cause": None,
+}
+_EMPTY: Mapping[str, Any] = {
+    "features": {"delta_mu": None, "delta_var": None, "ks": None},
+    "motions": [],
+}
+
+
+def sentence(role: str, why: str) -> str:
+    """Return a clause about one side as a sentence."""
+    return f"The {role}: {why}{'' if why.endswith('?') else '.'}"
+
+
+def _lost(axis: int, side: Side) -> dict[str, str]:
+    """Return, by run, what is wrong with an axis."""
+    own = [f for f in side.findings if f.axis == axis]
+    lost = {finding.run: finding.why for finding in own if not finding.at_rest}
+    for measured in side.measured:
+        if measured.axis != axis or not measured.moves or measured.run in lost:
+            continue
+        rows = side.rows(axis, measured.run)
+        if not rows.num_rows:
+            lost[measured.run] = f"the motions of axis {axis} could not be identified"
+        elif pc.max(rows["cycle"]).as_py() < 0:
+            lost[measured.run] = _unfitting(axis, rows)
+    return lost
+
+
+def _idle(axis: int, side: Side) -> dict[str, str]:
+    """Return, by run, that an axis rests or is not recorded."""
+    idle = {f.run: f.why for f in side.findings if f.axis == axis and f.at_rest}
+    recorded = {measured.run for measured in side.measured if measured.axis == axis}
+    for measured in side.measured:
+        if measured.run not in recorded:
+            idle[measured.run] = f"it has no current of axis {axis}"
+        elif measured.axis == axis and not measured.moves:
+            idle.setdefault(measured.run, f"axis {axis} does not move")
+    return idle
+
+
+def _unfitting(axis: int, rows: pa.Table) -> str:
+    count = f"all {rows.num_rows} segments" if rows.num_rows > 1 else "the only segment"
+    return (
+        f"{count} of axis {axis} fit no motion of the baseline's cycle: another program or speed, "
+        "another joint's channels, or no cycle that repeats"
+    )

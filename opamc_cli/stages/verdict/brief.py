@@ -1,0 +1,119 @@
+"""The verdict on a joint in a few words: what to do first, what speaks for it and what against."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
+from opamc_cli.decision.witnesses.patterns import effect_by_cell
+from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
+
+MOST_EVIDENCE = 2
+FEW_SESSIONS = 4
+"""Fewer say little of how much healthy ones differ."""
+
+COMMON = 1.5
+"""Times as far as usual that the siblings have moved, to be worth a word."""
+
+
+def brief(
+    judgement: Judgement, bundle: Bundle, cause: Mapping[str, Any] | None, unit: str = "A"
+) -> dict[str, Any] | None:
+    """Return what a maintainer needs of an unhealthy joint; None for any other.
+
+    Parameters
+    ----------
+    judgement
+        The decision.
+    bundle
+        What it was made from.
+    cause
+        The cause found for the change, if any.
+    unit
+        Of the current, or of the torque that stands for it.
+
+    Returns
+    -------
+    dict or None
+        `inspect`: what to do first; `evidence`: the strongest pieces, at most two; `against`:
+        what speaks against a fault.
+    """
+    if judgement.state not in ("changed", "fault"):
+        return None
+    return {
+        "inspect": _inspect(cause),
+        "evidence": _evidence(judgement, bundle, unit),
+        "against": _against(judgement, cause),
+    }
+
+
+def _inspect(cause: Mapping[str, Any] | None) -> str:
+    if cause is None:
+        return (
+            "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
+        )
+    meaning = cause.get("interpretation") or cause.get("effect")
+    if cause.get("harmless") or cause.get("origin", "joint") != "joint":
+        return f"Check before the gear: {meaning}."
+    return f"Inspect the joint for {meaning}."
+
+
+def _evidence(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
+    strongest = sorted((p, name) for name, p in judgement.witnesses.items() if math.isfinite(p))
+    said = [_of_witness(name, judgement, bundle, unit) for _, name in strongest]
+    return [text for text in said if text][:MOST_EVIDENCE]
+
+
+def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> str | None:
+    effect, p = judgement.effects.get(name, math.nan), judgement.witnesses[name]
+    by = f"p {p:.2g}" if p >= 1e-4 else "p < 0.0001"
+    if name == PATTERNS:
+        if not effect > 0:
+            return None
+        worst = bundle.cells[int(effect_by_cell(bundle.cells).argmax())]
+        return f"The current's patterns changed by {effect:.0%} in motion {worst.motion} ({by})."
+    witness = bundle.witnesses.get(name)
+    if isinstance(witness, SpectrumEvidence):
+        band = clearest_change(witness.cells, witness.n_baseline)
+        if band is None:
+            return None
+        return (
+            f"Fluctuations near {band.frequency_hz:.3g} Hz are {band.size_ratio:.2g} times as "
+            f"large in motion {band.motion}, {band.start:.0%} to {band.stop:.0%} ({by})."
+        )
+    if isinstance(witness, ProfileEvidence):
+        part = clearest_course(witness.cells, witness.n_baseline)
+        if part is None:
+            return None
+        return (
+            f"The mean {_called(unit)} is {part.change_a:+.2g} {unit} off in motion {part.motion}, "
+            f"{part.start:.0%} to {part.stop:.0%}; its size {part.scale:.2f} times ({by})."
+        )
+    return None
+
+
+def _called(unit: str) -> str:
+    return "torque" if unit == "Nm" else "current"
+
+
+def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
+    n = judgement.n_baseline_sessions
+    if n < FEW_SESSIONS:
+        return (
+            f"Only {n} baseline session{'' if n == 1 else 's'}: how much healthy ones differ is "
+            "hardly known."
+        )
+    if math.exp(judgement.common_log_ratio) >= COMMON:
+        return (
+            f"The other joints moved too, {math.exp(judgement.common_log_ratio):.2g} times as far "
+            "as usual: temperature, supply, payload?"
+        )
+    if cause is not None and float(cause.get("explained", cause.get("share", 1.0))) < 0.5:
+        return "The named cause explains less than half of the change."
+    if cause is not None and cause.get("ties"):
+        return f"The recordings cannot tell it from: {cause['ties'][0]}."
+    return (
+        "Another payload, program, gain or temperature looks alike: repeat under the same "
+        "conditions."
+    )

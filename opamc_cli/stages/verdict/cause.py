@@ -1,0 +1,159 @@
+"""Why a joint has changed: the effect that target runs have and baseline runs lack."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from typing import Any
+
+import pyarrow as pa
+
+from opamc_cli.config.models import JointConfig
+from opamc_cli.errors import OpamcError
+from opamc_cli.joint.change.explain import Cause, Change, explain_change
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
+from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
+from opamc_cli.storage.sources import RunSource
+
+MAX_RUNS = 8
+"""Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
+much better from more."""
+
+LEAST_HZ = 100.0
+"""Slower logs are interpolated: the change of a joint is sought on a grid of this rate."""
+
+OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
+
+WELL_EXPLAINED = 0.8
+"""Below this share the reasons say how much of the change is unexplained."""
+
+
+def explain(
+    axis: int,
+    baseline: Sequence[RunSource],
+    target: Sequence[RunSource],
+    config: JointConfig,
+    first_motion: Mapping[str, int] | None = None,
+) -> dict[str, Any] | None:
+    """Trace the change of one joint to an effect of the library.
+
+    Parameters
+    ----------
+    axis
+        Counted from 1.
+    baseline, target
+        Runs in which the axis moves, in time order.
+    config
+        Gear ratio and pole pairs, and how much is looked at.
+    first_motion
+        Sample at which the axis first moves, by run; where it waits for others, what is looked
+        at is counted from there.
+
+    Returns
+    -------
+    dict or None
+        The `cause` of verdict.json; None where nothing in the library explains the change, or
+        where the runs do not hold what a model of the joint needs.
+    """
+    sides = []
+    seconds = 60.0 * config.explain_minutes
+    for sources in (baseline, target):
+        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, first_motion or {})
+        if not recordings:
+            return None
+        sides.append(recordings)
+    joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
+    return _entry(explain_change(sides[0], sides[1], joint))
+
+
+def first_motions(patterns: pa.Table) -> dict[int, dict[str, int]]:
+    """Return, by axis and run, where the first identified motion of a pattern table starts."""
+    found: dict[int, dict[str, int]] = {}
+    for row in patterns.select(["axis", "run", "start"]).to_pylist():
+        runs = found.setdefault(row["axis"], {})
+        runs[row["run"]] = min(row["start"], runs.get(row["run"], row["start"]))
+    return found
+
+
+def _recordings(
+    axis: int, sources: Sequence[RunSource], seconds: float, first_motion: Mapping[str, int]
+) -> list[Recording]:
+    found = []
+    for source in sources:
+        # minutes are those of a log of this rate: a slower one costs no more for being longer
+        stop = round(seconds / len(sources) * max(source.info.sampling_rate_hz, LEAST_HZ))
+        stop += first_motion.get(source.name, 0)
+        try:
+            with source.open() as run:
+                found.append(interpolated(read_recording(run, axis, stop), LEAST_HZ))
+        except OpamcError:
+            continue  # the run served the chain but not a model, which needs motion beside current
+    return found
+
+
+def _entry(change: Change) -> dict[str, Any] | None:
+    if not change.causes:
+        return None
+    first, *others = change.causes
+    return {
+        "effect": first.effect,
+        "domain": first.domain,
+        "parameters": dict(first.parameters),
+        "interpretation": first.interpretation,
+        "share": first.share,
+        "p_value": first.p_value,
+        "ties": list(first.ties),
+        "harmless": change.benign,
+        "origin": first.origin,
+        "explained": change.explained_share,
+        "clear": first.clear,
+        "evidence": dict(first.evidence),
+        "why": _why(first, change),
+        "others": [{key: asdict(cause)[key] for key in OF_OTHERS} for cause in others],
+    }
+
+
+def _why(cause: Cause, change: Change) -> list[str]:
+    """Say in a maintainer's words what was measured, how sure it is, and what it cannot tell."""
+    before, after = change.units
+    kind = "sessions" if change.sessions else "cycles"
+    sentences = []
+    seen = cause.evidence
+    if "measured_order" in seen:
+        turn = "turn of the motor" if change.angle == "motor" else f"{change.angle} revolution"
+        sentences.append(
+            f"Torque ripple at {seen['measured_order']:.4g} ± {seen['order_error']:.1g} per {turn} "
+            f"has {seen['power_ratio']:.3g} times the power that it has in the baseline's {kind}; "
+            f"two orders must differ by {seen['order_resolution']:.2g} to be told apart within a "
+            "stroke."
+        )
+    if "measured_frequency_hz" in seen:
+        sentences.append(
+            f"A line at {seen['measured_frequency_hz']:.4g} Hz, whatever the speed, has "
+            f"{seen['power_ratio']:.3g} times the power that it has in the baseline's {kind}."
+        )
+    chance = "below 0.0001" if cause.p_value < 1e-4 else f"{cause.p_value:.2g}"
+    sentences.append(
+        f"{_effect_name(cause)} explains {cause.share:.0%} of what the current changed beyond the "
+        f"{kind}' own differences; healthy {kind} show as much with probability {chance} "
+        f"({before} {kind} against {after})."
+    )
+    if cause.ties:
+        sentences.append(f"The recordings cannot tell it from: {'; '.join(cause.ties)}.")
+    for other in change.causes[1:]:
+        name = _effect_name(other).lower()
+        sentences.append(f"Besides, {name} explains {other.share:.0%}: {other.interpretation}.")
+    if change.explained_share < WELL_EXPLAINED:
+        sentences.append(
+            f"{1 - change.explained_share:.0%} of the change has no cause in the library."
+        )
+    if not change.sessions:
+        sentences.append(
+            "With fewer than three baseline recordings it is assumed, not known, how much healthy "
+            "sessions differ."
+        )
+    return sentences
+
+
+def _effect_name(cause: Cause) -> str:
+    name = cause.effect.replace("_", " ")
+    return name[0].upper() + name[1:]

@@ -1,0 +1,93 @@
+"""Stage `decide`: pattern tables and what lies beside them in, verdict.json out; no recordings.
+
+What a diagnosis found out from the recordings themselves, causes and joints that cannot be judged,
+is taken from what it left (`findings`), as long as that is of the same tables.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from opamc_cli.config import Config
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.chain import patterns, score, to_patterns
+from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.verdict import verdict
+from opamc_cli.stages.verdict.agreement.common import far_together
+from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
+from opamc_cli.stages.verdict.findings import read_findings
+from opamc_cli.stages.verdict.header import header
+from opamc_cli.storage.runs import file_sha256
+
+FILES = (verdict.FILE_NAME, *score.FILES)
+
+
+@dataclass(frozen=True)
+class DecideOutcome:
+    """What `run` did.
+
+    Attributes
+    ----------
+    verdict
+        Content of verdict.json.
+    exit_code
+        What it ends with.
+    """
+
+    verdict: dict[str, Any]
+    exit_code: ExitCode
+
+
+def default_tables(folder: Path) -> tuple[Path, Path]:
+    """Return the two pattern tables that a diagnosis leaves in its folder."""
+    baseline, target = (folder / role / patterns.FILE_NAME for role in ("baseline", "target"))
+    return baseline, target
+
+
+def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -> DecideOutcome:
+    """Decide about every joint from tables alone.
+
+    Parameters
+    ----------
+    baseline, target
+        Tables of stage `patterns`; spectra and profiles are taken from beside them.
+    config
+        Section `score` is used.
+    folder
+        Where a diagnosis left its findings, if one did.
+    out
+        Where the new one is written.
+
+    Raises
+    ------
+    InputError
+        If a table cannot be used, or the two cannot be compared.
+    """
+    sides = Sides(read_side(baseline), read_side(target), config.score.day_starts_at)
+    found = read_findings(folder, (baseline, target))
+    scored = score.compare_sides(sides, config, out)
+    decided = verdict.decide(sides, config)
+    notes = list(scored.notes)
+    if any(axis not in found.causes for axis in decided.differing(config.score)):
+        notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
+    sources = (*sides.baseline.sources, *sides.target.sources)
+
+    def complete(judged: dict[str, Any]) -> dict[str, Any]:
+        named = with_reasons(judged, {**far_together(judged), **found.unjudged})
+        head = header(sources, notes, out, score.FILES)
+        return named | head | {"tables": head["tables"] | _beside(folder, (baseline, target))}
+
+    written = verdict.write(decided, scored, config, out, causes=found.causes, complete=complete)
+    return DecideOutcome(written.verdict, written.exit_code)
+
+
+def _beside(folder: Path, tables: tuple[Path, Path]) -> dict[str, str]:
+    """Return the hashes of the tables of both sides that lie below a folder, by their names."""
+    root = folder.resolve()
+    found = {}
+    for table in tables:
+        for name in to_patterns.FILES:
+            path = table.with_name(name)
+            if path.exists() and table.parent.resolve().parent == root:
+                found[f"{table.parent.name}/{name}"] = file_sha256(path)
+    return found

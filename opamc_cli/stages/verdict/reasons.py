@@ -1,0 +1,291 @@
+"""Why a joint is judged as it is, in a maintainer's words."""
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
+from opamc_cli.decision.witnesses.patterns import Cell, effect_by_cell
+from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
+from opamc_cli.stages.chain.compared.sessions import started
+from opamc_cli.storage.sources import RunSource, current_unit
+
+INSPECT = (
+    "Inspect the joint's strain wave gear first: backlash by hand with the motor held, flexspline "
+    "and circular spline teeth, wave generator bearing, grease; then brake, motor connector and "
+    "current sensor."
+)
+FOUND = (
+    "It looks like {}. After that look at the rest of the strain wave gear, brake, motor connector "
+    "and current sensor."
+)
+REPEAT = (
+    "Repeat the recording under the baseline's conditions before taking the joint apart: the "
+    "current shows an effect, not the part that is worn."
+)
+SUSPICION = 0.1
+"""Corrected p-value from which a healthy joint is said to be worth an eye."""
+
+CHECK_FIRST = (
+    "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
+    "stay."
+)
+CANNOT_TELL = (
+    "The current says that the torque's course has changed, not what changed it: another payload, "
+    "program, controller gain or temperature changes it too. Repeat the recording under the "
+    "baseline's conditions before taking the joint apart."
+)
+
+
+def reasons(
+    judgement: Judgement,
+    bundle: Bundle,
+    motions: Sequence[Mapping[str, Any]],
+    sources: Mapping[str, Sequence[RunSource]],
+    cause: Mapping[str, Any] | None = None,
+    limits: ScoreConfig | None = None,
+) -> list[str]:
+    """Sentences that explain one joint's state.
+
+    Parameters
+    ----------
+    judgement
+        The decision.
+    bundle
+        What it was made from.
+    motions
+        Entries `motions` of the verdict.
+    sources
+        Recordings of "baseline" and "target" in which the axis moves.
+    cause
+        The cause found for the change, if any.
+    limits
+        What a change has to exceed; None: the defaults.
+
+    Returns
+    -------
+    list of str
+        What changed and by how much, how sure that is, against what, what to inspect, and what
+        it cannot tell.
+    """
+    cells = bundle.cells
+    if judgement.state == "insufficient-data":
+        return [*_missing(judgement, cells), *_short(cells)]
+    unhealthy = judgement.state != "healthy"
+    unit = current_unit(chain(*sources.values()))
+    sentences = [
+        *_change(judgement, bundle, motions, limits or ScoreConfig(), unit),
+        _certainty(judgement),
+        _rest(judgement, sources),
+        *_siblings(judgement),
+    ]
+    if unhealthy and cause is not None:
+        meaning = cause.get("interpretation") or cause.get("effect")
+        outside = cause.get("harmless") or cause.get("origin", "joint") != "joint"
+        known = [CHECK_FIRST] if outside else [FOUND, REPEAT]
+        sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
+        if outside and judgement.state == "fault":
+            sentences += [INSPECT]  # it does not explain enough
+    elif unhealthy:
+        sentences += [INSPECT, CANNOT_TELL]
+    return [*sentences, *_short(cells)]
+
+
+def _change(
+    judgement: Judgement,
+    bundle: Bundle,
+    motions: Sequence[Mapping[str, Any]],
+    limits: ScoreConfig,
+    unit: str,
+) -> list[str]:
+    cells = bundle.cells
+    distance = (
+        f"the target lies {judgement.distance_ratio:.3g} times as far from the baseline as a "
+        "healthy session does"
+    )
+    if judgement.state == "healthy":
+        if judgement.p_adjusted <= SUSPICION < judgement.p_alone:
+            return [
+                f"Changed no more than the other joints of this robot: {distance}.",
+                _pattern_change(judgement, cells, motions),
+            ]
+        if judgement.p_adjusted > SUSPICION:
+            return [
+                f"No change beyond what healthy sessions show: {distance}.",
+                _pattern_change(judgement, cells, motions),
+            ]
+        first = f"A change {_why_spared(judgement, limits)}: {distance}; keep an eye on it."
+    else:
+        first = f"The course of the torque has changed: {distance}."
+    return [
+        first,
+        _pattern_change(judgement, cells, motions),
+        *_size_change(judgement, bundle),
+        *_course_change(judgement, bundle, unit),
+    ]
+
+
+def _why_spared(judgement: Judgement, limits: ScoreConfig) -> str:
+    """Return why a change that healthy sessions hardly show is not called one."""
+    if judgement.p_adjusted > limits.false_alarm_rate:
+        return "too uncertain to act on"
+    if judgement.p_alone > limits.false_alarm_rate:
+        return "common to all joints, and so none of this one"
+    return "too small to act on"
+
+
+def _pattern_change(
+    judgement: Judgement, cells: Sequence[Cell], motions: Sequence[Mapping[str, Any]]
+) -> str:
+    worst = cells[int(np.nanargmax(effect_by_cell(cells)))]
+    entry = next(
+        row
+        for row in motions
+        if (row["motion"], row["order"], row["tau"]) == (worst.motion, worst.order, worst.tau)
+    )
+    baseline, target = (
+        f"{np.mean(entry[side]):.3g}" if entry[side] else "unknown"
+        for side in ("jsd_baseline", "jsd_target")
+    )
+    return (
+        f"Patterns of the current differ most in motion {worst.motion}, where their probabilities "
+        f"changed by {judgement.effects[PATTERNS]:.0%} (root mean square): mean divergence "
+        f"{target} against {baseline} of the baseline (order {worst.order}, delay {worst.tau} "
+        "samples)."
+    )
+
+
+def _size_change(judgement: Judgement, bundle: Bundle) -> list[str]:
+    witness = bundle.witnesses.get("spectrum")
+    if not isinstance(witness, SpectrumEvidence):
+        return []
+    change = clearest_change(witness.cells, witness.n_baseline)
+    if change is None or not math.isfinite(judgement.effects["spectrum"]):
+        return []
+    how = (
+        f"{change.size_ratio:.2g} times as large as before"
+        if change.size_ratio >= 1
+        else f"down to {change.size_ratio:.0%} of what they were"
+    )
+    return [
+        f"Fluctuations of the current changed in size by {judgement.effects['spectrum']:.0%} (root "
+        f"mean square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"{change.stop:.0%} of its way, near {change.frequency_hz:.3g} Hz, where they are {how}."
+    ]
+
+
+def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
+    witness = bundle.witnesses.get("profile")
+    if not isinstance(witness, ProfileEvidence):
+        return []
+    change = clearest_course(witness.cells, witness.n_baseline)
+    if change is None or not math.isfinite(judgement.effects["profile"]):
+        return []
+    return [
+        f"The course of the current changed by {judgement.effects['profile']:.0%} (root mean "
+        f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"{change.stop:.0%} of its way, by {change.change_a:+.3g} {unit}; its size over the "
+        f"motion is {change.scale:.3g} times the baseline's."
+    ]
+
+
+def _certainty(judgement: Judgement) -> str:
+    own = f"A healthy joint shows this or more with probability {_p(judgement.p_value)}"
+    if judgement.p_adjusted != judgement.p_value:
+        own += f", {_p(judgement.p_adjusted)} after correction for the number of joints"
+    how = {
+        "sessions": "by its rank among all sessions, each held against the others",
+        "relabelled-sessions": "by exchanging whole sessions between baseline and target",
+        "one-session": "by the allowance for a single baseline session",
+        "none": "",
+    }[judgement.method]
+    return f"{own}, {how}."
+
+
+def _rest(judgement: Judgement, sources: Mapping[str, Sequence[RunSource]]) -> str:
+    text = (
+        f"Compared with {_count(judgement.n_baseline_sessions, 'baseline session')} of "
+        f"{_count(judgement.n_baseline_cycles, 'cycle')}{_age(sources)}; target: "
+        f"{_count(judgement.n_target_sessions, 'session')} of "
+        f"{_count(judgement.n_target_cycles, 'cycle')}."
+    )
+    if judgement.n_baseline_sessions == 1:
+        text += (
+            " With one baseline session the variation between sessions is unknown, so the limits "
+            "are widened to that of published healthy joints and of this robot's other joints; "
+            "a few more healthy recordings on other days make the verdict sharper."
+        )
+    elif judgement.n_baseline_sessions < 4:
+        text += " So few sessions say little of how much healthy ones vary; the limits are widened."
+    return text
+
+
+def _siblings(judgement: Judgement) -> list[str]:
+    factor = math.exp(judgement.common_log_ratio)
+    if factor < 1.5:
+        return []
+    text = (
+        f"The other joints' patterns have moved too, {factor:.3g} times as far as usual in the "
+        "middle"
+    )
+    if judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted:
+        return [
+            f"{text}: what moves all joints together (temperature, supply, logger, payload) is "
+            "not taken for a fault of one."
+        ]
+    return [f"{text}; what this joint shows beyond that has p = {_p(judgement.p_alone)}."]
+
+
+def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:
+    if not cells:
+        return [
+            "No motion of this joint occurs in both baseline and target; record both with the "
+            "same program."
+        ]
+    return [
+        f"{_count(judgement.n_baseline_cycles, 'baseline cycle')} and "
+        f"{_count(judgement.n_target_cycles, 'target cycle')} are too few: at least two cycles of "
+        "the baseline and one of the target are needed."
+    ]
+
+
+def _short(cells: Sequence[Cell]) -> list[str]:
+    short: dict[int, list[int]] = {}
+    for cell in cells:
+        if len(cell.cycles) and np.median(cell.cycles.sum(axis=1)) < cell.cycles.shape[1]:
+            short.setdefault(cell.order, []).append(cell.motion)
+    return [
+        f"Order {order} has {math.factorial(order)} patterns, more than motion"
+        f"{'s' if len(motions) > 1 else ''} {', '.join(map(str, motions))} give in a cycle: its "
+        "divergence is mostly chance; longer motions, a higher sampling rate or a lower order help."
+        for order, motions in sorted(short.items())
+    ]
+
+
+def _age(sources: Mapping[str, Sequence[RunSource]]) -> str:
+    times = {
+        role: sorted(t for source in runs if (t := started(source.info.started_at)) is not None)
+        for role, runs in sources.items()
+    }
+    if not times.get("baseline"):
+        return " (of unknown age)"
+    first, last = times["baseline"][0], times["baseline"][-1]
+    span = f"recorded {first:%Y-%m-%d}" + (f" to {last:%Y-%m-%d}" if last != first else "")
+    if times.get("target"):
+        days = (times["target"][0] - last).total_seconds() / 86400
+        side = "before" if days >= 0 else "after"
+        span += f", {_count(round(abs(days)), 'day')} {side} the target"
+    return f" ({span})"
+
+
+def _count(n: int, noun: str) -> str:
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
+def _p(value: float) -> str:
+    return f"{value:.2g}" if value >= 1e-4 else "below 0.0001"

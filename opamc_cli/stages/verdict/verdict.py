@@ -1,0 +1,271 @@
+"""Stage `verdict`: both sides' tables and their scores in, verdict.json out."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+
+from opamc_cli.config import Config
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.decision.judge import Bundle, Judgement, Policy, judge
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
+from opamc_cli.stages.chain.compared.sessions import Sessions, started
+from opamc_cli.stages.chain.compared.side import Side, Sides
+from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
+from opamc_cli.stages.verdict.brief import brief
+from opamc_cli.stages.verdict.evidence import bundles
+from opamc_cli.stages.verdict.reasons import reasons
+from opamc_cli.storage.files.atomic import write_text
+from opamc_cli.storage.sources import current_unit
+
+FILE_NAME = "verdict.json"
+
+MAIN_SHARE = 0.5
+"""Share of the change from which causes decide between changed and fault."""
+
+
+@dataclass(frozen=True)
+class VerdictOutcome:
+    """What `write` did.
+
+    Attributes
+    ----------
+    path
+        The file that was written.
+    verdict
+        Its content.
+    exit_code
+        What it ends with.
+    """
+
+    path: Path
+    verdict: dict[str, Any]
+    exit_code: ExitCode
+
+
+@dataclass(frozen=True)
+class Decided:
+    """The decision about every joint, before its causes are known.
+
+    Attributes
+    ----------
+    sides
+        What was compared.
+    bundles, judgements
+        What is known of each axis, and what was made of it.
+    """
+
+    sides: Sides
+    bundles: Mapping[int, Bundle]
+    judgements: Mapping[int, Judgement]
+
+    def differing(self, config: ScoreConfig) -> list[int]:
+        """Return the axes whose change asks for a cause."""
+        return [
+            axis
+            for axis, judgement in self.judgements.items()
+            if judgement.state in ("changed", "fault") or is_excused(judgement, config)
+        ]
+
+
+def decide(sides: Sides, config: Config) -> Decided:
+    """Decide about every joint.
+
+    Parameters
+    ----------
+    sides
+        Tables of baseline and target.
+    config
+        Section `score` is used.
+    """
+    known = bundles(sides)
+    return Decided(sides, known, judge(known, policy_of(config.score)))
+
+
+def write(
+    decided: Decided,
+    scored: ScoreOutcome,
+    config: Config,
+    out: Path,
+    *,
+    causes: Mapping[int, Mapping[str, Any]] | None = None,
+    complete: Callable[[dict[str, Any]], dict[str, Any]] = lambda verdict: verdict,
+) -> VerdictOutcome:
+    """Write the verdict.
+
+    Parameters
+    ----------
+    decided
+        The decision.
+    scored
+        Divergences and features of the same tables.
+    config
+        The verdict carries the hash of the whole.
+    out
+        Folder of verdict.json.
+    causes
+        Cause of the change by axis, from closing the loop of the joint's model.
+    complete
+        Adds what is known of the diagnosis besides: joints that cannot be judged, notes, tables.
+    """
+    verdict = complete(content(decided, scored, config, causes or {}))
+    path = out / FILE_NAME
+    write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
+    return VerdictOutcome(path, verdict, exit_code(verdict))
+
+
+def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
+    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5."""
+    states = {axis["state"] for axis in verdict["axes"]}
+    if states & {"changed", "fault"}:
+        return ExitCode.UNHEALTHY
+    return ExitCode.DONE if states == {"healthy"} else ExitCode.NOT_ENOUGH_DATA
+
+
+def content(
+    decided: Decided,
+    scored: ScoreOutcome,
+    config: Config,
+    causes: Mapping[int, Mapping[str, Any]],
+) -> dict[str, Any]:
+    """Return the content of verdict.json."""
+    jsd = _divergences(scored.scores)
+    pooled = _pooled_features(scored.features)
+    sides = (decided.sides.baseline, decided.sides.target)
+    unit = current_unit([source for side in sides for source in side.sources])
+    axes = []
+    for axis, judgement in decided.judgements.items():
+        cause = causes.get(axis)
+        final = _with_cause(judgement, cause, config.score)
+        if final.state == "healthy":
+            cause = None
+        bundle = decided.bundles[axis]
+        motions = [
+            {
+                "motion": cell.motion,
+                "order": cell.order,
+                "tau": cell.tau,
+                "jsd_baseline": jsd.get(("baseline", axis, cell.motion, cell.order, cell.tau), []),
+                "jsd_target": jsd.get(("target", axis, cell.motion, cell.order, cell.tau), []),
+            }
+            for cell in bundle.cells
+        ]
+        runs = {
+            role: [source for source in side.sources if source.name in _runs_of(axis, rows)]
+            for role, side, rows in zip(
+                ("baseline", "target"), sides, decided.sides.rows, strict=True
+            )
+        }
+        axes.append(
+            {
+                "axis": axis,
+                "state": final.state,
+                "health_index": _finite(final.health_index),
+                "p_value": _finite(final.p_value),
+                "p_adjusted": _finite(final.p_adjusted),
+                "witnesses": {name: _finite(p) for name, p in final.witnesses.items()},
+                "distance": {
+                    "ratio": _finite(final.distance_ratio),
+                    "common": _finite(math.exp(final.common_log_ratio)),
+                    "effect": _finite(final.effect),
+                },
+                "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
+                "motions": motions,
+                "cause": None if cause is None else dict(cause),
+                "brief": brief(final, bundle, cause, unit),
+                "reasons": reasons(final, bundle, motions, runs, cause, config.score),
+            }
+        )
+    return {
+        "axes": axes,
+        **{
+            role: _summary(side, sessions)
+            for role, side, sessions in zip(
+                ("baseline", "target"), sides, decided.sides.sessions, strict=True
+            )
+        },
+        "base": config.score.base,
+        "config_hash": config.digest(),
+    }
+
+
+def _summary(side: Side, sessions: Sessions) -> dict[str, Any]:
+    """Say which runs a side is of, how many sessions they make, and from when to when."""
+    times = sorted(t for s in side.sources if (t := started(s.info.started_at)) is not None)
+    return {
+        "runs": [source.name for source in side.sources],
+        "sessions": len(sessions),
+        "sessions_by": list(sessions.told_by),
+        "from": times[0].isoformat() if times else None,
+        "to": times[-1].isoformat() if times else None,
+    }
+
+
+def policy_of(config: ScoreConfig) -> Policy:
+    """Return the decision's limits from the configuration."""
+    return Policy(
+        false_alarm_rate=config.false_alarm_rate,
+        minimum_effect=config.minimum_effect,
+        fault_effect=config.fault_effect,
+        permutations=config.permutations,
+        seed=config.seed,
+    )
+
+
+def is_excused(judgement: Judgement, config: ScoreConfig) -> bool:
+    """Tell whether a joint is called healthy although it differs: others may differ as much."""
+    return judgement.state == "healthy" and judgement.p_adjusted <= config.false_alarm_rate
+
+
+def _with_cause(
+    judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
+) -> Judgement:
+    """Call a change of known cause a fault only if that cause harms the joint."""
+    if cause is None:
+        return judgement
+    if is_excused(judgement, config):
+        matters = judgement.effect >= config.minimum_effect
+        return replace(judgement, state="fault") if matters and cause.get("clear") else judgement
+    if judgement.state not in ("changed", "fault"):
+        return judgement
+    if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
+        return judgement
+    if cause.get("harmless"):
+        return replace(judgement, state="changed")
+    # A fault is named first if there is one.
+    at_fault = cause.get("origin", "joint") == "joint"
+    return replace(judgement, state="fault") if at_fault else judgement
+
+
+def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
+    return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.runs}
+
+
+def _divergences(scores: pa.Table) -> dict[tuple[str, int, int, int, int], list[float]]:
+    found: dict[tuple[str, int, int, int, int], list[float]] = {}
+    names = ["role", "axis", "motion", "order", "tau", "jsd"]
+    for row in scores.select(names).to_pylist():
+        if row["jsd"] is not None and math.isfinite(row["jsd"]):
+            key = (row["role"], row["axis"], row["motion"], row["order"], row["tau"])
+            found.setdefault(key, []).append(row["jsd"])
+    return found
+
+
+def _pooled_features(features: pa.Table) -> dict[int, dict[str, float | None]]:
+    """Pick the features over all motions of the highest order, the thesis's better one (5.2)."""
+    pooled = [row for row in features.to_pylist() if row["motion"] == ALL_MOTIONS]
+    best = {row["axis"]: row for row in sorted(pooled, key=lambda row: row["order"])}
+    return {
+        axis: {name: _finite(row[name]) for name in ("delta_mu", "delta_var", "ks")}
+        for axis, row in best.items()
+    }
+
+
+def _finite(value: float | None) -> float | None:
+    return float(value) if value is not None and np.isfinite(value) else None

@@ -1,0 +1,1 @@
+"""Files and folders: whole or not there, one writer, read within bounds."""

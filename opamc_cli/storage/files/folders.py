@@ -1,0 +1,90 @@
+"""Folders of results that are either whole or not there."""
+
+import os
+import shutil
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from opamc_cli.errors import UsageError
+from opamc_cli.storage.files.atomic import ensure_directory
+
+
+def replace_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Put a folder with these files in the place of the one that may be there.
+
+    Between two renames there is none: whoever finds none takes the work for not done.
+
+    Parameters
+    ----------
+    folder
+        Where it is seen.
+    files
+        Content by path below the folder.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be written; what was there is then as it was, or gone.
+    """
+    ensure_directory(folder.parent)
+    staged = folder.parent / f".{folder.name}.part"
+    old = folder.parent / f".{folder.name}.old"
+    try:
+        for left in (staged, old):
+            if left.exists():
+                shutil.rmtree(left)
+        staged.mkdir()
+        for name, content in sorted(files.items()):
+            path = staged / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with path.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        for place in {(staged / name).parent for name in files}:
+            flush_folder(place)
+        if folder.exists():
+            folder.rename(old)
+        staged.rename(folder)
+        flush_folder(folder.parent)
+        shutil.rmtree(old, ignore_errors=True)
+    except OSError as error:
+        with suppress(OSError):
+            shutil.rmtree(staged)
+        msg = (
+            f"{folder}: cannot be written ({error.strerror or error}); check space and permissions"
+        )
+        raise UsageError(msg) from error
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder of results and what a killed process left beside it.
+
+    Raises
+    ------
+    UsageError
+        If it cannot be removed.
+    """
+    try:
+        for place in (
+            folder,
+            folder.parent / f".{folder.name}.part",
+            folder.parent / f".{folder.name}.old",
+        ):
+            if place.exists():
+                shutil.rmtree(place)
+    except OSError as error:
+        msg = f"{folder}: cannot be removed ({error.strerror or error}); check permissions"
+        raise UsageError(msg) from error
+
+
+def flush_folder(folder: Path) -> None:
+    """Have a folder's list of names on the disk before going on."""
+    if not folder.exists():
+        return
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

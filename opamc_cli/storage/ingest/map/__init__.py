@@ -1,0 +1,1 @@
+"""The map file: which channel becomes which column, in which unit."""

@@ -1,0 +1,221 @@
+"""The map file: which channel of a foreign recording becomes which column of a run."""
+
+from collections.abc import Callable, Mapping, Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from opamc_cli.config.files import read_values, validate
+from opamc_cli.config.shipped import shipped_file
+from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
+from opamc_cli.storage.ingest.map.axes import expand, has_placeholder, protect
+from opamc_cli.storage.ingest.map.units import QUANTITY_OF_KIND, conversion
+from opamc_cli.storage.ingest.source import Listed, Name
+
+Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e15, le=1e15, allow_inf_nan=False)]
+MOST_SKIPPED = 1_000_000
+"""Lines before the data: no logger writes a longer heading."""
+Format = Literal["csv", "mat", "hdf5", "tdms", "parquet", "feather", "ros", "mdf"]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class ColumnMap(_Strict):
+    """One channel of the source: run value = source · scale + offset, in `unit`.
+
+    An optional one is left out where the recording has no such channel.
+    """
+
+    source: Name
+    unit: str
+    index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
+    scale: Finite = 1.0
+    offset: Finite = 0.0
+    unwrap: bool = False
+    optional: bool = False
+
+
+class TimeMap(_Strict):
+    """The column of time stamps, and what to do where they are uneven."""
+
+    source: Name
+    unit: str
+    index: Annotated[int, Field(ge=0)] | None = None
+    interpolation: Literal["cubic", "linear"] = "cubic"
+    max_gap_samples: Annotated[float, Field(ge=1.5, le=1000)] = 2.5
+
+
+class RateMap(_Strict):
+    """A sampling rate (Hz, kHz) or period (s, ms, us, ns) that the source itself holds."""
+
+    source: Name
+    unit: str
+
+
+class ValueMap(_Strict):
+    """A value that the source itself holds, in its first row or as an attribute."""
+
+    source: Name
+
+
+class MetadataMap(_Strict):
+    """What a run says of itself."""
+
+    robot: str | ValueMap | None = None
+    program: str | ValueMap | None = None
+    speed_percent: float | ValueMap | None = None
+    payload_kg: float | ValueMap | None = None
+    started_at: datetime | str | ValueMap | None = None
+    session: str | ValueMap | None = None
+
+
+class IngestMap(_Strict):
+    """The map file.
+
+    Attributes
+    ----------
+    format
+        None: by the file's ending.
+    separator
+        One or more characters, "tab" or "whitespace" (runs of blanks and tabs).
+    decimal
+        Decimal mark.
+    header
+        Whether a line with column names stands before the data.
+    encoding
+        Of the text.
+    skip_rows
+        Lines before the header (or before the data, without one).
+    units_rows
+        Lines between header and data.
+    axes
+        For how many axes a line with `{n}` stands; None: for as many as the file has.
+    columns
+        Run column by name, such as ``axis1_a``, or for all axes, ``axis{n}_a``.
+    sampling_rate_hz
+        Samples per second, by declaration. Without `time` the rows are taken as evenly spaced.
+    resample_hz
+        Rate of the run, whatever the clock says; None: the declared rate, or else the measured.
+    time
+        Time stamps.
+    metadata
+        What the run says of itself.
+    """
+
+    format: Format | None = None
+    separator: str = Field(",", min_length=1, max_length=100)
+    decimal: Literal[".", ","] = "."
+    header: bool = True
+    encoding: str = "utf-8"
+    skip_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
+    units_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
+    axes: Annotated[int, Field(ge=1, le=32)] | None = None
+    columns: dict[str, ColumnMap] = Field(min_length=1)
+    sampling_rate_hz: Positive | RateMap | None = None
+    resample_hz: Positive | None = None
+    time: TimeMap | None = None
+    metadata: MetadataMap = MetadataMap()
+
+
+def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
+    """Return a map file or a shipped map by its name, with `key=value` overrides applied.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or a key, column name, unit or combination is not allowed.
+    """
+    from opamc_cli.storage.ingest.map.check import check_map
+
+    file = shipped_file(path, "maps")
+    channels = validate(IngestMap, read_values(file, overrides, protect), str(path))
+    check_map(path, channels)
+    return channels
+
+
+def for_axes(
+    channels: IngestMap, listed: Callable[[], Sequence[Listed]] | None = None
+) -> IngestMap:
+    """Return a map with a line for every axis instead of those with `{n}`.
+
+    Parameters
+    ----------
+    channels
+        The map.
+    listed
+        Returns what the recording offers: it tells the number of axes where the map does not,
+        and which optional channels are there. None: as for one axis that has them all.
+    """
+    several = any(has_placeholder(name) for name in channels.columns)
+    if not several and not any(column.optional for column in channels.columns.values()):
+        return channels
+    offered = {each.name: each.width for each in listed()} if listed is not None else {}
+
+    def exists(entry: Mapping[str, Any]) -> bool:
+        source, index = entry["source"], entry.get("index")
+        if listed is None:
+            return True
+        return source in offered and (index is None or index < (offered[source] or 0))
+
+    entries = {
+        name: column.model_dump(exclude_defaults=True) for name, column in channels.columns.items()
+    }
+    if several:
+        entries = expand(entries, channels.axes or (None if listed is not None else 1), exists)
+    columns = {
+        name: ColumnMap.model_validate(entry)
+        for name, entry in entries.items()
+        if exists(entry) or not entry.get("optional")
+    }
+    return channels.model_copy(update={"columns": columns})
+
+
+def format_of(path: Path, channels: IngestMap) -> str:
+    """Return the format of a file: as the map says, or by the file's ending.
+
+    Raises
+    ------
+    InputError
+        If neither tells.
+    """
+    found = channels.format or format_by_ending(path)
+    if found is None:
+        msg = (
+            f"{path}: its ending does not tell the format; set format in the map; "
+            f"known: {known_endings()}"
+        )
+        raise InputError(msg)
+    return found
+
+
+def quantity_of(column: str) -> str:
+    """Return the quantity of a run's column.
+
+    Examples
+    --------
+    >>> quantity_of("axis2_b")
+    'current'
+    """
+    return QUANTITY_OF_KIND[column.partition("_")[2]]
+
+
+def rate_kind(rate: RateMap) -> str | None:
+    """Return whether a unit is one of a rate or of a time (a period), None if of neither."""
+    for quantity in ("rate", "time"):
+        if conversion(rate.unit, quantity) is not None:
+            return quantity
+    return None
+
+
+def rate_hz(rate: RateMap, value: float) -> float:
+    """Return the sampling rate that a rate or period in the source stands for."""
+    quantity = rate_kind(rate) or "rate"
+    known = conversion(rate.unit, quantity)
+    scaled = value * (known.factor if known else 1.0)
+    return scaled if quantity == "rate" else 1.0 / scaled

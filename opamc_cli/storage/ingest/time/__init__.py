@@ -1,0 +1,1 @@
+"""Dates, time stamps and uniform grids."""

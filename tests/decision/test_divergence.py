@@ -1,0 +1,131 @@
+"""Divergences against scipy, against simulation, and at the edges."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.spatial.distance import jensenshannon
+from scipy.stats import entropy
+
+from opamc_cli.decision.divergence.jensen_shannon import (
+    chance_divergence,
+    chance_inflation,
+    divergence_by_cell,
+    divergences_from_pool,
+    effect_size,
+    excess_divergence,
+    jensen_shannon,
+    kullback_leibler,
+    leave_cycle_out_divergences,
+)
+
+counts = arrays(np.int64, 24, elements=st.integers(0, 50)).filter(lambda c: c.sum() > 0)
+
+
+@settings(max_examples=200, deadline=None)
+@given(counts, counts, st.sampled_from([2.0, math.e, 10.0]))
+def test_jensen_shannon_is_scipys_distance_squared(p, q, base):
+    ours = jensen_shannon(p, q, base)
+    assert ours == pytest.approx(jensenshannon(p, q, base) ** 2, abs=1e-12)
+    assert ours == jensen_shannon(q, p, base)
+    assert 0.0 <= ours <= math.log(2) / math.log(base) + 1e-15
+
+
+@settings(max_examples=200, deadline=None)
+@given(counts, counts)
+def test_kullback_leibler_is_scipys_entropy(p, q):
+    assert kullback_leibler(p, q, 2.0) == pytest.approx(entropy(p, q, base=2), abs=1e-12)
+
+
+def test_equal_rows_give_exactly_zero_and_disjoint_ones_exactly_one():
+    row = np.array([3, 0, 7, 1])
+    assert jensen_shannon(row, 5 * row) == 0.0
+    assert jensen_shannon([1, 2, 0, 0], [0, 0, 4, 4]) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_a_row_without_counts_is_nan_not_zero():
+    with np.errstate(all="raise"):
+        assert np.isnan(jensen_shannon([0, 0], [1, 2]))
+        assert np.isnan(jensen_shannon([1, 2], [0, 0]))
+    assert np.isnan(kullback_leibler([0, 0], [1, 2]))
+    assert np.isnan(kullback_leibler([1, 2], [0, 0]))
+
+
+def test_a_pattern_never_seen_in_q_makes_the_kl_divergence_infinite():
+    assert kullback_leibler([1, 1], [1, 0]) == math.inf
+    assert kullback_leibler([1, 0], [1, 1]) == pytest.approx(1.0)
+
+
+def test_rows_are_worked_out_independently():
+    rng = np.random.default_rng(0)
+    p, q = rng.integers(0, 9, (7, 120)), rng.integers(0, 9, 120)
+    together = jensen_shannon(p, q)
+    assert together.shape == (7,)
+    np.testing.assert_array_equal(together, [jensen_shannon(row, q) for row in p])
+    np.testing.assert_allclose(divergence_by_cell(p, q).sum(axis=1), together)
+    assert (divergence_by_cell(p, q) >= 0).all()
+
+
+def test_tiny_differences_are_not_lost_to_rounding():
+    p = np.array([0.25 + 1e-9, 0.25 - 1e-9, 0.25, 0.25])
+    q = np.full(4, 0.25)
+    # second order: (1/8)·Σ(p-q)²/m, in nats
+    assert jensen_shannon(p, q, math.e) == pytest.approx(2 * 1e-18 / (8 * 0.25), rel=1e-6)
+
+
+def test_the_pool_leaves_out_the_whole_cycle_of_a_segment():
+    rows = np.array([[5, 1, 0], [4, 2, 1], [1, 1, 9], [2, 0, 7]])
+    cycles = np.array([0, 0, 1, 2])
+    expected = [
+        jensen_shannon(rows[0], rows[2] + rows[3]),
+        jensen_shannon(rows[1], rows[2] + rows[3]),
+        jensen_shannon(rows[2], rows[0] + rows[1] + rows[3]),
+        jensen_shannon(rows[3], rows[0] + rows[1] + rows[2]),
+    ]
+    np.testing.assert_allclose(leave_cycle_out_divergences(rows, cycles), expected)
+
+
+def test_a_single_cycle_has_no_pool():
+    assert np.isnan(leave_cycle_out_divergences([[1, 2], [2, 1]], [4, 4])).all()
+
+
+def test_target_segments_meet_the_whole_pool():
+    pool, target = np.array([[5, 1], [3, 3]]), np.array([[1, 8], [2, 2]])
+    np.testing.assert_allclose(divergences_from_pool(target, pool), jensen_shannon(target, [8, 4]))
+
+
+@pytest.mark.parametrize("n", [30, 130, 500, 5000])
+@pytest.mark.parametrize("even", [True, False])
+def test_chance_term_agrees_with_simulation(n, even):
+    rng = np.random.default_rng(1)
+    pmf = np.full(120, 1 / 120) if even else rng.dirichlet(np.full(120, 0.5))
+    drawn = jensen_shannon(rng.multinomial(n, pmf, 400), rng.multinomial(4 * n, pmf, 400))
+    assert chance_divergence(pmf, n, 4 * n) == pytest.approx(drawn.mean(), rel=0.1)
+
+
+def test_excess_is_fair_to_targets_of_another_length():
+    # Patterns that come in runs of eight, as overlapping windows do: eight times fewer are
+    # independent. A target four times shorter than the baseline must not look changed.
+    rng = np.random.default_rng(2)
+    pmf = rng.dirichlet(np.full(24, 3.0))
+    baseline = 8 * rng.multinomial(400, pmf, 400)
+    short = 8 * rng.multinomial(100, pmf, 400)
+    cycles = np.arange(400)
+    jsd = leave_cycle_out_divergences(baseline, cycles)
+    pool = baseline.sum(axis=0)
+    phi = chance_inflation(jsd, pool, 3200, pool.sum() - 3200)
+    assert phi == pytest.approx(8.0, rel=0.1)
+    raw = divergences_from_pool(short, baseline)
+    assert raw.mean() > 3 * jsd.mean()
+    excess = excess_divergence(raw, pool, 800, pool.sum(), phi)
+    assert abs(excess.mean()) < 0.06 * raw.mean()
+
+
+def test_effect_size_is_the_relative_change_of_probabilities():
+    q = np.full(100, 0.01)
+    p = q * (1 + 0.1 * np.where(np.arange(100) % 2, 1, -1))
+    assert effect_size(jensen_shannon(p, q)) == pytest.approx(0.1, rel=0.02)
+    assert effect_size(-0.5) == 0.0

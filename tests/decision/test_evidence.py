@@ -1,0 +1,147 @@
+"""Evidence by patterns and spectra: fair to every session, whatever it is made of."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chisquare, kstest
+
+from opamc_cli.decision.witnesses.evidence import session_distances, weigh_together
+from opamc_cli.decision.witnesses.patterns import PatternEvidence
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, deviation_from_rest, size_effect
+from tests.decision.fleet import Fleet, cells, judge, spectra
+
+SEEDS = range(40)
+
+
+def squared_deviation(cell, units, rest):
+    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest)
+
+
+def turned(plan, seed, place):
+    """The same sessions, another one of them the target."""
+    patterns, powers = {}, {}
+    order = np.r_[np.delete(np.arange(plan.n_baseline + 1), place), place]
+    for axis, own in cells(plan, seed).items():
+        patterns[axis] = []
+        for cell in own:
+            sessions = np.concatenate([cell.baseline, cell.target])[order]
+            patterns[axis].append(replace(cell, baseline=sessions[:-1], target=sessions[-1:]))
+    for axis, own in spectra(plan, seed).items():
+        powers[axis] = [replace(c, sessions=c.sessions[order], cycles=c.cycles[order]) for c in own]
+    return patterns, powers
+
+
+def test_no_session_is_favoured_for_being_the_target():
+    plan = Fleet(n_axes=2, n_baseline=4)
+    for seed in range(3):
+        ranks = []
+        for place in range(5):
+            patterns, powers = turned(plan, seed, place)
+            by_axis = {
+                axis: {
+                    "patterns": session_distances(PatternEvidence(patterns[axis]), 4, 1),
+                    "spectrum": session_distances(SpectrumEvidence(powers[axis], 4), 4, 1),
+                }
+                for axis in patterns
+            }
+            ranks += [[int((d.each > d.each[-1]).sum()) for d in weigh_together(by_axis).values()]]
+        # over all choices of the target each rank occurs once, on every axis
+        np.testing.assert_array_equal(np.sort(ranks, axis=0), np.tile(np.arange(5), (2, 1)).T)
+
+
+def test_ranks_and_p_values_of_healthy_joints_are_uniform():
+    plan = Fleet(n_axes=3, between_sessions=0.3)
+    judged = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in SEEDS]
+    p = np.array([j.p_value for joints in judged for j in joints.values()])
+    assert kstest(p, "uniform").pvalue > 0.01
+    assert chisquare(np.histogram(p, bins=7, range=(0, 1))[0]).pvalue > 0.01
+
+
+@pytest.mark.parametrize(
+    "plan",
+    [
+        Fleet(n_axes=1, n_baseline=3),
+        Fleet(n_axes=12, n_motions=1),
+        Fleet(n_axes=2, n_baseline=4, n_target=3),
+        Fleet(n_axes=3, between_sessions=0.4, influences=1),
+    ],
+    ids=["lone joint", "twelve joints", "three targets", "wild sessions"],
+)
+def test_robots_of_any_make_stay_healthy(plan):
+    judged = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(100, 115)]
+    states = [j.state for joints in judged for j in joints.values()]
+    assert len(states) - states.count("healthy") <= 1
+
+
+def test_a_change_of_size_alone_is_found_by_the_spectrum():
+    plan = Fleet(louder=0.6)
+    found = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(10)]
+    assert sum(j[plan.faulty].state != "healthy" for j in found) >= 7
+    assert np.mean([judge(cells(plan, s))[plan.faulty].state == "healthy" for s in range(10)]) > 0.8
+    assert np.median([j[plan.faulty].effects["spectrum"] for j in found]) == pytest.approx(
+        0.6, rel=0.2
+    )
+
+
+@pytest.mark.parametrize("n_target_cycles", [1, 8])
+def test_targets_of_fewer_or_more_cycles_keep_the_level(n_target_cycles):
+    p = []
+    for seed in SEEDS:
+        patterns = cells(Fleet(n_axes=2, n_cycles=8, between_sessions=0.05), seed)
+        for axis, own in patterns.items():
+            for k, cell in enumerate(own):
+                # eight cycles were drawn; either side counts the first of them
+                sessions = cell.cycles.reshape(6, 8, -1)[:, : 4 if n_target_cycles == 8 else 8]
+                target = cell.target_cycles[:n_target_cycles]
+                patterns[axis][k] = replace(
+                    cell, baseline=sessions.sum(axis=1), target=target.sum(axis=0, keepdims=True)
+                )
+        p += [j.p_value for j in judge(patterns).values()]
+    # A single cycle scatters more than the baseline's sessions do, which p cannot know.
+    assert np.mean(np.array(p) <= 0.01) <= 0.05
+    assert 0.3 < np.median(p) < 0.7
+
+
+@pytest.mark.parametrize("n_target_cycles", [1, 2, 8])
+def test_sessions_of_any_number_of_cycles_are_judged_alike(n_target_cycles):
+    plan = Fleet(n_axes=1, n_motions=1)
+    ratios = []
+    for seed in range(60):
+        cell = spectra(plan, seed, n_target_cycles)[1][0]
+        ratios.append(
+            deviation_from_rest(
+                cell.sessions, cell.cycles, cell.within, np.array([0, 6]), np.array([1, 2, 3, 4, 5])
+            )
+        )
+    own, target = np.mean(ratios, axis=0)
+    assert target == pytest.approx(own, rel=0.12)
+
+
+def test_a_session_without_spectrum_leaves_the_patterns_to_decide():
+    plan = Fleet(severity=1.0)
+    powers = spectra(plan, 0)
+    for own in powers.values():
+        for cell in own:
+            cell.sessions[2] = np.nan
+            cell.cycles[2] = 0
+    judged = judge(cells(plan, 0), spectra_by_axis=powers)
+    alone = judge(cells(plan, 0))
+    assert judged[plan.faulty].state == "fault"
+    assert judged[1].p_value == alone[1].p_value
+
+
+def test_two_sessions_are_judged_by_patterns_alone():
+    plan = Fleet(n_baseline=2, n_axes=3, severity=1.0)
+    judged, alone = judge(cells(plan, 0), spectra_by_axis=spectra(plan, 0)), judge(cells(plan, 0))
+    assert [j.p_value for j in judged.values()] == [j.p_value for j in alone.values()]
+
+
+def test_identical_spectra_are_no_evidence():
+    plan = Fleet(n_axes=1, n_motions=1)
+    cell = spectra(plan, 0)[1][0]
+    cell.sessions[:] = cell.sessions[0]
+    assert size_effect([cell], plan.n_baseline) == 0.0
+    assert deviation_from_rest(
+        cell.sessions, cell.cycles, cell.within, np.array([6]), np.arange(6)
+    )[0] == pytest.approx(0.0, abs=1e-9)

@@ -1,0 +1,62 @@
+"""Spectra on their way from recordings to the verdict."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.config import load_config
+from opamc_cli.decision.witnesses.spectra import clearest_change
+from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.chain.witnesses import spectrum
+from opamc_cli.stages.verdict.evidence import bundles, session_names
+from opamc_cli.storage.tables import read_table
+from tests.stages.chain.test_chain import FAULT, NORMAL
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory):
+    out = tmp_path_factory.mktemp("spectra")
+    normal = run_chain([NORMAL], load_config(), out / "b")
+    fault = run_chain([FAULT], load_config(), out / "t", reference=normal.motions)
+    return normal, fault
+
+
+def test_every_whole_segment_has_one_row_of_its_frames_and_bins(both):
+    for side in both:
+        table = read_table(side.patterns.with_name(spectrum.FILE_NAME), "patterns", spectrum.SCHEMA)
+        rows = table.to_pylist()
+        keys = {(r["run"], r["axis"], r["segment"]) for r in rows}
+        counted = read_table(side.patterns, "patterns").to_pylist()
+        assert keys == {(r["run"], r["axis"], r["segment"]) for r in counted}
+        assert len(keys) == len(rows)
+        for row in rows:
+            assert len(row["log_power"]) == row["frames"] * row["bins"] == 256
+            assert row["bin_hz"] == pytest.approx(
+                2048 / (2 * (row["stop"] - row["start"]) // 17), rel=1e-9
+            )
+
+
+def test_sessions_of_the_cells_are_the_means_of_their_cycles(both):
+    sides = Sides(*(read_side(side.patterns) for side in both))
+    names = session_names(3, *sides.rows)
+    own, cells = bundles(sides)[3].cells, bundles(sides)[3].witnesses["spectrum"].cells
+    assert [c.motion for c in cells] == sorted({c.motion for c in own})
+    assert {c.sessions.shape[0] for c in cells} == {len(own[0].baseline) + len(own[0].target)}
+    rows = [
+        row["log_power"]
+        for row in sides.target.witnesses[spectrum.FILE_NAME].to_pylist()
+        if (row["axis"], row["motion"]) == (3, 2)
+        and sides.sessions[1].of_run[row["run"]] == names[1][0]
+    ]
+    cell = next(c for c in cells if c.motion == 2)
+    np.testing.assert_allclose(cell.sessions[len(names[0])], np.mean(rows, axis=0), rtol=1e-6)
+    assert cell.cycles[len(names[0])] == len(rows)
+
+
+def test_the_fault_shows_at_the_order_of_the_flexspline(both):
+    sides = Sides(*(read_side(side.patterns) for side in both))
+    witness = bundles(sides)[3].witnesses["spectrum"]
+    change = clearest_change(witness.cells, witness.n_baseline)
+    # 2(N+1)/N per motor turn at 314 Hz and 5 pole pairs is 127 Hz, within a bin of 15 Hz
+    assert change.frequency_hz == pytest.approx(127, abs=15)
+    assert change.size_ratio > 2

@@ -1,0 +1,282 @@
+"""`opamc nightly` on short recordings, with the true diagnosis: what is done, said and kept."""
+
+import json
+import os
+import shutil
+import sqlite3
+import time
+from pathlib import Path
+
+import cell_logs
+import nightly_kills
+import pytest
+
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.workers.workers import run_all
+from opamc_cli.storage.history import dump
+
+NIGHTS = [cell_logs.night(i) for i in range(7)]
+COLUMNS = (
+    "robot, program, axis, night, state, health_index, p_value, cause, alarm, temperature_c, "
+    "payload_kg, speed_percent, n_runs, report, config_hash, version"
+)
+
+
+def rows(cell: Path, query: str) -> list[tuple]:
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        return db.execute(query).fetchall()
+
+
+def states(robots: dict) -> dict[str, str]:
+    return {name: entry["state"] for name, entry in robots.items()}
+
+
+def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
+    ended = opamc("nightly", cell, "--json")
+    assert ended.code == ExitCode.UNHEALTHY, ended
+    robots = json.loads(ended.out)["robots"]
+    assert states(robots) == {"r1": "healthy", "r2": "alarm", "r3": "healthy"}
+    assert robots["r1"]["done"] == NIGHTS[:5]
+    (alarm,) = robots["r2"]["alarms"]
+    assert alarm["axis"] == 2
+    assert alarm["since"] == NIGHTS[3]
+
+    # the history, as the design fixes it
+    assert rows(cell, f"SELECT count(*) FROM (SELECT {COLUMNS} FROM verdict)") == [(12,)]
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        described = db.execute("PRAGMA table_info(verdict)").fetchall()
+        assert ", ".join(column[1] for column in described) == COLUMNS
+        key = sorted((column[5], column[1]) for column in described if column[5])
+        assert [name for _, name in key] == ["robot", "program", "axis", "night"]
+        event = db.execute("PRAGMA table_info(event)").fetchall()
+        assert [column[1] for column in event] == ["time", "robot", "axis", "kind", "text"]
+    found = rows(cell, "SELECT axis, night, alarm FROM verdict WHERE robot = 'r2' ORDER BY 1, 2")
+    assert found == [(1, NIGHTS[3], 0), (1, NIGHTS[4], 0), (2, NIGHTS[3], 1), (2, NIGHTS[4], 1)]
+    ((temperature, report),) = rows(
+        cell, "SELECT temperature_c, report FROM verdict WHERE robot = 'r1' LIMIT 1"
+    )
+    assert 10 < temperature < 60
+    assert (cell.parent / "nightly" / report).is_file()
+
+    # a night is what a diagnosis of the same runs is
+    folder = cell.parent / "by-hand"
+    for role, nights in (("baseline", NIGHTS[:3]), ("target", NIGHTS[4:5])):
+        for night in nights:
+            (folder / role / night).mkdir(parents=True)
+            source = cell.parent / "logs" / "r2" / night / "cycle.parquet"
+            (folder / role / night / "cycle.parquet").symlink_to(source)
+    opamc(
+        *("diagnose", "--baseline", folder / "baseline", "--target", folder / "target"),
+        *("--set", "joint.explain=false", "--out", folder / "out", "--quiet"),
+    )
+    by_hand = json.loads((folder / "out" / "verdict.json").read_text())
+    of_night = cell.parent / "nightly" / "r2" / NIGHTS[4]
+    assert json.loads((of_night / "verdict.json").read_text())["axes"] == by_hand["axes"]
+    assert str(cell.parent) not in (of_night / "report.html").read_text()
+
+    # said once, kept in the exit code
+    again = opamc("nightly", cell, "--quiet")
+    assert (again.code, again.out) == (ExitCode.UNHEALTHY, "")
+    skipped = json.loads(opamc("nightly", cell, "--json").out)["robots"]["r1"]["skipped"]
+    assert skipped == NIGHTS[:5]
+
+    # silenced by who knows it
+    refused = opamc("nightly", "acknowledge", "r1", "--axis", 2, "--why", "x", "--cell", cell)
+    assert refused.code == ExitCode.USAGE
+    assert "no alarm stands on axis 2 of r1" in refused.err
+    opamc("nightly", "acknowledge", "r2", "--axis", 2, "--why", "gear ordered", "--cell", cell)
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    said = opamc("history", "--cell", cell, "--events", "--json")
+    kinds = {row["kind"]: row["text"] for row in json.loads(said.out)["event"]}
+    assert "gear ordered" in kinds["acknowledged"]
+
+    # a new gear, a new baseline: two nights are not enough for it yet
+    opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[3], "--why", "new gear", "--cell", cell)
+    after = opamc("nightly", cell, "--json")
+    assert after.code == ExitCode.DONE
+    assert states(json.loads(after.out)["robots"])["r2"] == "baseline"
+    assert rows(cell, "SELECT count(*) FROM verdict WHERE robot = 'r2'") == [(0,)]
+    assert not of_night.exists()
+
+    # exports
+    for ending in ("csv", "parquet", "json"):
+        file = cell.parent / f"export.{ending}"
+        assert opamc("history", "--cell", cell, "--out", file).code == 0
+        assert file.stat().st_size
+    assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
+
+
+def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc):
+    cell.write_text(cell.read_text() + "robots: {r1: {}, r3: {axes: [1]}, r4: {}}\n")
+    logs = cell.parent / "logs"
+    last = logs / "r1" / NIGHTS[4]
+    shutil.move(last, cell.parent / "later")
+    planned = opamc("nightly", cell, "--dry-run", "--json")
+    assert len(json.loads(planned.out)["nights"]) == 9
+    assert not (cell.parent / "nightly" / "r3").exists()
+    first = opamc("nightly", cell, "--quiet", "--jobs", 2)
+    assert first.code == ExitCode.PARTIAL
+    assert f"r1 no file of {NIGHTS[4]}; others have some" in first.out
+    assert "r4 no file at all" in first.out
+    assert opamc("nightly", cell, "--quiet").out == ""
+    assert rows(cell, "SELECT DISTINCT axis FROM verdict WHERE robot = 'r3'") == [(1,)]
+
+    cell.write_text(cell.read_text().replace(", r4: {}", ""))
+    shutil.move(cell.parent / "later", last)
+    (logs / "r3" / NIGHTS[5]).mkdir()
+    (logs / "r3" / NIGHTS[5] / "cycle.parquet").write_bytes(b"PAR1 half a file")
+    second = opamc("nightly", cell, "--json")
+    robots = json.loads(second.out)["robots"]
+    assert second.code == ExitCode.PARTIAL
+    assert robots["r1"]["done"] == [NIGHTS[4]]
+    ((failed,),) = [robots["r3"]["failed"]]
+    assert failed["night"] == NIGHTS[5]
+    assert "cannot be opened as Parquet" in failed["why"]
+    # said once; it stays the robot's state until there is something better
+    third = opamc("nightly", cell, "--quiet")
+    assert (third.code, third.out) == (ExitCode.PARTIAL, "")
+
+    # the same content with another time is not new; another file in the baseline is
+    touched = logs / "r1" / NIGHTS[4] / "cycle.parquet"
+    os.utime(touched, (time.time(), time.time()))
+    assert json.loads(opamc("nightly", cell, "--dry-run", "--json").out)["nights"] == []
+    kept = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()}
+    cell_logs.record(logs / "r1" / NIGHTS[1] / "second.parquet", 900, 1)
+    planned = json.loads(opamc("nightly", cell, "--dry-run", "--json").out)["nights"]
+    assert {entry["why"] for entry in planned} == {
+        "the baseline has changed",
+        "1 new or changed file",
+    }
+    opamc("nightly", cell, "--quiet")
+    new = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()} - kept
+    assert len(new) == 2 * 3  # two axes of the one file, three stages
+
+    # what was judged stays judged when logs are cleared away
+    shutil.rmtree(logs / "r1" / NIGHTS[3])
+    assert json.loads(opamc("nightly", cell, "--dry-run", "--json").out)["nights"] == []
+
+
+def test_a_night_that_is_not_judged_is_said_when_quiet(cell, opamc):
+    logs = cell.parent / "logs"
+    shutil.rmtree(logs / "r2")
+    shutil.rmtree(logs / "r3")
+    for index in (3, 4):
+        shutil.rmtree(logs / "r1" / NIGHTS[index])
+    cell_logs.record(logs / "r1" / NIGHTS[3] / "cycle.parquet", 500, 3, program="another")
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.DONE  # the first night of another program's baseline
+    assert ended.out == f"the cell: no recording of any robot since {NIGHTS[3]}\n"
+    cell.write_text(cell.read_text().replace("nights: 3", f"from: {NIGHTS[0]}, to: {NIGHTS[2]}"))
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert "the baseline has no recording of program 'another'" in ended.out
+
+
+def test_other_conditions_have_a_baseline_of_their_own(cell, opamc):
+    logs = cell.parent / "logs"
+    shutil.rmtree(logs / "r2")
+    shutil.rmtree(logs / "r3")
+    for index in (3, 4):
+        cell_logs.record(logs / "r1" / NIGHTS[index] / "cycle.parquet", 500, index, payload_kg=2.0)
+    entry = json.loads(opamc("nightly", cell, "--json").out)["robots"]["r1"]
+    assert (entry["state"], entry["done"]) == ("baseline", NIGHTS[:5])
+
+
+@pytest.mark.parametrize(
+    ("text", "part"),
+    [
+        ("runs: logs/*.parquet", "needs {robot}"),
+        ("runs: logs/{robot}/{day}/*.parquet", "{day}; known are"),
+        ("runs: '{robot}/*.parquet'\nrobot: auto", "did you mean 'robots'"),
+        ("runs: '{robot}/*.parquet'\nbaseline: {nights: 3, runs: 'x/{robot}'}", "give either"),
+        (
+            "runs: '{robot}/*.parquet'\nbaseline: {from: 2026-03-02, to: 2026-03-01}",
+            "from not after",
+        ),
+        ("runs: '{robot}/*.parquet'\nalarm: {nights: 4, of: 3}", "could never be reached"),
+        ("runs: '{robot}/*.parquet'\nset: {patterns.gama: 1}", "did you mean 'gamma'"),
+        ("runs: '{robot}/*.parquet'\nrobots: {../x: {}}", "robots"),
+        ("runs: '{robot}/*.parquet'", "no file fits"),
+        ("- 1", "a mapping of keys is needed"),
+    ],
+)
+def test_a_cell_that_cannot_be_looked_after_is_one_sentence(tmp_path, opamc, text, part):
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(text)
+    ended = opamc("nightly", cell)
+    assert ended.code in (ExitCode.USAGE, ExitCode.BAD_INPUT)
+    assert ended.err.startswith("opamc: ")
+    assert ended.err.count("\n") == 1
+    assert part in ended.err
+
+
+def test_dates_and_names_are_checked(cell, opamc):
+    assert "is no date" in opamc("nightly", cell, "--night", "yesterday").err
+    assert "is none of the cell's robots" in opamc("nightly", cell, "--robot", "r9").err
+    assert "nothing of that kind" in opamc("history", "--cell", cell).out
+    shutil.rmtree(cell.parent / "nightly")
+    assert "no history here yet" in opamc("history", "--cell", cell).err
+
+
+def test_a_start_that_is_under_way_holds_the_folder(cell, opamc):
+    from opamc_cli.storage.files.lock import output_lock
+
+    with output_lock(cell.parent / "nightly"):
+        assert opamc("nightly", cell).code == ExitCode.LOCKED
+
+
+def test_limits_are_the_robots_own(cell, opamc):
+    shutil.rmtree(cell.parent / "logs" / "r3")
+    cell.write_text(cell.read_text() + "limits: {seconds: 0.01}\n")
+    ended = opamc("nightly", cell, "--json", "--robot", "r1")
+    assert ended.code == ExitCode.PARTIAL
+    why = {entry["why"] for entry in json.loads(ended.out)["robots"]["r1"]["failed"]}
+    assert why == {"took longer than 0.01 s (limits.seconds)"}
+    cell.write_text(cell.read_text().replace("seconds: 0.01", "seconds: 600"))
+    mended = opamc("nightly", cell, "--json", "--robot", "r1")
+    assert mended.code == ExitCode.DONE
+    assert json.loads(mended.out)["robots"]["r1"]["done"] == NIGHTS[3:5]
+
+
+def answers(function: str, jobs: list, **limits) -> dict:
+    chosen = {"seconds": 60.0, "memory_gb": None, **limits}
+    return dict(run_all(f"worker_jobs:{function}", jobs, 2, **chosen))
+
+
+def test_workers_that_die_are_a_sentence(monkeypatch):
+    here = str(Path(__file__).parent)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
+    found = answers("behave", ["fine", "die", "raise", "refuse", "also fine"])
+    assert found["fine"] == "FINE"
+    assert found["also fine"] == "ALSO FINE"
+    assert found["die"].text == "its worker was ended by SIGKILL"
+    assert found["raise"].text.startswith("a bug: ZeroDivisionError")
+    assert (found["refuse"].kind, found["refuse"].text) == ("refused", "the disk is full")
+    greedy = answers("behave", ["eat", "fine"], memory_gb=0.2)
+    assert greedy["eat"].text == "needed more than 0.2 GB (limits.memory_gb)"
+    assert greedy["fine"] == "FINE"
+    slow = answers("behave", ["sleep", "fine"], seconds=4.0)
+    assert slow["sleep"].kind == "time"
+    assert slow["fine"] == "FINE"
+
+
+def test_what_follows_is_the_same_in_whatever_order_nights_come(cell, opamc):
+    cell.write_text(cell.read_text() + "keep: {reports: 1}\n")
+    with nightly_kills.with_stand_in():
+        opamc("nightly", cell, "--night", NIGHTS[4], "--quiet")
+        opamc("nightly", cell, "--quiet")
+        piecewise = dump(cell.parent / "nightly" / "history.sqlite")
+        shutil.rmtree(cell.parent / "nightly")
+        opamc("nightly", cell, "--jobs", 2, "--quiet")
+        assert dump(cell.parent / "nightly" / "history.sqlite") == piecewise
+
+    # old folders are pruned, the history is not
+    folders = sorted(path.name for path in (cell.parent / "nightly" / "r2").iterdir())
+    assert folders == [NIGHTS[4]]
+    kept = rows(cell, "SELECT DISTINCT night, report IS NULL FROM verdict WHERE robot = 'r2'")
+    assert sorted(kept) == [(NIGHTS[3], 1), (NIGHTS[4], 0)]
+
+
+def test_compute_is_loaded_by_workers_only():
+    assert stage.COMPUTE == "opamc_cli.stages.nightly.workers.judge:compute"

@@ -1,0 +1,127 @@
+"""The cell's page: what it holds, how large it gets, and what a real browser makes of it."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import cell_logs
+import pytest
+
+from opamc_cli.stages.nightly.publish.page import render
+from opamc_cli.stages.nightly.summary import summarise
+from opamc_cli.storage.history import AlarmRow, History, MeasureRow, NightRow, VerdictRow
+
+BROWSER = next(
+    (b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), ""
+)
+FLAGS = (
+    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
+    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+)
+NIGHTS = [cell_logs.night(index) for index in range(30)]
+NASTY = '</script><b>"r&1'
+
+
+def write_history(path: Path, names: list[str]) -> History:
+    """Write a history in which axis 3 of the first robot wears and the second robot is unknown."""
+    history = History(path)
+    for number, name in enumerate(names):
+        status = "failed" if number == 1 else "done"
+        for night in NIGHTS:
+            verdicts, measures = [], []
+            for axis in range(1, 7):
+                worn = number == 0 and axis == 3
+                distance = 0.05 * NIGHTS.index(night) if worn else 0.02 * ((axis * 7) % 5 - 2)
+                verdicts.append(
+                    VerdictRow(
+                        *(name, "pick", axis, night, "fault" if worn else "healthy"),
+                        *(distance, 0.5, None, int(worn), 25.0, 1.0, 100.0, 4),
+                        *(f"{name}/{night}/report.html", "hash", "0.1"),
+                    )
+                )
+                measures.append(
+                    MeasureRow(name, "pick", axis, night, "b", distance, 0.0, 0.1, 0, "")
+                )
+            row = NightRow(name, night, "{}", status, why="no <b>")
+            history.record_night(row, verdicts, measures)
+    alarm = AlarmRow(
+        *(names[0], "pick", 3, NIGHTS[12], NIGHTS[9], None, None, "at fault, effect 0.41", "{}")
+    )
+    history.settle(names[0], [alarm], [("pick", 3, NIGHTS[-1])], [])
+    return history
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("page")
+    with write_history(folder / "history.sqlite", [NASTY, "r2", "r3"]) as history:
+        path = folder / "index.html"
+        path.write_text(render(history, summarise(history)), encoding="utf-8")
+    return path
+
+
+def test_what_needs_a_look_stands_in_the_page_itself(page):
+    text = page.read_text(encoding="utf-8")
+    assert "1 joint of 1 robot with an alarm" in text
+    assert f"alarm since {NIGHTS[9]}" in text
+    assert NASTY not in text
+    assert not re.search(r"(src|href)=\"https?:", text)
+    data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
+    assert [robot for robot, _ in data["robots"]] == sorted([NASTY, "r2", "r3"])
+    assert all(len(row[5]) == len(NIGHTS) for _, rows in data["robots"] for row in rows)
+
+
+def test_two_thousand_robots_are_less_than_two_megabytes(page):
+    with History(page.parent / "history.sqlite") as history:
+        text = render(history, summarise(history))
+    data = re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1]
+    # one robot of a plain name, with its six joints
+    (entry,) = [part for part in json.loads(data)["robots"] if part[0] == "r3"]
+    per_robot = len(json.dumps(entry, separators=(", ", ": "))) + len("cell-0000") * 13
+    assert len(text) - len(data) + 2000 * per_robot < 2_000_000
+
+
+def in_browser(page: Path, folder: Path, width: int, dark: bool) -> tuple[str, bytes]:
+    scheme = "--blink-settings=preferredColorScheme=" + ("0" if dark else "1")
+    # a window is never narrower than 500: a phone is a frame in it
+    framed = folder / "framed.html"
+    framed.write_text(
+        f"<!doctype html><style>body{{margin:0}}iframe{{border:0;width:{width}px;height:900px}}"
+        f"</style><iframe src='{page.as_uri()}'></iframe>"
+    )
+    shot = folder / f"{width}-{dark}.png"
+    common = [BROWSER, *FLAGS, f"--user-data-dir={folder / 'profile'}", scheme]
+    subprocess.run(
+        [*common, f"--window-size={max(width, 500)},900", f"--screenshot={shot}", framed.as_uri()],
+        capture_output=True,
+        check=True,
+        timeout=120,
+    )
+    dumped = subprocess.run(
+        [*common, f"--window-size={width},900", "--dump-dom", page.as_uri()],
+        capture_output=True,
+        check=True,
+        text=True,
+        timeout=120,
+    )
+    return dumped.stdout, shot.read_bytes()
+
+
+@pytest.mark.skipif(not BROWSER, reason="no chromium on this machine")
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
+    dom, shot = in_browser(page, tmp_path, width, dark)
+    body = dom.partition('<tbody id="rows">')[2].partition("</tbody>")[0]
+    assert body.count("<tr>") == 18
+    assert body.count('class="spark"') == 18
+    assert "! alarm" in body.partition("</tr>")[0]  # the worst first
+    assert "18 of 18 joints" in dom
+    from matplotlib.image import imread
+
+    path = tmp_path / f"{width}-{dark}.png"
+    pixels = imread(path)[..., :3]
+    assert shot
+    assert pixels.std() > 0.02  # something is drawn
+    assert (pixels[5, 5].mean() < 0.5) == dark

@@ -1,0 +1,57 @@
+"""The current sensors' offset, found from whole turns and taken off before the envelope."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
+from opamc_cli.storage.runs import Run, RunInfo, save_run
+
+RATE_HZ = 2048.0
+OFFSETS_A = (0.2, -0.15, 0.07)
+
+
+def write(path, seconds=4.0, phases="abc", reported=False):
+    time = np.arange(int(seconds * RATE_HZ)) / RATE_HZ
+    angle = 2 * np.pi * np.cumsum(60 * np.sin(np.pi * time / seconds)) / RATE_HZ
+    torque = 3.0 + 0.5 * np.sin(2 * np.pi * 3 * time)
+    columns = {}
+    for phase, shift, offset in zip("abc", range(3), OFFSETS_A, strict=True):
+        if phase in phases:
+            current = torque * np.cos(angle - 2 * np.pi * shift / 3) + offset
+            columns[f"axis1_{phase}"] = current.astype(np.float32)
+    if reported:
+        columns = {"axis1_current": torque.astype(np.float32), "axis1_position": angle / 500}
+    save_run(path, RunInfo(RATE_HZ), columns)
+    return torque
+
+
+def test_the_offset_of_three_sensors_is_found_and_taken_off(tmp_path):
+    torque = write(tmp_path / "run.parquet")
+    with Run(tmp_path / "run.parquet") as run:
+        offset = current_offset(run, 1, [(0, 4096), (4096, 8192)])
+        a, b, c = OFFSETS_A
+        true = 2 / 3 * (a + b * np.exp(2j * np.pi / 3) + c * np.exp(-2j * np.pi / 3))
+        assert abs(offset - true) < 0.1 * abs(true)
+        plain = read_envelope(run, 1, 0, 8192)
+        clean = read_envelope(run, 1, 0, 8192, offset=offset)
+    assert clean.dtype == np.float32
+    assert np.abs(clean - torque).max() < 0.15 * np.abs(plain - torque).max()
+
+
+def test_the_offset_of_a_single_phase_is_its_mean(tmp_path):
+    write(tmp_path / "run.parquet", phases="a")
+    with Run(tmp_path / "run.parquet") as run:
+        assert current_offset(run, 1, [(0, 8192)]).real == pytest.approx(0.2, abs=0.03)
+
+
+def test_a_vector_that_hardly_turns_keeps_its_mean(tmp_path):
+    write(tmp_path / "run.parquet")
+    with Run(tmp_path / "run.parquet") as run:
+        assert current_offset(run, 1, [(0, 1000)]) == 0j
+        assert current_offset(run, 1, []) == 0j
+
+
+def test_the_mean_of_a_reported_current_is_torque(tmp_path):
+    write(tmp_path / "run.parquet", reported=True)
+    with Run(tmp_path / "run.parquet") as run:
+        assert current_offset(run, 1, [(0, 8192)]) == 0j

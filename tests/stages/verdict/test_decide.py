@@ -1,0 +1,95 @@
+"""Deciding again from tables, and the documents that programs read."""
+
+import json
+from importlib import resources
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+from opamc_cli.__main__ import main
+
+SAMPLES = Path(__file__).parents[3] / "data" / "samples"
+
+
+def ended(*arguments):
+    with pytest.raises(SystemExit) as end:
+        main([str(argument) for argument in arguments])
+    return int(end.value.code or 0)
+
+
+def schema(name):
+    text = (
+        resources.files("opamc_cli.storage.schemas")
+        .joinpath(f"{name}.schema.json")
+        .read_text("utf-8")
+    )
+    return json.loads(text)
+
+
+def verdict_in(folder):
+    return json.loads((folder / "verdict.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def diagnosed(tmp_path_factory):
+    """Return the folder of a diagnosis of three healthy and two faulty sessions, cause included."""
+    out = tmp_path_factory.mktemp("diagnosed")
+    runs = {role: sorted((SAMPLES / role).glob("*.parquet")) for role in ("normal", "fault")}
+    sides = [*(["--baseline", run] for run in runs["normal"][:3])]
+    sides += [["--target", run] for run in runs["fault"][:2]]
+    flat = [part for side in sides for part in side]
+    assert ended("diagnose", *flat, "--out", out, "--quiet", "--set", "joint.gear_ratio=100") == 1
+    return out
+
+
+def test_the_same_options_decide_the_same(diagnosed, tmp_path):
+    before = verdict_in(diagnosed)
+    tables = [diagnosed / role / "patterns.parquet" for role in ("baseline", "target")]
+    assert ended("decide", "--baseline", tables[0], "--target", tables[1], "--out", tmp_path) == 1
+    after = verdict_in(tmp_path)
+    for old, new in zip(before["axes"], after["axes"], strict=True):
+        for key in ("axis", "health_index", "p_value", "p_adjusted", "features", "motions"):
+            assert old[key] == new[key]
+    assert any("no cause was sought" in note for note in after["notes"])
+    assert not any("no cause was sought" in note for note in before["notes"])
+
+
+def test_other_limits_decide_otherwise_and_keep_the_cause(diagnosed):
+    before = verdict_in(diagnosed)
+    cause = before["axes"][2]["cause"]
+    assert cause is not None
+    # a change that is too small to matter but as far off as this is not called healthy
+    assert ended("decide", "--out", diagnosed, "--set", "score.minimum_effect=1") == 5
+    states = [axis["state"] for axis in verdict_in(diagnosed)["axes"]]
+    assert states == ["healthy", "healthy", "insufficient-data"]
+    assert ended("decide", "--out", diagnosed) == 1
+    assert verdict_in(diagnosed)["axes"][2]["cause"] == cause
+    assert ended("report", "--out", diagnosed, "--quiet") == 0
+
+
+def test_decide_without_a_diagnosis(tmp_path, capsys):
+    assert ended("decide", "--out", tmp_path) == 3
+    assert "baseline/patterns.parquet: no such file" in capsys.readouterr().err
+
+
+def test_a_verdict_keeps_to_its_schema(diagnosed):
+    jsonschema.Draft202012Validator.check_schema(schema("verdict"))
+    jsonschema.validate(verdict_in(diagnosed), schema("verdict"))
+
+
+def test_schemas_refuse_what_is_no_verdict(diagnosed):
+    verdict = verdict_in(diagnosed)
+    for key in ("schema_version", "robot", "created_at", "tables", "notes", "baseline"):
+        without = {name: value for name, value in verdict.items() if name != key}
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(without, schema("verdict"))
+    verdict["axes"][0]["state"] = "fine"
+    with pytest.raises(jsonschema.ValidationError):
+        jsonschema.validate(verdict, schema("verdict"))
+
+
+def test_schemas_are_printed(capsys):
+    assert ended("config", "schema", "verdict") == 0
+    assert json.loads(capsys.readouterr().out) == schema("verdict")
+    assert ended("config", "schema", "tables") == 2
