@@ -4,6 +4,9 @@ Nothing but the interpreter's own is imported before the signals are in hand: an
 the first millisecond ends as one in the last.
 """
 
+if __name__ == "__main__":
+    import opamc_cli.entry  # noqa: F401 - takes SIGINT in hand
+
 import os
 import sys
 from collections.abc import Sequence
@@ -15,35 +18,42 @@ from opamc_cli.stages.processes.interruption import Interrupted, interruptible
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run `opamc` and exit with one of `ExitCode`, or 128 and the number of a signal."""
-    with interruptible():
+    with interruptible() as came:
         open_streams()
         given = sys.argv[1:] if arguments is None else list(arguments)
         try:
             _run(given)
-        except OpamcError as error:
-            _tell(str(error), error.exit_code, given)
-            sys.exit(error.exit_code)
         except Interrupted as error:
             _tell(str(error), error.code, given)
             raise
-        except MemoryError:
-            message = "out of memory; use fewer --jobs, shorter recordings, or another machine"
-            _tell(message, ExitCode.USAGE, given)
-            sys.exit(ExitCode.USAGE)
-        except OSError as error:
-            # what the system refuses is no bug of ours: no space, no permission, too many files
-            where = f"{error.filename}: " if error.filename is not None else ""
-            message = f"{where}{error.strerror or error}; check space, permissions and limits"
-            _tell(message, ExitCode.USAGE, given)
-            sys.exit(ExitCode.USAGE)
-        except Exception as error:  # noqa: BLE001 - the last resort; everything known is above
-            if os.environ.get("OPAMC_DEBUG"):
-                import traceback
+        except Exception as error:  # noqa: BLE001 - whatever is not one of ours is a bug
+            if came:
+                ended = Interrupted(came[0])
+                _tell(str(ended), ended.code, given)
+                raise ended from None
+            message, code = _told(error)
+            _tell(message, code, given)
+            sys.exit(code)
 
-                traceback.print_exc()
-            told = f"a bug: {type(error).__name__}: {error} (set OPAMC_DEBUG=1 for the traceback)"
-            _tell(told, ExitCode.BUG, given)
-            sys.exit(ExitCode.BUG)
+
+def _told(error: Exception) -> tuple[str, ExitCode]:
+    """Return what is said of an error, and the exit code it ends with."""
+    if isinstance(error, OpamcError):
+        return str(error), error.exit_code
+    if isinstance(error, MemoryError):
+        message = "out of memory; use fewer --jobs, shorter recordings, or another machine"
+        return message, ExitCode.USAGE
+    if isinstance(error, OSError):
+        # what the system refuses is no bug of ours: no space, no permission, too many files
+        where = f"{error.filename}: " if error.filename is not None else ""
+        message = f"{where}{error.strerror or error}; check space, permissions and limits"
+        return message, ExitCode.USAGE
+    if os.environ.get("OPAMC_DEBUG"):
+        import traceback
+
+        traceback.print_exception(error)
+    message = f"a bug: {type(error).__name__}: {error} (set OPAMC_DEBUG=1 for the traceback)"
+    return message, ExitCode.BUG
 
 
 def _run(given: list[str]) -> None:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from fuzz import ALONE
+from fuzz import call as called
 from recordings import record
 
 from opamc_cli.__main__ import main
@@ -49,3 +51,14 @@ def baseline(tmp_path_factory) -> Path:
 def tonight(tmp_path_factory) -> Path:
     """Another healthy session."""
     return record(tmp_path_factory.mktemp("target") / "tonight.parquet", 9)
+
+
+@pytest.fixture(scope="session")
+def diagnosed(tmp_path_factory, baseline, tonight) -> Path:
+    """The folder of a diagnosis that a command has made; who changes it takes a copy."""
+    out = tmp_path_factory.mktemp("diagnosed") / "out"
+    code, _, err = called(
+        "diagnose", "--baseline", baseline, "--target", tonight, "--out", out, *ALONE
+    )
+    assert code == 0, err
+    return out

@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 
+import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import InputError, UsageError
@@ -181,15 +182,6 @@ def test_where_a_result_is_seen(tmp_path):
 # -- a diagnosis -----------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def diagnosed(tmp_path_factory, baseline, tonight):
-    from opamc_cli.config import load_config
-
-    out = tmp_path_factory.mktemp("diagnosed")
-    stage.run([baseline], [tonight], load_config(None, ["joint.explain=false"]), out)
-    return out
-
-
 def test_the_verdict_vouches_for_its_tables(diagnosed):
     verdict = json.loads((diagnosed / "verdict.json").read_text())
     assert set(verdict["tables"]) == {n for n in stage.FILES if n.endswith(".parquet")}
@@ -201,8 +193,6 @@ def test_the_verdict_vouches_for_its_tables(diagnosed):
 def test_a_report_of_two_diagnoses_is_refused(opamc, diagnosed, tmp_path, name):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     assert opamc("report", "--out", out).code == 0
-    import pyarrow.parquet as pq
-
     table = pq.read_table(out / name)
     pq.write_table(table.slice(0, table.num_rows - 1), out / name)
     ended = opamc("report", "--out", out)

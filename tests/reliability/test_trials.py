@@ -1,42 +1,38 @@
 """The short forms of `make kill` and `make faults`."""
 
-import errno
+import os
 import shutil
-import signal
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
-from faults import build, fault
-from kills import kill
-from trials import Trial, trials
 
-NAMES = ("diagnose", "simulate", "patterns", "score")
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
 
 
-@pytest.fixture(scope="module")
-def every(tmp_path_factory) -> dict[str, Trial]:
-    return {trial.name: trial for trial in trials(tmp_path_factory.mktemp("trials"), NAMES)}
+def script(name: str, *arguments: object) -> str:
+    """Run a script of this folder; it fails if one of its trials does."""
+    ended = subprocess.run(
+        [sys.executable, str(HERE / name), *map(str, arguments)],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr[-2000:]
+    return ended.stdout
 
 
-@pytest.mark.parametrize(
-    ("name", "after_s", "number"),
-    [
-        ("diagnose", 4.0, signal.SIGKILL),
-        ("diagnose", 6.0, signal.SIGTERM),
-        ("simulate", 3.0, signal.SIGKILL),
-        ("patterns", 1.5, signal.SIGINT),
-    ],
-)
-def test_killed_commands(every, name, after_s, number):
-    assert kill(every[name], after_s, number) is None
+@pytest.mark.slow
+def test_killed_commands():
+    said = script("kills.py", "--count", 12, "--seed", 1, "--only", "diagnose", "simulate", "score")
+    assert "12 kills and interruptions, 0 wrong" in said
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
-@pytest.mark.parametrize("name", ["score", "simulate"])
-def test_failing_system_calls(every, tmp_path, name):
-    library = build(tmp_path)
-    count = tmp_path / "count"
-    assert fault(every[name], library, 0, 0, count) is None
-    calls = int(count.read_text())
-    assert calls > 10
-    for at in (1, calls // 3, 2 * calls // 3, calls):
-        assert fault(every[name], library, at, errno.ENOSPC, tmp_path / "ignored") is None
+def test_failing_system_calls():
+    said = script("faults.py", "--every", 25, "--first", 7, "--only", "score", "simulate")
+    assert int(said.splitlines()[-1].split()[0]) > 5

@@ -4,14 +4,25 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import yaml
+from forks import Ended, Fork
 from fuzz import Inputs
 
 ROOT = Path(__file__).parents[2]
 COMMAND = (sys.executable, "-m", "opamc_cli")
+LONGEST_S = 600.0
+QUICK = ("--set", "joint.explain=false")
+CELL = {
+    "runs": "nights/{robot}/{night}/*.parquet",
+    "robots": "auto",
+    "baseline": {"nights": 2},
+    "out": "nightly-out",
+    "set": {"joint.explain": False},
+}
 
 
 @dataclass(frozen=True)
@@ -22,40 +33,59 @@ class Trial:
     arguments: tuple[str, ...]
     out: Path
     before: Path
+    codes: tuple[int, ...] = (0,)
 
 
 def trials(folder: Path, names: tuple[str, ...] = ()) -> list[Trial]:
     """Return one trial of each kind of command (or of some), with inputs and last results."""
-    inputs = Inputs(folder)
-    (folder / "map.yaml").write_text(yaml.safe_dump(inputs.map))
-    testbed = ROOT / "configs" / "samples.yaml"
-    good, sides = folder / "good", ("baseline", "target")
-    patterns = [inputs.out / role / "patterns.parquet" for role in sides]
+    ready = Fork(lambda: _prepare(folder)).wait(LONGEST_S)
+    assert ready.returncode == 0, ready.stderr
+    good, out = folder / "good", folder / "diagnosed"
+    target = folder / "good-target" / "9.parquet"
+    patterns = [out / role / "patterns.parquet" for role in ("baseline", "target")]
+    short = ROOT / "configs" / "samples.yaml"
     made: list[Trial] = []
     for name, arguments in {
-        "diagnose": ["--baseline", good, "--target", inputs.target, "--set", "joint.explain=false"],
-        "segment": [good],
-        "identify": [inputs.out / "baseline" / "segments.parquet", "--runs", good],
-        "patterns": [inputs.out / "baseline" / "motions.parquet", "--runs", good],
-        "score": ["--baseline", patterns[0], "--target", patterns[1]],
-        "sweep": ["--baseline", good, "--tau", "2:3", "--order", "4:4", "--jobs", "2"],
-        "simulate": ["--config", testbed, "--cycles", "1", "--sessions", "2", "--jobs", "1"],
-        "ingest": [inputs.log, "--map", folder / "map.yaml"],
-        "report": [],
-        "decide": [],
+        "diagnose": ["diagnose", "--baseline", good, "--target", target, *QUICK],
+        "segment": ["segment", good],
+        "identify": ["identify", out / "baseline" / "segments.parquet", "--runs", good],
+        "patterns": ["patterns", out / "baseline" / "motions.parquet", "--runs", good],
+        "score": ["score", "--baseline", patterns[0], "--target", patterns[1]],
+        "decide": ["decide"],
+        "report": ["report"],
+        "sweep": ["sweep", "--baseline", good, "--tau", "2:3", "--order", "4:4", "--jobs", "1"],
+        "select": ["select", out / "baseline" / "motions.parquet", "--runs", good, "--order", "3"],
+        "simulate": ["simulate", "--config", short, "--cycles", "1", "--sessions", "2"],
+        "ingest": ["ingest", folder / "log.csv", "--map", folder / "map.yaml"],
+        "fit": ["model", "fit", target, "--axis", "1"],
+        "trace": ["model", "trace", target, "--axis", "1"],
+        "close": ["model", "close", target, "--axis", "1"],
+        "nightly": ["nightly", folder / "cell.yaml"],
     }.items():
         if names and name not in names:
             continue
-        out, before = folder / f"{name}-out", folder / f"{name}-before"
+        place, before = folder / f"{name}-out", folder / f"{name}-before"
         if name in ("report", "decide"):
-            shutil.copytree(inputs.out, before, symlinks=True)
-        trial = Trial(name, (name, *map(str, arguments), "--out", str(out)), out, before)
+            shutil.copytree(out, before, symlinks=True)
+        words = [str(argument) for argument in arguments]
+        words += [] if name == "nightly" else ["--out", str(place)]
+        trial = Trial(name, tuple(words), place, before)
         if not before.exists():
             ended = run(trial)
-            assert ended.returncode == 0, (name, ended.stderr)
-            shutil.copytree(out, before, symlinks=True)
+            assert ended.returncode in trial.codes, (name, ended.stderr)
+            shutil.copytree(place, before, symlinks=True)
         made.append(trial)
     return made
+
+
+def _prepare(folder: Path) -> None:
+    inputs = Inputs(folder)
+    (folder / "map.yaml").write_text(yaml.safe_dump(inputs.map))
+    (folder / "cell.yaml").write_text(yaml.safe_dump(CELL))
+    for number, run in enumerate([*inputs.runs[:2], inputs.target]):
+        night = folder / "nights" / "r1" / f"2026-03-0{number + 1}"
+        night.mkdir(parents=True)
+        shutil.copyfile(run, night / "run.parquet")
 
 
 def reset(trial: Trial) -> None:
@@ -64,20 +94,26 @@ def reset(trial: Trial) -> None:
     shutil.copytree(trial.before, trial.out, symlinks=True)
 
 
-def start(trial: Trial, **environment: str) -> "subprocess.Popen[str]":
-    """Start a trial's command in a session of its own."""
-    return subprocess.Popen(
-        [*COMMAND, *trial.arguments],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        start_new_session=True,
-    )
-
-
-def run(trial: Trial, **environment: str) -> "subprocess.CompletedProcess[str]":
+def run(trial: Trial, at_end: Callable[[], object] = lambda: None, **environment: str) -> Ended:
     """Run a trial's command to its end."""
-    process = start(trial, **environment)
-    out, err = process.communicate(timeout=300)
-    return subprocess.CompletedProcess(trial.arguments, process.returncode, out, err)
+    return Fork(trial.arguments, environment, at_end).wait(LONGEST_S)
+
+
+class Started:
+    """A command that an interpreter of its own runs, from its first millisecond."""
+
+    def __init__(self, arguments: tuple[str, ...]) -> None:
+        self._process = subprocess.Popen(
+            [*COMMAND, *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            start_new_session=True,
+        )
+        self.pid = self._process.pid
+
+    def wait(self, timeout_s: float) -> Ended:
+        """Return how it ended."""
+        out, err = self._process.communicate(timeout=timeout_s)
+        return Ended(self._process.returncode, out, err)
