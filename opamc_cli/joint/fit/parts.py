@@ -41,6 +41,14 @@ class Parts:
         """Number of units."""
         return int(self.unit.max()) + 1 if self.unit.size else 0
 
+    @property
+    def halves(self) -> Ints:
+        """Half of a unit that each part belongs to, counted over all units."""
+        first = np.searchsorted(self.unit, self.unit)
+        size = np.searchsorted(self.unit, self.unit, side="right") - first
+        half: Ints = 2 * self.unit + (2 * (np.arange(self.unit.size) - first) >= size)
+        return np.unique(half, return_inverse=True)[1]
+
     def elsewhere(self, units: Floats) -> Floats:
         """Sum over all units but each one, of values of shape (units, ...)."""
         rest: Floats = units.sum(axis=0) - units
@@ -114,12 +122,28 @@ class Sums:
         return Sums(gram, np.concatenate([self.moment, moment], axis=1), self.power, self.parts)
 
     def without_drift(self) -> "Sums":
-        """Allow the current another offset in every part; the last regressor has to be ones."""
-        count = np.maximum(self.gram[:, -1, -1], 1.0)
-        total, power = self.gram[:, :-1, -1], self.moment[:, -1]
-        gram = self.gram[:, :-1, :-1] - np.einsum("pi,pj,p->pij", total, total, 1 / count)
-        moment = self.moment[:, :-1] - total * (power / count)[:, None]
-        return Sums(gram, moment, self.power - power**2 / count, self.parts)
+        """Allow the current another offset in each half of every unit.
+
+        A quarter is often one stroke, in which friction is an offset. The last regressor has to be
+        ones; the parts of what is returned are halves, without rows.
+        """
+        halves = self.parts.halves
+        count = int(halves.max()) + 1
+        gram, moment, power = (
+            _summed(values, halves, count) for values in (self.gram, self.moment, self.power)
+        )
+        number = np.maximum(gram[:, -1, -1], 1.0)
+        total, mean = gram[:, :-1, -1], moment[:, -1] / number
+        unit = np.zeros(count, dtype=np.int64)
+        unit[halves] = self.parts.unit
+        none = np.zeros(0, dtype=np.int64)
+        parts = Parts(none, ((0, 0),) * count, unit, np.ones(count, dtype=bool))
+        return Sums(
+            gram[:, :-1, :-1] - np.einsum("pi,pj,p->pij", total, total, 1 / number),
+            moment[:, :-1] - total * mean[:, None],
+            power - number * mean**2,
+            parts,
+        )
 
     def columns(self, kept: Sequence[int]) -> "Sums":
         """Keep some of the regressors."""
@@ -166,3 +190,10 @@ class Sums:
         quadratic = np.einsum("pi,pij,pj->p", coefficients, self.gram, coefficients)
         error: Floats = np.maximum(self.power - 2 * linear + quadratic, 0.0)
         return error
+
+
+def _summed(values: Floats, places: Ints, count: int) -> Floats:
+    """Sum parts' values at their places."""
+    summed = np.zeros((count, *values.shape[1:]))
+    np.add.at(summed, places, values)
+    return summed

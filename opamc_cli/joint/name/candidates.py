@@ -14,6 +14,8 @@ from opamc_cli.joint.name.chain import Chain, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
+NARROW = 4
+"""Regressors of a guess up to which products are summed one by one, for all guesses at once."""
 RIDGE = 1e-6
 """Of a regressor's energy: one of which the model leaves less is the model's already."""
 
@@ -74,6 +76,9 @@ def batches_of(session: Session, terms: Sequence[Term], fine: bool) -> list[Batc
 
 def _own_products(columns: Floats, parts: Parts, count: int, width: int) -> Floats:
     """Products of each guess's regressors with one another over each part, shape (p, K, w, w)."""
+    if width > NARROW:
+        blocks = [columns[:, k * width : (k + 1) * width] for k in range(count)]
+        return np.stack([parts.products(block, block) for block in blocks], axis=1)
     starts = [start for start, _ in parts.slices]
     guesses = columns.reshape(-1, count, width)
     own = np.empty((len(starts), count, width, width))

@@ -211,8 +211,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     if "sign" not in pool.without and not child.plausible:
         return "its sign, or its size, is not physical"
     if child.terms[-1].effect.changes_in_time and "drift" not in pool.without:
-        share, t_value = child.gain_beside_drift(parent)
-        if share < pool.least_share or t_value < LEAST_T:
+        if child.gain_beside_drift(parent)[0] < pool.least_share:
             return "slow noise explains it as well: within parts of the data nothing speaks for it"
     return None
 

@@ -19,6 +19,7 @@ from opamc_cli.stages.report.figures import (
     motion_signal,
     order_spectrum,
     ordinal_distribution,
+    partial_residuals,
     residual,
     similarity,
 )
@@ -44,7 +45,11 @@ EVIDENCE = (
 )
 """The thesis's figures: first what the verdict rests on, then how the segments were found."""
 
-LOOP = (("residual", residual.figure), ("order spectrum", order_spectrum.figure))
+LOOP = (
+    ("partial residuals", partial_residuals.figure),
+    ("residual", residual.figure),
+    ("order spectrum", order_spectrum.figure),
+)
 
 
 @dataclass(frozen=True)

@@ -350,7 +350,7 @@ def remains(entry: Mapping[str, Any]) -> str:
     if isinstance(after, int | float):
         parts.append(f"the sealed error is {number(after)} {unit}")
     if isinstance(floor, int | float):
-        parts.append(f"{number(floor)} {unit} of it does not repeat and cannot be modelled")
+        parts.append(f"functions without a name leave {number(floor)} {unit}")
     if isinstance(share, int | float):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
     domains = [
