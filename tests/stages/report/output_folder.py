@@ -121,6 +121,13 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
         "ties": [],
         "rmse_before_a": 0.065,
         "rmse_after_a": 0.031,
+        "curve": {
+            "covariate": "angle within the period",
+            "unit": "turns",
+            "x": (phase := np.linspace(0.0, 1.0, 40)).tolist(),
+            "residual_a": (0.06 * np.cos(2 * np.pi * phase) + 0.002).tolist(),
+            "named_a": (0.06 * np.cos(2 * np.pi * phase)).tolist(),
+        },
     }
     loop = {
         "axes": [

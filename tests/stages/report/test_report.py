@@ -283,7 +283,7 @@ def test_a_loop_alone_makes_a_report(tmp_path: Path) -> None:
     output_folder.add_loop(tmp_path)
     outcome = report.run(tmp_path)
     page = _Page(outcome.path.read_text(encoding="utf-8"))
-    assert page.figures() == {"residual-3", "order-spectrum-3"}
+    assert page.figures() == {"partial-residuals-3", "residual-3", "order-spectrum-3"}
     assert "Model of axis 3: closed, 2 effects added" in page.words()
     assert "To tell ripple from elasticity: move at two more speeds" in page.words()
     assert outcome.omitted == ("diagnosis: scores.parquet is absent; `opamc diagnose` writes it",)

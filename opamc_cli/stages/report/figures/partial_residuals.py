@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any
 
-from opamc_cli.stages.report.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
+from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.figures.residual import loop_axis
-from opamc_cli.stages.report.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.stages.report.palette import colour
+from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 MOST = 6
 """Effects that are drawn, in the order in which they were added; a joint seldom lacks more."""
@@ -15,9 +15,11 @@ COLUMNS = 2
 
 def figure(inputs: ReportInputs, axis: int) -> Figure:
     """Draw the partial residual of every effect that the loop added to one axis."""
-    steps = [step for step in loop_axis(inputs, axis).get("steps", ()) if step.get("curve")]
+    added = loop_axis(inputs, axis).get("steps", ())
+    steps = [step for step in added if step.get("curve")]
     if not steps:
-        msg = f"the loop added nothing to axis {axis}"
+        nothing = f"the loop added nothing to axis {axis}"
+        msg = f"loop.json holds no curve of axis {axis}" if added else nothing
         raise NothingToDrawError(msg)
     shown = steps[:MOST]
     rows = -(-len(shown) // COLUMNS)
