@@ -2,13 +2,17 @@
 
 Each virtual robot has one joint. Its temperature, friction, gain and offset are drawn once a
 night; the files of a night share them. One more healthy night is held against the baseline's, and
-one with damage. `--by-file` takes each file for a session of its own, as it must not be.
+three with damage. `--by-file` takes each file for a session of its own, as it must not be. Tables
+are kept in `benchmarks/out/nights`, so that another decision is tried in seconds: remove them when
+anything before the decision changes.
 
     python benchmarks/nights.py --quick
     python benchmarks/nights.py --robots 140 --first 5000
 """
 
 import argparse
+import pickle
+import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -24,13 +28,15 @@ from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.sources import RunSource
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
+CACHE = Path(__file__).resolve().parent / "out" / "nights"
 RATE_HZ = 250.0
 AXIS = 3
 FILES = (1, 4, 16)
-SEVERITY = 0.25
+SEVERITIES = (0.1, 0.25, 0.5)
 
 
 def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
@@ -48,7 +54,7 @@ def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
         dwell_jitter_s=0.02,
     )
     for night in range(n_nights + 1):
-        for severity in (0.0, SEVERITY) if night == n_nights else (0.0,):
+        for severity in (0.0, *SEVERITIES) if night == n_nights else (0.0,):
             side = "baseline" if night < n_nights else f"target-{severity:g}"
             damage = {AXIS: replace(robot.damage, severity=severity)} if severity else {}
             signals = simulate(
@@ -70,7 +76,32 @@ def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
             )
 
 
-def by_files(side: Side, by_file: bool) -> Side:
+def tables(seed: int, n_files: int) -> dict[str, dict[str, pa.Table]]:
+    """Return one robot's tables by side and name; what was recorded before is read."""
+    path = CACHE / f"{n_files}-files-{seed}.pickle"
+    if path.exists():
+        return pickle.loads(path.read_bytes())
+    config = load_config()
+    with tempfile.TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        record(seed, 3 + seed % 6, n_files, folder)
+        found, reference = {}, None
+        for side in ("baseline", *(f"target-{severity:g}" for severity in (0.0, *SEVERITIES))):
+            done = run_chain([folder / side], config, folder / "out" / side, reference=reference)
+            reference = reference or done.motions
+            made = read_side(done.patterns)
+            found[side] = {"patterns": made.patterns, **made.witnesses}
+    CACHE.mkdir(parents=True, exist_ok=True)
+    plain = {
+        side: {name: table.replace_schema_metadata(None) for name, table in of_side.items()}
+        for side, of_side in found.items()
+    }
+    path.with_suffix(".tmp").write_bytes(pickle.dumps(plain))
+    path.with_suffix(".tmp").rename(path)
+    return plain
+
+
+def by_files(of_side: dict[str, pa.Table], by_file: bool) -> Side:
     """Turn each cycle of a night's run into a file of that night."""
 
     def renamed(table: pa.Table) -> pa.Table:
@@ -78,36 +109,30 @@ def by_files(side: Side, by_file: bool) -> Side:
         names = pa.array([f"{run}-{cycle}" for run, cycle in pairs])
         return table.set_column(table.column_names.index("run"), "run", names)
 
-    patterns = renamed(side.patterns)
-    by_name = {source.name: source for source in side.sources}
+    made = {name: renamed(table) for name, table in of_side.items()}
+    patterns = made.pop("patterns")
     sources = []
     for name in sorted(set(patterns["run"].to_pylist())):
-        night = by_name[name.rsplit("-", 1)[0]]
-        info = replace(night.info, session=name if by_file else night.name)
-        sources.append(replace(night, name=name, info=info))
-    witnesses = {name: renamed(table) for name, table in side.witnesses.items()}
-    return Side(side.path, tuple(sources), patterns, witnesses)
+        night = name if by_file else name.rsplit("-", 1)[0]
+        info = RunInfo(sampling_rate_hz=RATE_HZ, session=night)
+        sources.append(RunSource(name, Path(name), "", 0, info))
+    return Side(Path("patterns.parquet"), tuple(sources), patterns, made)
 
 
-def judged(seed: int, n_files: int, by_file: bool) -> dict[float, tuple[float, str]]:
+def judged(
+    seed: int, n_files: int, by_file: bool, without: frozenset[str] = frozenset()
+) -> dict[float, tuple[float, str]]:
     """Return p and state by severity of one robot's target night."""
-    n_nights = 3 + seed % 6
-    config = load_config()
-    with tempfile.TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        record(seed, n_nights, n_files, folder)
-        baseline = run_chain([folder / "baseline"], config, folder / "out" / "baseline")
-        own = by_files(read_side(baseline.patterns), by_file)
-        found = {}
-        for severity in (0.0, SEVERITY):
-            name = f"target-{severity:g}"
-            done = run_chain(
-                [folder / name], config, folder / "out" / name, reference=baseline.motions
-            )
-            sides = Sides(own, by_files(read_side(done.patterns), by_file))
-            judgement = judge(bundles(sides))[AXIS]
-            found[severity] = (judgement.p_value, judgement.state)
-        return found
+    made = tables(seed, n_files)
+    own = by_files(made["baseline"], by_file)
+    found = {}
+    for severity in (0.0, *SEVERITIES):
+        sides = Sides(own, by_files(made[f"target-{severity:g}"], by_file))
+        bundle = bundles(sides)[AXIS]
+        kept = {name: one for name, one in bundle.witnesses.items() if name not in without}
+        judgement = judge({AXIS: replace(bundle, witnesses=kept)})[AXIS]
+        found[severity] = (judgement.p_value, judgement.state)
+    return found
 
 
 def main() -> None:
@@ -117,25 +142,34 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
     parser.add_argument("--files", type=int, nargs="*", default=list(FILES))
     parser.add_argument("--by-file", action="store_true")
+    parser.add_argument("--without", nargs="*", default=[], help="witnesses that are not asked")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     n_robots = 4 if arguments.quick else arguments.robots
-    print("files a night,robots,not judged,healthy alarms,KS p,found at 0.25,p<0.01 at 0.25")
+    each = ",".join(f"found at {s:g},AUC {s:g}" for s in SEVERITIES)
+    print(f"files a night,robots,not judged,healthy alarms,KS p,{each}")
     for n_files in arguments.files:
-        results = [
-            judged(arguments.first + 1000 * n_files + k, n_files, arguments.by_file)
-            for k in range(n_robots)
-        ]
-        healthy = np.array([one[0.0][0] for one in results])
-        known = healthy[np.isfinite(healthy)]
-        alarms = sum(one[0.0][1] in ("changed", "fault") for one in results)
-        found = sum(one[SEVERITY][1] in ("changed", "fault") for one in results)
-        small = sum(one[SEVERITY][0] <= 0.01 for one in results)
-        uniform = kstest(known, "uniform").pvalue
-        print(
-            f"{n_files},{n_robots},{n_robots - len(known)},{alarms},{uniform:.3f},{found},{small}",
-            flush=True,
-        )
+        results = []
+        for k in range(n_robots):
+            seed = arguments.first + 1000 * n_files + k
+            results.append(judged(seed, n_files, arguments.by_file, frozenset(arguments.without)))
+            print(f"robot {seed}: {results[-1]}", file=sys.stderr, flush=True)
+        print(row(n_files, results), flush=True)
+
+
+def row(n_files: int, results: list[dict[float, tuple[float, str]]]) -> str:
+    """Summarise the robots of one number of files."""
+    healthy = np.array([one[0.0][0] for one in results])
+    known = healthy[np.isfinite(healthy)]
+    alarms = sum(one[0.0][1] in ("changed", "fault") for one in results)
+    uniform = kstest(known, "uniform").pvalue
+    cells = [f"{n_files},{len(results)},{len(results) - len(known)},{alarms},{uniform:.3f}"]
+    for severity in SEVERITIES:
+        found = sum(one[severity][1] in ("changed", "fault") for one in results)
+        p = np.array([one[severity][0] for one in results])
+        above = (p[:, np.newaxis] < known) + 0.5 * (p[:, np.newaxis] == known)
+        cells.append(f"{found},{above.mean():.3f}")
+    return ",".join(cells)
 
 
 if __name__ == "__main__":
