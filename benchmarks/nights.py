@@ -14,19 +14,22 @@ import argparse
 import pickle
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
 from scipy.stats import kstest
 
 from opamc_cli.config import load_config
-from opamc_cli.config.testbed import load_testbed
-from opamc_cli.decision.judge import judge
-from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
-from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.config.testbed import TestbedConfig, load_testbed
 from opamc_cli.stages.verdict.evidence import bundles
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
+from opamc_cli.decision.judge import judge
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.storage.sources import RunSource
 from opamc_cli.testbed.robot import simulate
@@ -39,9 +42,17 @@ FILES = (1, 4, 16)
 SEVERITIES = (0.1, 0.25, 0.5)
 
 
-def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
+@cache
+def testbed() -> TestbedConfig:
+    """Return the shipped robot and program."""
+    return load_testbed(ROOT / "configs" / "testbed.yaml")
+
+
+def record(
+    seed: int, n_nights: int, n_files: int, severities: Sequence[float], folder: Path
+) -> None:
     """Write one run per night; each of its cycles stands for a file."""
-    config = load_testbed(ROOT / "configs" / "testbed.yaml")
+    config = testbed()
     spread = replace(config.robot.spread, temperature_c=5.0)
     robot = replace(config.robot, spread=spread)
     program = replace(
@@ -54,8 +65,7 @@ def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
         dwell_jitter_s=0.02,
     )
     for night in range(n_nights + 1):
-        for severity in (0.0, *SEVERITIES) if night == n_nights else (0.0,):
-            side = "baseline" if night < n_nights else f"target-{severity:g}"
+        for severity in severities if night == n_nights else (0.0,):
             damage = {AXIS: replace(robot.damage, severity=severity)} if severity else {}
             signals = simulate(
                 robot,
@@ -66,8 +76,9 @@ def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
                 faults=damage,
                 sampling_rate_hz=RATE_HZ,
             ).axes[AXIS]
+            name = f"target/{severity:g}" if night == n_nights else f"baseline/{night}"
             save_run(
-                folder / side / f"{night}.parquet",
+                folder / f"{name}.parquet",
                 RunInfo(sampling_rate_hz=RATE_HZ),
                 {
                     f"axis{AXIS}_current": signals.reported_a,
@@ -76,29 +87,35 @@ def record(seed: int, n_nights: int, n_files: int, folder: Path) -> None:
             )
 
 
-def tables(seed: int, n_files: int) -> dict[str, dict[str, pa.Table]]:
+def tables(seed: int, n_files: int, severities: Sequence[float]) -> dict[str, dict[str, pa.Table]]:
     """Return one robot's tables by side and name; what was recorded before is read."""
     path = CACHE / f"{n_files}-files-{seed}.pickle"
     if path.exists():
         return pickle.loads(path.read_bytes())
     config = load_config()
+    found: dict[str, dict[str, pa.Table]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        record(seed, 3 + seed % 6, n_files, folder)
-        found, reference = {}, None
-        for side in ("baseline", *(f"target-{severity:g}" for severity in (0.0, *SEVERITIES))):
+        record(seed, 3 + seed % 6, n_files, severities, folder)
+        reference = None
+        for side in ("baseline", "target"):
             done = run_chain([folder / side], config, folder / "out" / side, reference=reference)
-            reference = reference or done.motions
+            reference = done.motions
             made = read_side(done.patterns)
-            found[side] = {"patterns": made.patterns, **made.witnesses}
+            found[side] = {
+                name: table.replace_schema_metadata(None)
+                for name, table in {"patterns": made.patterns, **made.witnesses}.items()
+            }
+    for severity in severities:
+        found[f"target-{severity:g}"] = {
+            name: table.filter(pc.equal(table["run"], f"{severity:g}"))
+            for name, table in found["target"].items()
+        }
+    del found["target"]
     CACHE.mkdir(parents=True, exist_ok=True)
-    plain = {
-        side: {name: table.replace_schema_metadata(None) for name, table in of_side.items()}
-        for side, of_side in found.items()
-    }
-    path.with_suffix(".tmp").write_bytes(pickle.dumps(plain))
+    path.with_suffix(".tmp").write_bytes(pickle.dumps(found))
     path.with_suffix(".tmp").rename(path)
-    return plain
+    return found
 
 
 def by_files(of_side: dict[str, pa.Table], by_file: bool) -> Side:
@@ -120,13 +137,18 @@ def by_files(of_side: dict[str, pa.Table], by_file: bool) -> Side:
 
 
 def judged(
-    seed: int, n_files: int, by_file: bool, without: frozenset[str] = frozenset()
+    seed: int,
+    n_files: int,
+    severities: Sequence[float] = (0.0, *SEVERITIES),
+    *,
+    by_file: bool = False,
+    without: frozenset[str] = frozenset(),
 ) -> dict[float, tuple[float, str]]:
     """Return p and state by severity of one robot's target night."""
-    made = tables(seed, n_files)
+    made = tables(seed, n_files, severities)
     own = by_files(made["baseline"], by_file)
     found = {}
-    for severity in (0.0, *SEVERITIES):
+    for severity in severities:
         sides = Sides(own, by_files(made[f"target-{severity:g}"], by_file))
         bundle = bundles(sides)[AXIS]
         kept = {name: one for name, one in bundle.witnesses.items() if name not in without}
@@ -141,18 +163,27 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=40, help="for each number of files")
     parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
     parser.add_argument("--files", type=int, nargs="*", default=list(FILES))
+    parser.add_argument("--severities", type=float, nargs="*", default=list(SEVERITIES))
     parser.add_argument("--by-file", action="store_true")
     parser.add_argument("--without", nargs="*", default=[], help="witnesses that are not asked")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     n_robots = 4 if arguments.quick else arguments.robots
-    each = ",".join(f"found at {s:g},AUC {s:g}" for s in SEVERITIES)
+    each = ",".join(f"found at {s:g},AUC {s:g}" for s in arguments.severities)
     print(f"files a night,robots,not judged,healthy alarms,KS p,{each}")
     for n_files in arguments.files:
         results = []
         for k in range(n_robots):
             seed = arguments.first + 1000 * n_files + k
-            results.append(judged(seed, n_files, arguments.by_file, frozenset(arguments.without)))
+            results.append(
+                judged(
+                    seed,
+                    n_files,
+                    (0.0, *arguments.severities),
+                    by_file=arguments.by_file,
+                    without=frozenset(arguments.without),
+                )
+            )
             print(f"robot {seed}: {results[-1]}", file=sys.stderr, flush=True)
         print(row(n_files, results), flush=True)
 
@@ -164,7 +195,7 @@ def row(n_files: int, results: list[dict[float, tuple[float, str]]]) -> str:
     alarms = sum(one[0.0][1] in ("changed", "fault") for one in results)
     uniform = kstest(known, "uniform").pvalue
     cells = [f"{n_files},{len(results)},{len(results) - len(known)},{alarms},{uniform:.3f}"]
-    for severity in SEVERITIES:
+    for severity in sorted(set(results[0]) - {0.0}):
         found = sum(one[severity][1] in ("changed", "fault") for one in results)
         p = np.array([one[severity][0] for one in results])
         above = (p[:, np.newaxis] < known) + 0.5 * (p[:, np.newaxis] == known)

@@ -11,6 +11,7 @@ import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from math import factorial
 from pathlib import Path
@@ -383,8 +384,12 @@ def table_input(path: Path) -> tuple[Path, str]:
     return path, file_sha256(path)
 
 
-def library_versions() -> dict[str, str]:
-    """Return the versions of opamc and of the libraries that its numbers depend on."""
+@cache
+def library_versions() -> Mapping[str, str]:
+    """Return the versions of opamc and of the libraries that its numbers depend on.
+
+    Asked once: each answer of importlib.metadata reads a file, and a night writes a dozen tables.
+    """
     versions = {name: version(name) for name in LIBRARIES}
     return {"opamc": __version__, "python": platform.python_version(), **versions}
 
