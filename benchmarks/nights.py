@@ -2,9 +2,9 @@
 
 Each virtual robot has one joint. Its temperature, friction, gain and offset are drawn once a
 night; the files of a night share them. One more healthy night is held against the baseline's, and
-three with damage. `--by-file` takes each file for a session of its own, as it must not be. Tables
-are kept in `benchmarks/out/nights`, so that another decision is tried in seconds: remove them when
-anything before the decision changes.
+others with damage, or with more friction. `--by-file` takes each file for a session of its own, as
+it must not be. Tables are kept in `benchmarks/out/nights`, so that another decision is tried in
+seconds: remove them when anything before the decision changes.
 
     python benchmarks/nights.py --quick
     python benchmarks/nights.py --robots 140 --first 5000
@@ -15,7 +15,7 @@ import pickle
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -32,6 +32,7 @@ from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.decision.judge import judge
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.storage.sources import RunSource
+from opamc_cli.testbed.parameters import Robot
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -42,15 +43,45 @@ FILES = (1, 4, 16)
 SEVERITIES = (0.1, 0.25, 0.5)
 
 
+@dataclass(frozen=True)
+class Night:
+    """What is wrong in a target night: damage of the gear, or friction that has grown evenly."""
+
+    severity: float = 0.0
+    friction: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Name of its tables."""
+        return f"{self.severity:g}" if self.friction == 1 else f"friction {self.friction:g}"
+
+
+HEALTHY = Night()
+
+
 @cache
 def testbed() -> TestbedConfig:
     """Return the shipped robot and program."""
     return load_testbed(ROOT / "configs" / "testbed.yaml")
 
 
-def record(
-    seed: int, n_nights: int, n_files: int, severities: Sequence[float], folder: Path
-) -> None:
+def rubbed(robot: Robot, factor: float) -> Robot:
+    """Return the robot with more friction in its joints."""
+    joints = []
+    for joint in robot.joints:
+        own = joint.friction
+        more = {
+            name: factor * getattr(own, name)
+            for name in (
+                *("coulomb_nm", "viscous_nms_per_rad"),
+                *("output_coulomb_nm", "output_viscous_nms_per_rad"),
+            )
+        }
+        joints.append(replace(joint, friction=replace(own, **more)))
+    return replace(robot, joints=tuple(joints))
+
+
+def record(seed: int, n_nights: int, n_files: int, targets: Sequence[Night], folder: Path) -> None:
     """Write one run per night; each of its cycles stands for a file."""
     config = testbed()
     spread = replace(config.robot.spread, temperature_c=5.0)
@@ -65,10 +96,10 @@ def record(
         dwell_jitter_s=0.02,
     )
     for night in range(n_nights + 1):
-        for severity in severities if night == n_nights else (0.0,):
-            damage = {AXIS: replace(robot.damage, severity=severity)} if severity else {}
+        for one in targets if night == n_nights else (HEALTHY,):
+            damage = {AXIS: replace(robot.damage, severity=one.severity)} if one.severity else {}
             signals = simulate(
-                robot,
+                robot if one.friction == 1 else rubbed(robot, one.friction),
                 program,
                 seed=seed,
                 session=night,
@@ -76,7 +107,7 @@ def record(
                 faults=damage,
                 sampling_rate_hz=RATE_HZ,
             ).axes[AXIS]
-            name = f"target/{severity:g}" if night == n_nights else f"baseline/{night}"
+            name = f"target/{one.name}" if night == n_nights else f"baseline/{night}"
             save_run(
                 folder / f"{name}.parquet",
                 RunInfo(sampling_rate_hz=RATE_HZ),
@@ -87,16 +118,18 @@ def record(
             )
 
 
-def tables(seed: int, n_files: int, severities: Sequence[float]) -> dict[str, dict[str, pa.Table]]:
+def tables(seed: int, n_files: int, targets: Sequence[Night]) -> dict[str, dict[str, pa.Table]]:
     """Return one robot's tables by side and name; what was recorded before is read."""
     path = CACHE / f"{n_files}-files-{seed}.pickle"
     if path.exists():
-        return pickle.loads(path.read_bytes())
+        kept: dict[str, dict[str, pa.Table]] = pickle.loads(path.read_bytes())
+        if all(f"target-{one.name}" in kept for one in targets):
+            return kept
     config = load_config()
     found: dict[str, dict[str, pa.Table]] = {}
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        record(seed, 3 + seed % 6, n_files, severities, folder)
+        record(seed, 3 + seed % 6, n_files, targets, folder)
         reference = None
         for side in ("baseline", "target"):
             done = run_chain([folder / side], config, folder / "out" / side, reference=reference)
@@ -106,9 +139,9 @@ def tables(seed: int, n_files: int, severities: Sequence[float]) -> dict[str, di
                 name: table.replace_schema_metadata(None)
                 for name, table in {"patterns": made.patterns, **made.witnesses}.items()
             }
-    for severity in severities:
-        found[f"target-{severity:g}"] = {
-            name: table.filter(pc.equal(table["run"], f"{severity:g}"))
+    for one in targets:
+        found[f"target-{one.name}"] = {
+            name: table.filter(pc.equal(table["run"], one.name))
             for name, table in found["target"].items()
         }
     del found["target"]
@@ -139,21 +172,20 @@ def by_files(of_side: dict[str, pa.Table], by_file: bool) -> Side:
 def judged(
     seed: int,
     n_files: int,
-    severities: Sequence[float] = (0.0, *SEVERITIES),
+    targets: Sequence[Night],
     *,
     by_file: bool = False,
     without: frozenset[str] = frozenset(),
-) -> dict[float, tuple[float, str]]:
-    """Return p and state by severity of one robot's target night."""
-    made = tables(seed, n_files, severities)
+) -> dict[Night, tuple[float, str]]:
+    """Return p and state of one robot's target nights."""
+    made = tables(seed, n_files, targets)
     own = by_files(made["baseline"], by_file)
     found = {}
-    for severity in severities:
-        sides = Sides(own, by_files(made[f"target-{severity:g}"], by_file))
-        bundle = bundles(sides)[AXIS]
-        kept = {name: one for name, one in bundle.witnesses.items() if name not in without}
+    for one in targets:
+        bundle = bundles(Sides(own, by_files(made[f"target-{one.name}"], by_file)))[AXIS]
+        kept = {name: kind for name, kind in bundle.witnesses.items() if name not in without}
         judgement = judge({AXIS: replace(bundle, witnesses=kept)})[AXIS]
-        found[severity] = (judgement.p_value, judgement.state)
+        found[one] = (judgement.p_value, judgement.state)
     return found
 
 
@@ -164,12 +196,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
     parser.add_argument("--files", type=int, nargs="*", default=list(FILES))
     parser.add_argument("--severities", type=float, nargs="*", default=list(SEVERITIES))
+    parser.add_argument("--friction", type=float, nargs="*", default=[], help="1.3: 30 % more")
     parser.add_argument("--by-file", action="store_true")
     parser.add_argument("--without", nargs="*", default=[], help="witnesses that are not asked")
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     n_robots = 4 if arguments.quick else arguments.robots
-    each = ",".join(f"found at {s:g},AUC {s:g}" for s in arguments.severities)
+    faulty = [*(Night(s) for s in arguments.severities), *(Night(0, f) for f in arguments.friction)]
+    each = ",".join(f"found at {one.name},AUC {one.name}" for one in faulty)
     print(f"files a night,robots,not judged,healthy alarms,KS p,{each}")
     for n_files in arguments.files:
         results = []
@@ -179,25 +213,30 @@ def main() -> None:
                 judged(
                     seed,
                     n_files,
-                    (0.0, *arguments.severities),
+                    (HEALTHY, *faulty),
                     by_file=arguments.by_file,
                     without=frozenset(arguments.without),
                 )
             )
-            print(f"robot {seed}: {results[-1]}", file=sys.stderr, flush=True)
+            print(
+                seed,
+                {one.name: p for one, (p, _) in results[-1].items()},
+                file=sys.stderr,
+                flush=True,
+            )
         print(row(n_files, results), flush=True)
 
 
-def row(n_files: int, results: list[dict[float, tuple[float, str]]]) -> str:
+def row(n_files: int, results: list[dict[Night, tuple[float, str]]]) -> str:
     """Summarise the robots of one number of files."""
-    healthy = np.array([one[0.0][0] for one in results])
+    healthy = np.array([one[HEALTHY][0] for one in results])
     known = healthy[np.isfinite(healthy)]
-    alarms = sum(one[0.0][1] in ("changed", "fault") for one in results)
+    alarms = sum(one[HEALTHY][1] in ("changed", "fault") for one in results)
     uniform = kstest(known, "uniform").pvalue
     cells = [f"{n_files},{len(results)},{len(results) - len(known)},{alarms},{uniform:.3f}"]
-    for severity in sorted(set(results[0]) - {0.0}):
-        found = sum(one[severity][1] in ("changed", "fault") for one in results)
-        p = np.array([one[severity][0] for one in results])
+    for night in list(results[0])[1:]:
+        found = sum(one[night][1] in ("changed", "fault") for one in results)
+        p = np.array([one[night][0] for one in results])
         above = (p[:, np.newaxis] < known) + 0.5 * (p[:, np.newaxis] == known)
         cells.append(f"{found},{above.mean():.3f}")
     return ",".join(cells)

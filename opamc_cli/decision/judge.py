@@ -218,7 +218,14 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         axis: one_session_log_ratio(cells[axis]) for axis in axes if methods[axis] == "one-session"
     }
     pooled: dict[tuple[int, str], FloatArray] = {}
-    together = _Comparison(cells, methods, evidence, weigh_together(each), lone, policy, pooled)
+    ranking = {
+        axis: {name: kind for name, kind in kinds.items() if kind.ranks}
+        for axis, kinds in evidence.items()
+    }
+    weighed = weigh_together(
+        {axis: {name: each[axis][name] for name in kinds} for axis, kinds in ranking.items()}
+    )
+    together = _Comparison(cells, methods, ranking, weighed, lone, policy, pooled)
     alone_by_witness = {
         name: _Comparison(
             cells,
@@ -231,42 +238,41 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         )
         for name in dict.fromkeys([PATTERNS, *(n for kinds in evidence.values() for n in kinds)])
     }
-    shifts = together.shifts
-    common = {axis: common_log_ratio(shifts, axis) if axis in evidence else 0.0 for axis in axes}
     witnesses = {
         axis: {name: one.p_value(axis) for name, one in alone_by_witness.items()}
         for axis in axes
         if axis in evidence
     }
-    p_values = {
-        axis: _beyond_ranks(
-            together.p_value(axis), together.lowest_step(axis), witnesses.get(axis, {})
-        )
-        for axis in axes
-    }
+    p_values, p_alone, shifts, common = {}, {}, {}, {}
+    for axis in axes:
+        heard, times = together, 1
+        step, own = together.lowest_step(axis), witnesses.get(axis, {})
+        p_values[axis] = _beyond_ranks(together.p_value(axis), step, own)
+        for name, kind in evidence.get(axis, {}).items():
+            sure = len(own) * own[name]
+            if not kind.ranks and sure < min(p_values[axis], step):
+                heard, times, p_values[axis] = alone_by_witness[name], len(own), sure
+        shifts[axis] = heard.shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
+        common[axis] = common_log_ratio(heard.shifts, axis) if axis in evidence else 0.0
+        p_alone[axis] = p_values[axis]
+        if common[axis]:
+            p_alone[axis] = max(p_values[axis], times * heard.p_value(axis, common[axis]))
     witnesses |= {axis: {PATTERNS: p_values[axis]} for axis in axes if axis not in evidence}
-    p_alone = {
-        axis: max(p_values[axis], together.p_value(axis, common[axis]))
-        if common[axis]
-        else p_values[axis]
-        for axis in axes
-    }
     adjusted = dict(zip(axes, holm([p_values[axis] for axis in axes]).tolist(), strict=True))
     alone = dict(zip(axes, holm([p_alone[axis] for axis in axes]).tolist(), strict=True))
     judgements = {}
     for axis in axes:
         known = methods[axis] != "none"
-        shift = shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
         every = {PATTERNS: PatternEvidence(cells[axis]), **bundles[axis].witnesses}
         effects = {name: kind.effect() if known else math.nan for name, kind in every.items()}
         judgement = Judgement(
             state="healthy",
-            health_index=_health_index(shift),
+            health_index=_health_index(shifts[axis]),
             p_value=p_values[axis],
             p_adjusted=adjusted[axis],
             p_alone=alone[axis],
             common_log_ratio=common[axis],
-            distance_ratio=math.exp(min(shift.log_ratio, 100.0)),
+            distance_ratio=math.exp(min(shifts[axis].log_ratio, 100.0)),
             effects=effects,
             witnesses=witnesses[axis],
             method=methods[axis],

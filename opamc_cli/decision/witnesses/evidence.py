@@ -23,6 +23,10 @@ class Evidence(Protocol):
     """One way of telling sessions apart; sessions are numbered, baseline first."""
 
     @property
+    def ranks(self) -> bool:
+        """Whether sessions are ranked by it; if not, it counts where it is sure by itself."""
+
+    @property
     def cells(self) -> Sequence[object]:
         """What it rests on, one for each motion; nothing is known without any."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -174,6 +175,7 @@ class PatternEvidence:
     """
 
     cells: Sequence[Cell]
+    ranks: ClassVar[bool] = True
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
         """Return the log of the mean divergence, each in units of the rest's own.

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,6 +121,7 @@ class ProfileEvidence:
 
     cells: Sequence[ProfileCell]
     n_baseline: int
+    ranks: ClassVar[bool] = False
 
     def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
         """Return the log of the squared deviation, the mean of that of size and of shape."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,6 +62,7 @@ class SpectrumEvidence:
 
     cells: Sequence[SpectrumCell]
     n_baseline: int
+    ranks: ClassVar[bool] = True
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
         """Return the log of the squared deviation, averaged over frames, bins and motions."""
