@@ -247,13 +247,17 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     for axis in axes:
         heard, times = together, 1
         step, own = together.lowest_step(axis), witnesses.get(axis, {})
-        p_values[axis] = _beyond_ranks(together.p_value(axis), step, own)
+        asked = sum(math.isfinite(p) for p in own.values())
+        ranked = [own[name] for name in ranking.get(axis, {})]
+        p_values[axis] = _beyond_ranks(together.p_value(axis), step, ranked, asked)
         for name, kind in evidence.get(axis, {}).items():
-            sure = len(own) * own[name]
+            sure = asked * own[name]
             if not kind.ranks and sure < min(p_values[axis], step):
-                heard, times, p_values[axis] = alone_by_witness[name], len(own), sure
+                heard, times, p_values[axis] = alone_by_witness[name], asked, sure
         shifts[axis] = heard.shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
-        common[axis] = common_log_ratio(heard.shifts, axis) if axis in evidence else 0.0
+        # who speaks for itself has to be odd among all siblings, not only among most
+        others = common_log_ratio(heard.shifts, axis, largest=heard is not together)
+        common[axis] = others if axis in evidence else 0.0
         p_alone[axis] = p_values[axis]
         if common[axis]:
             p_alone[axis] = max(p_values[axis], times * heard.p_value(axis, common[axis]))
@@ -285,17 +289,17 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     return judgements
 
 
-def _beyond_ranks(p_value: float, step: float, witnesses: Mapping[str, float]) -> float:
+def _beyond_ranks(p_value: float, step: float, ranked: Sequence[float], asked: int) -> float:
     """Say how improbable a shift is that exceeds all healthy ones.
 
     Ranks say no more of it than the lowest step. The soft maximum has a longer tail than its parts
     have, which a Student tail does not know: below the step the p-value is that of the witness
     that is surest, times the number that were asked (Bonferroni).
     """
-    known = [p for p in witnesses.values() if math.isfinite(p)]
-    if len(known) < 2 or not p_value <= step:
+    known = [p for p in ranked if math.isfinite(p)]
+    if asked < 2 or not known or not p_value <= step:
         return p_value
-    return min(step, len(known) * min(known))
+    return min(step, asked * min(known))
 
 
 class _Comparison:
@@ -445,7 +449,7 @@ def one_session_shift(log_ratios: Mapping[int, float], axis: int) -> Shift:
     return Shift(log_ratios[axis] - centre, blended.scale, Spread(scale, blended.dof))
 
 
-def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
+def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = False) -> float:
     """Shift that the siblings of a joint have in common.
 
     Parameters
@@ -454,6 +458,8 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
         All joints of the session.
     axis : int
         The joint in question.
+    largest : bool
+        The largest of the siblings' shifts instead of their median.
 
     Returns
     -------
@@ -464,8 +470,9 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int) -> float:
     others = [shift for key, shift in shifts.items() if key != axis]
     if len(others) < 2:
         return 0.0
-    plain = float(np.median([shift.log_ratio for shift in others]))
-    scaled = float(np.median([shift.log_ratio / shift.spread.scale for shift in others]))
+    over = np.max if largest else np.median
+    plain = float(over([shift.log_ratio for shift in others]))
+    scaled = float(over([shift.log_ratio / shift.spread.scale for shift in others]))
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
