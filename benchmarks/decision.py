@@ -48,7 +48,7 @@ from opamc_cli.testbed.robot import simulate
 ROOT = Path(__file__).resolve().parents[1]
 CACHE = Path(__file__).resolve().parent / "out" / "decision"
 
-CHAIN = ("segment", "carrier_segments", "segment_rows", "identify", "envelope", "patterns")
+RECORDED_BY = ("testbed", "signal", "stages/chain", "stages/recordings")
 SEVERITIES = (0.0, 0.1, 0.25, 0.5, 1.0)
 ORDERS = (4, 5)
 AXES = (1, 2, 3, 4, 5, 6)
@@ -235,9 +235,11 @@ def source_digest() -> str:
     """Digest of everything the recordings depend on, so that no cache outlives its testbed."""
     files = [
         ROOT / "configs" / "testbed.yaml",
-        *sorted((ROOT / "opamc_cli" / "testbed").glob("*.py")),
-        *sorted((ROOT / "opamc_cli" / "signal").glob("*.py")),
-        *(ROOT / "opamc_cli" / "stages" / f"{name}.py" for name in CHAIN),
+        *(
+            file
+            for part in RECORDED_BY
+            for file in sorted((ROOT / "opamc_cli" / part).rglob("*.py"))
+        ),
         Path(rivals.__file__),
     ]
     return hashlib.sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
@@ -292,7 +294,7 @@ def evaluate(job) -> list[dict]:
 
 
 def judge_digest() -> str:
-    files = [*sorted((ROOT / "opamc_cli" / "stats").glob("*.py")), Path(rivals.__file__)]
+    files = [*sorted((ROOT / "opamc_cli" / "decision").rglob("*.py")), Path(rivals.__file__)]
     return hashlib.sha256(b"".join(f.read_bytes() for f in files)).hexdigest()
 
 

@@ -26,10 +26,10 @@ from scipy.stats import kstest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.chain.to_patterns import run_chain
-from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.decision.judge import judge
+from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.storage.sources import RunSource
 from opamc_cli.testbed.parameters import Robot

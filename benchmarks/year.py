@@ -19,13 +19,14 @@ import tempfile
 import time
 from dataclasses import asdict, dataclass, field, replace
 from datetime import date, timedelta
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from opamc_cli.config import load_config
 from opamc_cli.config.cell import AlarmConfig
-from opamc_cli.config.testbed import load_testbed
+from opamc_cli.config.testbed import TestbedConfig, load_testbed
 from opamc_cli.stages.chain import identify, patterns, segment
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.kept import KeptResults
@@ -99,9 +100,15 @@ def lives(n_robots: int, n_nights: int, first_seed: int) -> list[Life]:
     return drawn
 
 
+@cache
+def testbed() -> TestbedConfig:
+    """Return the robot of data/samples."""
+    return load_testbed(ROOT / "configs" / "samples.yaml")
+
+
 def record(life: Life, night: int, folder: Path) -> Path:
     """Record one night of a robot; three cycles of two motions of all joints together, 6 s."""
-    config = load_testbed(ROOT / "configs" / "samples.yaml")
+    config = testbed()
     rng = np.random.default_rng([life.seed, night, 7])
     ambient = 22 + SEASON_K * np.sin(2 * np.pi * (night + life.season_phase) / 365)
     ambient += COLD_K if rng.random() < COLD_SHARE else 0.0
@@ -237,9 +244,9 @@ Cell = list[tuple[Life, list[Measured]]]
 
 
 def measured_cell(n_robots: int, n_nights: int, first_seed: int, only_known: bool) -> Cell:
-    """Measure every robot of a cell; what was measured before is read."""
+    """Measure every robot of a cell, those that wear first; what was measured before is read."""
     cell = []
-    for life in lives(n_robots, n_nights, first_seed):
+    for life in sorted(lives(n_robots, n_nights, first_seed), key=lambda one: not one.wearing_axis):
         path = CACHE / f"{first_seed}-{n_nights}" / f"robot-{life.seed}.json"
         if not path.exists():
             if only_known:
