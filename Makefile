@@ -1,13 +1,13 @@
 # Two commands set everything up on a machine that has only Python and make:
 #   make demo   environment, install, a diagnosis of data/samples, a report
-#   make test   the test suite
+#   make test   the tests but the long ones: three minutes on two cores (make test-all: all)
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
 STAMP  := $(VENV)/.installed
 
 .DEFAULT_GOAL := help
-.PHONY: fuzz kill faults help install demo demo-nightly test lint types check samples bench studies clean
+.PHONY: fuzz kill faults help install demo demo-nightly test test-all lint types check samples bench studies clean
 
 help:  ## Show the targets
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 16
@@ -29,8 +29,14 @@ demo-nightly: $(STAMP)  ## Three virtual robots, ten nights, one joint that wear
 	@$(BIN)/opamc nightly opamc-cell/cell.yaml --since 2026-03-01 --jobs 0 || test $$? -eq 1
 	@echo "open $(CURDIR)/opamc-cell/nightly/index.html"
 
-test: $(STAMP)  ## Run the test suite on all cores
-	$(BIN)/python -m pytest -n auto --dist loadfile -q
+# a file's tests stay together for their fixtures, until one core would wait for the other
+PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal -q
+
+test: $(STAMP)  ## Run the tests that take three minutes, on all cores
+	$(PYTEST) -m 'not long'
+
+test-all: $(STAMP)  ## Run all tests, as CI does
+	$(PYTEST)
 
 lint: $(STAMP)  ## ruff: lint and format check
 	$(BIN)/ruff check .
@@ -39,7 +45,7 @@ lint: $(STAMP)  ## ruff: lint and format check
 types: $(STAMP)  ## mypy, strict
 	$(BIN)/mypy
 
-check: lint types test  ## Everything that CI runs
+check: lint types test-all  ## Everything that CI runs
 
 samples: $(STAMP)  ## Record data/samples anew with the virtual testbed
 	$(BIN)/opamc simulate --config configs/samples.yaml --seed 20210801 --no-truth-signals \

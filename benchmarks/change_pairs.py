@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "joint"))
+sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from simulator import simulate as simulate_joint
 
 from opamc_cli.config.testbed import load_testbed

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
+sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
 from opamc_cli.joint.effects.library import built_in_library

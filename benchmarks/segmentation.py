@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.append(str(Path(__file__).parents[1] / "tests" / "signal"))
+sys.path.append(str(Path(__file__).parent / "sources"))
 from axis import segments_of
 from carriers import Move, Recording, Torque, record
 

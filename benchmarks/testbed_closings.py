@@ -1,6 +1,6 @@
 """The loop on the virtual testbed, every effect in turn: `benchmarks/loop.py --testbed`.
 
-The recordings are those of the tests (`tests/joint/testbed_closing.py`): the joint of
+The recordings are those of the tests (`sources/testbed_closing.py`): the joint of
 configs/closing.yaml, about 40 s at 1024 Hz. The oracle is the same session without the effect.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "joint"))
+sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from testbed_closing import EFFECTS, SENSING, close_on_testbed, error_on, names_of, record
 
 from opamc_cli.joint.motion.track import Floats

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 
 from opamc_cli.commands.terminal.streams import open_streams, say
-from opamc_cli.errors import ExitCode, OpamcError, UsageError
-from opamc_cli.stages.processes.interruption import Interrupted, interruptible
+from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
+from opamc_cli.stages.processes.interruption import interruptible
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -51,3 +51,19 @@ class LockedError(OpamcError):
     """Another process is writing to the same output directory."""
 
     exit_code = ExitCode.LOCKED
+
+
+class Interrupted(SystemExit):
+    """A signal that ends the command, with the exit code 128 and its number."""
+
+    code: int
+
+    def __init__(self, number: int) -> None:
+        super().__init__(128 + number)
+        from signal import Signals  # which takes milliseconds; who raises this has it
+
+        self._name = Signals(number).name
+
+    def __str__(self) -> str:
+        """Say what happened."""
+        return f"ended by {self._name}; what was not finished is as it was before"

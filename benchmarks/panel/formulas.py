@@ -10,7 +10,7 @@ import numpy as np
 from panel.case import RIGID, SIZES, Case, Logged, Wanted
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "joint"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "sources"))
 import algebraic_joint
 import simulator
 

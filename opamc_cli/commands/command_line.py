@@ -18,8 +18,7 @@ from opamc_cli.commands.recordings import example, ingest, simulate
 from opamc_cli.commands.terminal.plain import PlainCommand
 from opamc_cli.commands.tuning import select, sweep
 from opamc_cli.commands.verdict import decide, diagnose, report
-from opamc_cli.errors import ExitCode
-from opamc_cli.stages.processes.interruption import Interrupted
+from opamc_cli.errors import ExitCode, Interrupted
 
 COMMANDS: dict[str, Callable[..., None]] = {
     "ingest": ingest.ingest,

@@ -67,7 +67,7 @@ def _checked(kind: str, file: Path, overrides: list[str]) -> "BaseModel":
     from opamc_cli.config.cell import load_cell
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.config.testbed import load_testbed
-    from opamc_cli.storage.ingest.map.map_file import load_map
+    from opamc_cli.storage.ingest.map.load import load_map
 
     if kind == "testbed":
         return load_testbed(file, overrides)

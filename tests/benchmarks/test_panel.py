@@ -1,13 +1,9 @@
 """The panel's own arithmetic, and its two-mass joint."""
 
-import sys
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 from panel import run, table, two_mass, two_mass_cases
 from panel.case import RIGID, Case, Wanted
 

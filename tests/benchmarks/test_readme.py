@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).parents[2]
-sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "tests" / "storage")]
+sys.path[:0] = [str(ROOT / "tests" / "storage")]
 
 import foreign  # noqa: E402
 import readme  # noqa: E402
@@ -72,14 +72,14 @@ def test_a_map_of_the_readme_is_ten_lines_at_most():
         assert len(yaml.safe_dump(yaml.safe_load(block)).splitlines()) <= 10
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_the_readme_shows_is_what_its_commands_print():
     check = [sys.executable, str(ROOT / "benchmarks" / "readme.py"), "--check"]
     ended = subprocess.run(check, capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_ros_bag_ends_in_a_verdict(logs, tmp_path):
     for path in sorted((logs / "logs").rglob("*.csv")):
         target = tmp_path / "bags" / path.parent.name
@@ -97,7 +97,7 @@ def test_a_ros_bag_ends_in_a_verdict(logs, tmp_path):
     assert "(A)" not in page
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_foreign_parquet_ends_in_a_verdict(logs, tmp_path):
     for path in sorted((logs / "logs").rglob("*.csv")):
         r = read_log(path)
@@ -115,7 +115,7 @@ def test_a_foreign_parquet_ends_in_a_verdict(logs, tmp_path):
     check_found(verdict_of(tmp_path, given))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.measured
 def test_a_measured_arm_ends_in_a_closed_loop(tmp_path):
     if not readme.MEASURED.exists():

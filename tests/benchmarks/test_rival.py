@@ -1,13 +1,10 @@
 """The plain rival of the loop is no straw man: it finds what is large."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import plain
+import pytest
 
 KINOVA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 

@@ -8,46 +8,19 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import bad_runs
 import numpy as np
 import pytest
 
-from opamc_cli.__main__ import main
 from opamc_cli.commands.command_line import COMMANDS
 from opamc_cli.errors import ExitCode
 from opamc_cli.storage.files.lock import output_lock
+from tests.conftest import Ended
 
 ROOT = Path(__file__).parents[2]
 MAP = "sampling_rate_hz: 10\nheader: false\ncolumns: {axis1_a: {source: 0, unit: A}}\n"
-
-
-@dataclass(frozen=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-    @property
-    def sentences(self) -> list[str]:
-        return [line for line in self.err.splitlines() if line.startswith("opamc: ")]
-
-
-@pytest.fixture
-def opamc(capsys) -> Callable[..., Ended]:
-    def call(*arguments: object) -> Ended:
-        capsys.readouterr()
-        code = 0
-        try:
-            main([str(a) for a in arguments])
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        captured = capsys.readouterr()
-        return Ended(code, captured.out, captured.err)
-
-    return call
 
 
 def check_refusal(ended: Ended, code: ExitCode, *parts: str) -> None:

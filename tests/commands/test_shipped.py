@@ -40,7 +40,7 @@ def main_ends(arguments, code=0):
     assert int(ended.value.code or 0) == code
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_wheel_holds_what_is_shipped(tmp_path):
     wheel = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(tmp_path)]
     source = tmp_path / "source"

@@ -1,41 +1,11 @@
-"""How the tests of this folder call the command, and the recordings that they share."""
+"""The recordings that the tests of this folder share."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 from fuzz import ALONE
 from fuzz import call as called
 from recordings import record
-
-from opamc_cli.__main__ import main
-
-
-@dataclass(frozen=True)
-class Ended:
-    code: int
-    out: str
-    err: str
-
-    @property
-    def sentences(self) -> list[str]:
-        return [line for line in self.err.splitlines() if line.startswith("opamc: ")]
-
-
-@pytest.fixture
-def opamc(capsys) -> Callable[..., Ended]:
-    def call(*arguments: object) -> Ended:
-        capsys.readouterr()
-        code = 0
-        try:
-            main([str(a) for a in arguments])
-        except SystemExit as ended:
-            code = int(ended.code or 0)
-        captured = capsys.readouterr()
-        return Ended(code, captured.out, captured.err)
-
-    return call
 
 
 @pytest.fixture(scope="session")

@@ -8,7 +8,7 @@ import pytest
 
 from opamc_cli.errors import ConfigError, InputError, UsageError
 from opamc_cli.stages.recordings import ingest
-from opamc_cli.storage.ingest.map.map_file import load_map
+from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.runs import Run, file_sha256
 
 

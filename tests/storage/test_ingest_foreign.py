@@ -10,7 +10,7 @@ import yaml
 from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
-from opamc_cli.storage.ingest.map.map_file import load_map
+from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.runs import Run
 
 LATE = 0.6

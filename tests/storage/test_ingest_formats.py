@@ -8,7 +8,7 @@ from nptdms import ChannelObject, RootObject, TdmsWriter
 
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings import ingest
-from opamc_cli.storage.ingest.map.map_file import load_map
+from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.ingest.source import BLOCK_ROWS
 from opamc_cli.storage.runs import Run
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.stages.recordings import ingest
-from opamc_cli.storage.ingest.map.map_file import load_map
+from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.runs import Run
 
 ROOT = Path(__file__).parents[2]

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.convert import convert
-from opamc_cli.storage.ingest.map.map_file import IngestMap, load_map
+from opamc_cli.storage.ingest.map.load import load_map
+from opamc_cli.storage.ingest.map.map_file import IngestMap
 from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import examine
 from opamc_cli.storage.runs import Run

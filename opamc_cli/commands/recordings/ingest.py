@@ -56,7 +56,7 @@ def ingest(
         _guess(files, output)
         return
     from opamc_cli.stages.recordings import ingest as stage
-    from opamc_cli.storage.ingest.map.map_file import load_map
+    from opamc_cli.storage.ingest.map.load import load_map
 
     own_map = map_file is None
     if map_file is None:

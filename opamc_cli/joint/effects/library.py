@@ -5,7 +5,7 @@ import inspect
 from difflib import get_close_matches
 from pathlib import Path
 
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, Interrupted
 from opamc_cli.joint.effects.asymmetric_friction import AsymmetricFriction
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.coulomb import Coulomb
@@ -30,7 +30,6 @@ from opamc_cli.joint.effects.thermal_viscous import ThermalViscous
 from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.effects.viscous import Viscous
 from opamc_cli.joint.effects.warmup import Warmup
-from opamc_cli.stages.processes.interruption import Interrupted
 
 BUILT_IN: tuple[type[Effect], ...] = (
     Inertia,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import InputError
-from opamc_cli.stages.chain.compared.sessions import night_of
+from opamc_cli.stages.recordings.sessions import night_of
 from opamc_cli.storage.history import FileRow, History
 from opamc_cli.storage.logs import Facts, LogFile, fetch, find_logs, read_facts
 

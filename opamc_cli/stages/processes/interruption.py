@@ -8,6 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+from opamc_cli.errors import Interrupted
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:
     from sys import UnraisableHookArgs
@@ -15,20 +17,6 @@ if TYPE_CHECKING:
 SIGNALS = tuple(
     getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
 )
-
-
-class Interrupted(SystemExit):
-    """A signal that ends the command, with the exit code 128 and its number."""
-
-    code: int
-
-    def __init__(self, number: int) -> None:
-        super().__init__(128 + number)
-        self._name = signal.Signals(number).name
-
-    def __str__(self) -> str:
-        """Say what happened."""
-        return f"ended by {self._name}; what was not finished is as it was before"
 
 
 AGAIN_S = 0.01

@@ -18,10 +18,10 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 )
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
-from opamc_cli.stages.chain.compared.sessions import Sessions, lie_in_folders, sessions_of
 from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, current_offset, read_envelope
+from opamc_cli.stages.recordings.sessions import Sessions, lie_in_folders, sessions_of
 from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
 from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
 

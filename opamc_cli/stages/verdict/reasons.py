@@ -12,7 +12,7 @@ from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
 from opamc_cli.decision.witnesses.patterns import Cell, effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
-from opamc_cli.stages.chain.compared.sessions import started
+from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.sources import RunSource, current_unit
 
 INSPECT = (

@@ -15,9 +15,9 @@ from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Bundle, Judgement, Policy, judge
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
-from opamc_cli.stages.chain.compared.sessions import Sessions, started
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
+from opamc_cli.stages.recordings.sessions import Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.stages.verdict.reasons import reasons

@@ -1,20 +1,17 @@
 """Stage `segment` on run files: carriers, reported currents, never still, and what it refuses."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from carriers import Move, record
 
 from opamc_cli.config import Config
 from opamc_cli.errors import InputError
 from opamc_cli.stages.chain import segment
 from opamc_cli.storage.runs import RunInfo, save_run, write_run
-
-sys.path.append(str(Path(__file__).parents[2] / "signal"))
-from carriers import Move, record
 
 SHARED = Path(__file__).parents[4] / "shared" / "data"
 MOVES = [Move(157, 1), Move(157, -1), Move(100, 1), Move(157, -1)]

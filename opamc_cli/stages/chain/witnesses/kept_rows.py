@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from opamc_cli.stages.chain.compared.sessions import Sessions
+from opamc_cli.stages.recordings.sessions import Sessions
 from opamc_cli.storage.tables import PATTERNS
 
 Floats = npt.NDArray[np.float64]

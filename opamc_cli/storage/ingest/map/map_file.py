@@ -7,11 +7,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from opamc_cli.config.files import read_values, validate
-from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
-from opamc_cli.storage.ingest.map.axes import expand, has_placeholder, protect
+from opamc_cli.storage.ingest.map.axes import expand, has_placeholder
 from opamc_cli.storage.ingest.map.units import QUANTITY_OF_KIND, conversion
 from opamc_cli.storage.ingest.source import Listed, Name
 
@@ -121,22 +119,6 @@ class IngestMap(_Strict):
     resample_hz: Positive | None = None
     time: TimeMap | None = None
     metadata: MetadataMap = MetadataMap()
-
-
-def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
-    """Return a map file or a shipped map by its name, with `key=value` overrides applied.
-
-    Raises
-    ------
-    ConfigError
-        If it cannot be read, or a key, column name, unit or combination is not allowed.
-    """
-    from opamc_cli.storage.ingest.map.check import check_map
-
-    file = shipped_file(path, "maps")
-    channels = validate(IngestMap, read_values(file, overrides, protect), str(path))
-    check_map(path, channels)
-    return channels
 
 
 def for_axes(

@@ -1,11 +1,14 @@
-"""What cannot be in a map, although every key and value is allowed by itself."""
+"""Read a map file, and refuse what cannot be in it although every key and value is allowed."""
 
 import codecs
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
+from opamc_cli.config.files import read_values, validate
+from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
-from opamc_cli.storage.ingest.map.axes import has_placeholder, shown
+from opamc_cli.storage.ingest.map.axes import has_placeholder, protect, shown
 from opamc_cli.storage.ingest.map.map_file import (
     IngestMap,
     RateMap,
@@ -18,6 +21,20 @@ from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_
 CSV_KEYS = frozenset({"separator", "decimal", "header", "encoding", "skip_rows", "units_rows"})
 
 _COLUMN = re.compile(r"axis[1-9][0-9]*_(a|b|c|current|position|velocity|temperature)")
+
+
+def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
+    """Return a map file or a shipped map by its name, with `key=value` overrides applied.
+
+    Raises
+    ------
+    ConfigError
+        If it cannot be read, or a key, column name, unit or combination is not allowed.
+    """
+    file = shipped_file(path, "maps")
+    channels = validate(IngestMap, read_values(file, overrides, protect), str(path))
+    check_map(path, channels)
+    return channels
 
 
 def check_map(path: Path, channels: IngestMap) -> None:
