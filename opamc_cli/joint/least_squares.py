@@ -1,9 +1,10 @@
 """Least squares of scaled sums of products, for regressors of any size and any likeness."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import eigh
 
-from opamc_cli.joint.motion.track import Floats
+Floats = NDArray[np.float64]
 
 SINGULAR_BELOW = 1e-6
 """Of the largest eigenvalue: regressors that differ by less than a thousandth of their size are

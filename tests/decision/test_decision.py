@@ -8,6 +8,7 @@ from scipy.stats import kstest
 
 from opamc_cli.decision.judge import Policy
 from tests.decision.fleet import Fleet, cells, judge
+from tests.marks import long
 
 SEEDS = range(40)
 
@@ -20,9 +21,9 @@ def p_values(plan, seeds=SEEDS):
     "plan",
     [
         Fleet(),
-        Fleet(n_baseline=8, between_sessions=0.4, influences=2),
-        Fleet(n_baseline=5, n_target=5, n_axes=3),
-        Fleet(n_baseline=4, n_target=3, n_axes=3, between_sessions=0.3),
+        long(Fleet(n_baseline=8, between_sessions=0.4, influences=2)),
+        long(Fleet(n_baseline=5, n_target=5, n_axes=3)),
+        long(Fleet(n_baseline=4, n_target=3, n_axes=3, between_sessions=0.3)),
     ],
     ids=["six sessions", "wild sessions", "five and five", "four and three"],
 )
@@ -32,8 +33,8 @@ def test_p_values_of_healthy_joints_are_uniform(plan):
     assert (p <= 0.01).mean() <= 0.03
 
 
-@pytest.mark.parametrize("n_baseline", [1, 2, 3, 6])
-@pytest.mark.parametrize("between_sessions", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("n_baseline", [1, 2, 3, long(6)])
+@pytest.mark.parametrize("between_sessions", [long(0.0), long(0.1), 0.3])
 def test_healthy_joints_stay_healthy(n_baseline, between_sessions):
     plan = Fleet(n_baseline=n_baseline, between_sessions=between_sessions)
     states = [j.state for seed in SEEDS for j in judge(cells(plan, seed)).values()]
@@ -42,7 +43,7 @@ def test_healthy_joints_stay_healthy(n_baseline, between_sessions):
     assert len(states) - states.count("healthy") <= allowed
 
 
-@pytest.mark.parametrize("n_baseline", [1, 2, 3, 6])
+@pytest.mark.parametrize("n_baseline", [1, 2, long(3), 6])
 def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
     plan = Fleet(n_baseline=n_baseline, severity=1.0)
     found, others = [], []
@@ -56,6 +57,7 @@ def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
     assert others.count("healthy") >= len(others) - 1
 
 
+@pytest.mark.long
 def test_the_health_index_is_zero_for_healthy_sessions_and_grows_with_severity():
     healthy = [j.health_index for seed in SEEDS for j in judge(cells(Fleet(), seed)).values()]
     assert abs(np.mean(healthy)) < 0.2

@@ -54,6 +54,7 @@ def close(names, orders=()):
     return close_loop(best_fit([session], known, lambda _: declared), library, SEED)
 
 
+@pytest.mark.long
 def test_what_is_found_beside_declared_parts_is_there():
     ratio = recording()[0].gear_ratio
     turn = (ratio + 1) / ratio
@@ -73,6 +74,7 @@ def test_what_is_found_beside_declared_parts_is_there():
     assert loop.rmse_after_a < 0.8 * loop.rmse_before_a
 
 
+@pytest.mark.long
 def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
     loop = close(RIGID)
     assert "time_delay" not in {step.term.effect.name for step in loop.steps}

@@ -16,6 +16,7 @@ from testbed_closing import (
 
 from opamc_cli.joint.loop import Loop
 from opamc_cli.joint.motion.track import Floats, Joint
+from tests.marks import long
 
 SEED = 100
 
@@ -28,15 +29,15 @@ TIED = {"asymmetric_friction"}
 
 
 CASES = [
-    ("gravity", "position and current"),
-    ("asymmetric_friction", "position and current"),
-    ("thermal_viscous", "position and current"),
-    ("elasticity", "position and current"),
     ("ripple", "position and current"),
-    ("sensor_offset", "position and phases"),
-    ("dead_time", "position and phases"),
     ("stribeck", "phases"),
-    ("spring", "phases"),
+    long("gravity", "position and current"),
+    long("asymmetric_friction", "position and current"),
+    long("thermal_viscous", "position and current"),
+    long("elasticity", "position and current"),
+    long("sensor_offset", "position and phases"),
+    long("dead_time", "position and phases"),
+    long("spring", "phases"),
 ]
 """One of every domain; `benchmarks/testbed_closings.py` has all."""
 
@@ -53,7 +54,7 @@ def fall(loop: Loop, healthy_a: Floats) -> float:
     return float((loop.rmse_before_a**2 - loop.rmse_after_a**2) / excess)
 
 
-@pytest.mark.parametrize("sensing", SENSING)
+@pytest.mark.parametrize("sensing", [SENSING[0], *map(long, SENSING[1:])])
 def test_nothing_is_added_to_a_healthy_joint(sensing):
     loop = close_on_testbed((), sensing, SEED)
     assert loop.verdict == "nothing-missing"
@@ -73,6 +74,7 @@ def test_the_missing_effect_is_found_alone(effect, sensing, healthy):
     assert fall(loop, healthy[sensing]) > 0.85
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("effect", "sensing"), sorted(UNTESTABLE))
 def test_what_the_phases_cannot_show_is_said_to_be_untestable(effect, sensing):
     loop = close_on_testbed((effect,), sensing, SEED)
@@ -91,6 +93,7 @@ PAIRS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("pair", "sensing"), PAIRS)
 def test_two_missing_effects_are_both_found(pair, sensing, healthy):
     loop = close_on_testbed(pair, sensing, SEED)
@@ -100,6 +103,7 @@ def test_two_missing_effects_are_both_found(pair, sensing, healthy):
     assert fall(loop, healthy[sensing]) > 0.85
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("effect", "domain", "sensing"),
     [

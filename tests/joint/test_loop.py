@@ -9,6 +9,7 @@ from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.loop import close_loop
+from tests.marks import long
 
 SHAPES = {
     "ripple": lambda q, v, a, t: np.cos(60 * q + 0.4),
@@ -38,15 +39,23 @@ def test_nothing_is_added_where_nothing_is_missing(motion):
     assert not loop.ceiling.certain
 
 
-@pytest.mark.parametrize(("seed", "quantum"), [(4, 1e-5), (9, None), (32, 1e-4), (53, 5e-4)])
+@pytest.mark.parametrize(
+    ("seed", "quantum"), [(4, 1e-5), *(long(*case) for case in [(9, None), (32, 1e-4), (53, 5e-4)])]
+)
 def test_what_an_encoder_rounds_off_is_not_called_missing(seed, quantum):
     _, loop = close_on(seed, (), quantum=quantum, rate=250.0)
     assert loop.verdict == "nothing-missing"
     assert loop.steps == ()
 
 
-@pytest.mark.parametrize("effect", SHAPES)
-@pytest.mark.parametrize("motion", MOTIONS)
+@pytest.mark.parametrize(
+    ("motion", "effect"),
+    [
+        (motion, effect) if (i + j) % len(MOTIONS) == 0 else long(motion, effect)
+        for i, motion in enumerate(MOTIONS)
+        for j, effect in enumerate(SHAPES)
+    ],
+)
 def test_an_effect_of_fifteen_times_the_noise_does_not_hide(motion, effect):
     loop = close(joint_of(motion, SHAPES[effect], strength=15.0))
     assert effect in names_of(loop)[0]
@@ -57,7 +66,11 @@ def test_an_effect_of_fifteen_times_the_noise_does_not_hide(motion, effect):
 
 @pytest.mark.parametrize(
     "effect",
-    ["load_friction", "thermal_viscous", "hysteresis", "elasticity", "time_delay", "coulomb"],
+    [
+        "load_friction",
+        "elasticity",
+        *map(long, ("thermal_viscous", "hysteresis", "time_delay", "coulomb")),
+    ],
 )
 def test_a_missing_effect_of_the_noise_s_size_is_found_named_and_removed(effect):
     made, loop = close_on(1, (effect,), rate=250.0)
@@ -73,6 +86,7 @@ def test_two_missing_effects_are_both_found():
         assert any(effect in names for names in names_of(loop))
 
 
+@pytest.mark.long
 def test_two_runs_of_the_loop_are_equal():
     _, first = close_on(2, ("stribeck",), rate=250.0)
     _, second = close_on(2, ("stribeck",), rate=250.0)
@@ -80,6 +94,7 @@ def test_two_runs_of_the_loop_are_equal():
     assert [s.p_value for s in first.steps] == [s.p_value for s in second.steps]
 
 
+@pytest.mark.long
 def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
     # Of five cycles the last is sealed, and the fourth alone knows the new payload.
     made = simulate(3, (), rate=250.0, cycles=5)
@@ -109,8 +124,12 @@ IMITATED = pytest.mark.xfail(
 
 @pytest.mark.parametrize(
     "effect",
-    ["offset", "asymmetric_friction", "ripple", "mains_hum", "spring", "position_drag"]
-    + [pytest.param(name, marks=IMITATED) for name in ("stribeck", "quadratic_friction")],
+    ["offset", "ripple"]
+    + [long(name) for name in ("asymmetric_friction", "mains_hum", "spring", "position_drag")]
+    + [
+        pytest.param(name, marks=[IMITATED, pytest.mark.long])
+        for name in ("stribeck", "quadratic_friction")
+    ],
 )
 def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
     shapes = SHAPES | {
@@ -143,9 +162,9 @@ LEAK = pytest.mark.xfail(
     ("motion", "margin"),
     [
         (MOTIONS[1], 0.0),
-        (MOTIONS[1], 0.25),
-        (MOTIONS[2], 0.25),
-        pytest.param(MOTIONS[2], 0.0, marks=LEAK),
+        long(MOTIONS[1], 0.25),
+        long(MOTIONS[2], 0.25),
+        pytest.param(MOTIONS[2], 0.0, marks=[LEAK, pytest.mark.long]),
     ],
 )
 def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):

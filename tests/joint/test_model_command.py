@@ -218,6 +218,7 @@ def test_effects_are_listed_and_shown(capsys):
     assert "did you mean stribeck" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_phases_alone_are_enough(tmp_path):
     made = simulate(6, ("stribeck",), 1.0, rate=2048.0, cycles=6)
     write_run(
@@ -235,6 +236,7 @@ def test_phases_alone_are_enough(tmp_path):
 DATA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 
 
+@pytest.mark.long
 @pytest.mark.measured
 @pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not at ../shared/data")
 @pytest.mark.parametrize(("joint", "after"), [(5, 0.035), (6, 0.032)])

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.marks import long
+
 ROOT = Path(__file__).parents[2]
 COMMAND = (sys.executable, "-m", "opamc_cli")
 LONG = (
@@ -55,7 +57,9 @@ def wait_for(condition, seconds: float) -> bool:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are counted in /proc")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGKILL, signal.SIGTERM, long(signal.SIGINT), long(signal.SIGHUP)]
+)
 def test_nothing_outlives_a_command(tmp_path, number):
     """Two workers at work, and the command is killed or interrupted."""
     process = start(*LONG, "--jobs", 2, "--out", tmp_path / "out")

@@ -25,13 +25,13 @@ def script(name: str, *arguments: object) -> str:
     return ended.stdout
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_killed_commands():
     said = script("kills.py", "--count", 12, "--seed", 1, "--only", "diagnose", "simulate", "score")
     assert "12 kills and interruptions, 0 wrong" in said
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_failing_system_calls():
     said = script("faults.py", "--every", 25, "--first", 7, "--only", "score", "simulate")

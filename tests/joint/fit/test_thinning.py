@@ -84,6 +84,7 @@ def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end(low_l
     )
 
 
+@pytest.mark.long
 def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells(monkeypatch):
     track, grouping = long_track(cycles=20)
     library = built_in_library()

@@ -93,6 +93,7 @@ def test_counts_are_those_of_the_envelope_itself(chain):
             assert row["counts"][0] == ascending.sum()
 
 
+@pytest.mark.long
 def test_each_stage_alone_gives_the_same_bytes(chain, tmp_path):
     out, outcome = chain
     config = load_config()

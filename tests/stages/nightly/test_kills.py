@@ -10,6 +10,7 @@ import cell_logs
 import nightly_kills
 import pytest
 
+pytestmark = pytest.mark.long
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
 

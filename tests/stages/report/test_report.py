@@ -190,6 +190,7 @@ def test_what_is_absent_is_left_out_with_a_reason(folder: Path) -> None:
     assert "verdict.json is absent" in text
 
 
+@pytest.mark.long
 def test_runs_that_were_moved_are_found_again(folder: Path) -> None:
     (folder.parent / "baseline").rename(folder.parent / "old")
     reasons = " ".join(report.run(folder).omitted)
