@@ -34,15 +34,17 @@ from opamc_cli.decision.divergence.features import compare
 from opamc_cli.decision.divergence.jensen_shannon import divergences_from_pool
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.signal.transform.analytic import clarke
-from opamc_cli.stages.chain import identify, patterns
+from opamc_cli.stages.chain import patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.patterns import aligned_span
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import RunSource, sources_record
-from opamc_cli.storage.tables import MOTIONS, read_table, write_table
+from opamc_cli.storage.tables import read_table, write_table
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -130,7 +132,7 @@ def taught_motions(folder: Path, recordings: dict, f_max_hz: float, out: Path) -
                     "reference_samples": length,
                 }
             )
-    path = out / identify.FILE_NAME
+    path = out / files.MOTIONS
     table = pa.Table.from_pylist(rows, schema=MOTIONS)
     extra = sources_record(sources, out)
     write_table(path, table, stage="identify", config={}, inputs=[], extra=extra)

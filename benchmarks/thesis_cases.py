@@ -34,6 +34,7 @@ from opamc_cli.stages.chain import patterns, score
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.recordings import simulate
 from opamc_cli.stages.tuning import sweep
+from opamc_cli.storage.schemas import files
 
 ROOT = Path(__file__).parents[1]
 FAULT_AXIS, NORMAL_AXIS = 3, 2
@@ -82,7 +83,7 @@ def run_case(case: Case) -> dict[str, Any]:
         kept = load_config(None, ["patterns.orders=[4, 5]", "patterns.remove_offset=false"])
         for role, motions in (("b", baseline.motions), ("t", target.motions)):
             patterns.run(motions, kept, out / f"{role}-kept")
-        name = patterns.FILE_NAME
+        name = files.PATTERNS
         as_in_thesis = score.run(out / "b-kept" / name, out / "t-kept" / name, kept, out / "kept")
         swept = sweep.run(
             baseline.motions, config, out, taus=TAUS, orders=ORDERS, target=target.motions

@@ -23,13 +23,14 @@ from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, check_comparable
 
 FILES = (
-    verdict.FILE_NAME,
-    report.FILE_NAME,
+    files.VERDICT,
+    files.REPORT,
     *score.FILES,
-    findings.FILE_NAME,
+    files.FINDINGS,
     *(f"{role}/{name}" for role in ("baseline", "target") for name in to_patterns.FILES),
 )
 """What a diagnosis leaves in its folder; the verdict vouches for the others."""
@@ -112,8 +113,8 @@ def run(
         )
     return replace(
         outcome,
-        verdict_path=out / verdict.FILE_NAME,
-        report_path=out / report.FILE_NAME,
+        verdict_path=out / files.VERDICT,
+        report_path=out / files.REPORT,
         errors=tuple(type(error)(published_text(str(error))) for error in outcome.errors),
     )
 

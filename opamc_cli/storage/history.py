@@ -19,7 +19,6 @@ import pyarrow as pa
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import ensure_directory
 
-FILE_NAME = "history.sqlite"
 SCHEMA_VERSION = 1
 BUSY_S = 60.0
 """Another process may be writing: its transactions last milliseconds."""

@@ -1,4 +1,4 @@
-"""Stage outputs: their columns, where they came from, and how they get to disk whole.
+"""Stage outputs: where they came from, and how they get to disk whole.
 
 Every table carries in its schema metadata key `opamc_table` one JSON object: stage, schema
 version, canonical config and its hash, the inputs' relative paths and SHA-256, and the versions
@@ -29,69 +29,12 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import LARGEST, Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, read_whole
 from opamc_cli.storage.files.result import published
-from opamc_cli.storage.runs import MOST_HZ, RunMetadata, file_sha256
+from opamc_cli.storage.runs import RunMetadata, file_sha256
+from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL
 
 TABLE_KEY = b"opamc_table"
 SCHEMA_VERSION = 1
-MAY_BE_NULL = frozenset(
-    {
-        *("temperature_c", "gamma", "lda"),
-        *("jsd", "chance", "excess", "delta_mu", "delta_var", "ks"),
-    }
-)
-"""Columns of stage tables in which null means unknown."""
-
 LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "scikit-learn")
-
-SEGMENTS = pa.schema(
-    [
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("segment", pa.int32()),
-        ("start", pa.int64()),
-        ("stop", pa.int64()),
-        ("sampling_rate_hz", pa.float64()),
-        ("f_max_hz", pa.float64()),
-        ("direction", pa.int8()),
-        ("variance", pa.float64()),
-        ("edge", pa.bool_()),
-        ("kind", pa.string()),
-        ("signal", pa.string()),
-        ("temperature_c", pa.float64()),
-    ]
-)
-MOTIONS = pa.schema(
-    [
-        *SEGMENTS,
-        pa.field("cycle", pa.int32()),
-        pa.field("motion", pa.int32()),
-        pa.field("similarity", pa.float64()),
-        pa.field("lag", pa.int64()),
-        pa.field("reference", pa.bool_()),
-        pa.field("reference_f_max_hz", pa.float64()),
-        pa.field("reference_samples", pa.int64()),
-    ]
-)
-PATTERNS = pa.schema(
-    [
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("segment", pa.int32()),
-        ("start", pa.int64()),
-        ("stop", pa.int64()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("gamma", pa.float64()),
-        ("f_max_hz", pa.float64()),
-        ("n_patterns", pa.int64()),
-        ("n_masked", pa.int64()),
-        ("counts", pa.list_(pa.int64())),
-        ("signal", pa.string()),
-        ("temperature_c", pa.float64()),
-    ]
-)
 
 
 @dataclass(frozen=True)
@@ -238,31 +181,6 @@ def _check_rows(
                     f"run `opamc {record['stage']}` again"
                 )
                 raise InputError(msg)
-
-
-LIMITS: Mapping[str, tuple[float, float]] = {
-    "axis": (1, 999),
-    "segment": (0, 1e9),
-    "cycle": (-1, 1e9),
-    "motion": (-1, 1e9),
-    "start": (0, 1e15),
-    "stop": (1, 1e15),
-    "sampling_rate_hz": (1e-9, MOST_HZ),
-    "direction": (-1, 1),
-    "variance": (0, 1e15),
-    "order": (2, 8),
-    "tau": (1, 1e9),
-    "n_patterns": (0, 1e15),
-    "n_masked": (0, 1e15),
-    "n_pool": (0, 1e15),
-    "f_max_hz": (0, MOST_HZ),
-    "base": (1, 1e15),
-    "jsd": (0, 1e3),
-    "ks": (0, 1),
-    "frames": (0, 1e6),
-    "bins": (0, 1e6),
-}
-"""Of the values of stage tables, both included; other columns have to be within `LARGEST`."""
 
 
 def _check_values(

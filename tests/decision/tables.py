@@ -5,8 +5,9 @@ from pathlib import Path
 import pyarrow as pa
 
 from opamc_cli.storage.runs import RunInfo
+from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.sources import RunSource, sources_record
-from opamc_cli.storage.tables import PATTERNS, write_table
+from opamc_cli.storage.tables import write_table
 from tests.decision.fleet import Fleet, cells
 
 

@@ -9,6 +9,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import spectrum
 from opamc_cli.stages.verdict.evidence import bundles, session_names
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import read_table
 from tests.stages.chain.test_chain import FAULT, NORMAL
 
@@ -23,7 +24,7 @@ def both(tmp_path_factory):
 
 def test_every_whole_segment_has_one_row_of_its_frames_and_bins(both):
     for side in both:
-        table = read_table(side.patterns.with_name(spectrum.FILE_NAME), "patterns", spectrum.SCHEMA)
+        table = read_table(side.patterns.with_name(files.SPECTRA), "patterns", spectrum.SCHEMA)
         rows = table.to_pylist()
         keys = {(r["run"], r["axis"], r["segment"]) for r in rows}
         counted = read_table(side.patterns, "patterns").to_pylist()
@@ -44,7 +45,7 @@ def test_sessions_of_the_cells_are_the_means_of_their_cycles(both):
     assert {c.sessions.shape[0] for c in cells} == {len(own[0].baseline) + len(own[0].target)}
     rows = [
         row["log_power"]
-        for row in sides.target.witnesses[spectrum.FILE_NAME].to_pylist()
+        for row in sides.target.witnesses[files.SPECTRA].to_pylist()
         if (row["axis"], row["motion"]) == (3, 2)
         and sides.sessions[1].of_run[row["run"]] == names[1][0]
     ]

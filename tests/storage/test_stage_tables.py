@@ -1,5 +1,4 @@
 import json
-from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -7,13 +6,8 @@ import pytest
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
-from opamc_cli.stages.chain.score import FEATURES, SCORES
-from opamc_cli.stages.model.tables import CANDIDATES, FIT, RESIDUALS, SPECTRUM
-from opamc_cli.stages.tuning.sweep import SWEEP
+from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.tables import (
-    MOTIONS,
-    PATTERNS,
-    SEGMENTS,
     TABLE_KEY,
     Provenance,
     read_table,
@@ -168,12 +162,3 @@ def test_every_flipped_byte_is_noticed(tmp_path):
         except InputError:
             continue
         assert found.to_pylist() == TABLE.to_pylist(), f"byte {at} of {len(content)}"
-
-
-@pytest.mark.parametrize(
-    "schema",
-    [SEGMENTS, MOTIONS, PATTERNS, SCORES, FEATURES, SWEEP, FIT, CANDIDATES, RESIDUALS, SPECTRUM],
-)
-def test_every_column_is_documented(schema):
-    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
-    assert [name for name in schema.names if f"`{name}`" not in text] == []

@@ -17,6 +17,7 @@ from opamc_cli.commands.terminal.options import (
     Quiet,
 )
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.storage.schemas import files
 
 
 def identify(
@@ -43,13 +44,12 @@ def identify(
     """Find cycles and motions in a segment table; writes motions.parquet."""
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain import identify as stage
-    from opamc_cli.stages.chain import segment
     from opamc_cli.storage.files.lock import output_lock
 
     output = Output(as_json, quiet)
     with output_lock(out), output.steps() as steps:
         outcome = stage.run(
-            segments or out / segment.FILE_NAME,
+            segments or out / files.SEGMENTS,
             load_config(config, overrides or ()),
             out,
             reference=reference,

@@ -17,6 +17,7 @@ from opamc_cli.commands.terminal.options import (
     Quiet,
 )
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.storage.schemas import files
 
 
 def patterns(
@@ -34,7 +35,6 @@ def patterns(
 ) -> None:
     """Count ordinal patterns of identified segments; writes patterns.parquet, spectra.parquet."""
     from opamc_cli.config import load_config
-    from opamc_cli.stages.chain import identify
     from opamc_cli.stages.chain import patterns as stage
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.result import published, result
@@ -42,7 +42,7 @@ def patterns(
     output = Output(as_json, quiet)
     with output_lock(out), result(out, *stage.FILES) as staged, output.steps() as steps:
         outcome = stage.run(
-            motions or out / identify.FILE_NAME,
+            motions or out / files.MOTIONS,
             load_config(config, overrides or ()),
             staged,
             moved_to=runs or (),
@@ -53,8 +53,8 @@ def patterns(
     output.result(
         {
             "written": str(published(outcome.path)),
-            "spectra": str(published(outcome.path).with_name("spectra.parquet")),
-            "profiles": str(published(outcome.path).with_name("profiles.parquet")),
+            "spectra": str(published(outcome.path).with_name(files.SPECTRA)),
+            "profiles": str(published(outcome.path).with_name(files.PROFILES)),
             "motions": counted,
         },
         *(

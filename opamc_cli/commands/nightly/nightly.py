@@ -82,6 +82,7 @@ def run(
     from opamc_cli.stages.nightly import run as stage
     from opamc_cli.stages.nightly.morning import silent, tell
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.schemas import files
 
     output = Output(as_json, quiet)
     loaded = load_cell(cell)
@@ -101,7 +102,7 @@ def run(
         morning = tell(summary, untold, outcome, loaded.out)
         if outcome.ended:
             output.failure(outcome.ended)
-        page = loaded.out / "index.html"
+        page = loaded.out / files.PAGE
         output.result(
             {**morning.values, "page": str(page)},
             *morning.lines,

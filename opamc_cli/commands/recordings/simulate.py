@@ -7,6 +7,7 @@ import typer
 
 from opamc_cli.commands.terminal.options import DEFAULT_OUT, Jobs, Json, Out, Overrides, Quiet
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.storage.schemas import files
 
 
 def simulate(
@@ -64,7 +65,7 @@ def simulate(
     with (
         output_lock(out),
         # recordings are moved about by their users: plain files, no links
-        result(out, stage.TRUTH_NAME, linked=False) as staged,
+        result(out, files.TRUTH, linked=False) as staged,
         output.steps() as steps,
     ):
         outcome = stage.run(
@@ -73,7 +74,7 @@ def simulate(
     rate = testbed.recording.sampling_rate_hz
     output.result(
         {
-            "truth": str(out / stage.TRUTH_NAME),
+            "truth": str(out / files.TRUTH),
             "runs": [str(out / entry["run"]) for entry in outcome.results],
         },
         *(
@@ -81,7 +82,7 @@ def simulate(
             f"{len(entry['segments'])} motions"
             for entry in outcome.results
         ),
-        str(out / stage.TRUTH_NAME),
+        str(out / files.TRUTH),
     )
     raise typer.Exit(
         output.failures([str(error) for error in outcome.errors], len(outcome.results))

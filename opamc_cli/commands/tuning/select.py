@@ -17,6 +17,7 @@ from opamc_cli.commands.terminal.options import (
     Quiet,
 )
 from opamc_cli.commands.terminal.output import Output
+from opamc_cli.storage.schemas import files
 
 
 def select(
@@ -45,14 +46,13 @@ def select(
     Rated is how much better healthy segments fit their own motion than another one.
     """
     from opamc_cli.config import load_config
-    from opamc_cli.stages.chain import identify
     from opamc_cli.stages.tuning import select as stage
     from opamc_cli.storage.files.lock import output_lock
 
     output = Output(as_json, quiet)
     with output_lock(out), output.steps() as steps:
         outcome = stage.run(
-            motions or out / identify.FILE_NAME,
+            motions or out / files.MOTIONS,
             load_config(config, overrides or ()),
             out,
             orders=orders or (3, 4, 5, 6),

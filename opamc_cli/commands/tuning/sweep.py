@@ -18,6 +18,7 @@ from opamc_cli.commands.terminal.options import (
 )
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import UsageError
+from opamc_cli.storage.schemas import files
 
 
 def sweep(
@@ -46,7 +47,7 @@ def sweep(
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain.to_patterns import FILES, run_chain
     from opamc_cli.stages.tuning import sweep as stage
-    from opamc_cli.stages.tuning.sweep_figure import FIGURE_NAME, write_figure
+    from opamc_cli.stages.tuning.sweep_figure import write_figure
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.result import published, published_text, result
 
@@ -55,7 +56,7 @@ def sweep(
     chain = [f"{role}/{name}" for role in ("baseline", "target") for name in FILES]
     with (
         output_lock(out),
-        result(out, stage.FILE_NAME, FIGURE_NAME, *chain) as staged,
+        result(out, files.SWEEP, files.SWEEP_FIGURE, *chain) as staged,
         output.steps() as steps,
     ):
         normal = run_chain(baseline, effective, staged / "baseline", jobs=jobs, progress=steps)
@@ -83,7 +84,7 @@ def sweep(
             jobs=jobs,
             watch=steps("sweep"),
         )
-        write_figure(outcome.table, staged / FIGURE_NAME)
+        write_figure(outcome.table, staged / files.SWEEP_FIGURE)
     errors += outcome.errors
     best = outcome.best()
     output.result(
@@ -95,7 +96,7 @@ def sweep(
             for b in best
         ),
         str(published(outcome.path)),
-        str(out / FIGURE_NAME),
+        str(out / files.SWEEP_FIGURE),
     )
     raise typer.Exit(output.failures([published_text(str(error)) for error in errors], len(done)))
 

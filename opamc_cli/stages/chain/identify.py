@@ -24,10 +24,10 @@ from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_envelope
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
-from opamc_cli.storage.tables import MOTIONS, SEGMENTS, read_table, table_input, write_table
-
-FILE_NAME = "motions.parquet"
+from opamc_cli.storage.tables import read_table, table_input, write_table
 
 MIN_CORRELATION = 0.5
 """Below this the correlation peak says nothing of time, and the segment's own start is kept."""
@@ -174,7 +174,7 @@ def run(
         raise outcome.errors[0]
     motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
-    path = out / FILE_NAME
+    path = out / files.MOTIONS
     write_table(
         path,
         motions,

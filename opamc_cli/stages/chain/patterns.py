@@ -18,20 +18,14 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
-from opamc_cli.stages.chain.witnesses.kept_rows import PLACE
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import current_offset, read_course
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, PLACE
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
-from opamc_cli.storage.tables import (
-    MOTIONS,
-    PATTERNS,
-    read_table,
-    table_input,
-    write_table,
-)
+from opamc_cli.storage.tables import read_table, table_input, write_table
 
-FILE_NAME = "patterns.parquet"
-FILES = (FILE_NAME, *(witness.FILE_NAME for witness in WITNESSES))
+FILES = (files.PATTERNS, *(witness.FILE_NAME for witness in WITNESSES))
 
 
 @dataclass(frozen=True)
@@ -120,7 +114,7 @@ def run(
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     patterns = pa.concat_tables(
-        [PATTERNS.empty_table(), *(result[FILE_NAME] for result in outcome.results)]
+        [PATTERNS.empty_table(), *(result[files.PATTERNS] for result in outcome.results)]
     ).combine_chunks()
     beside = {
         witness.FILE_NAME: pa.concat_tables(
@@ -132,7 +126,7 @@ def run(
         for witness in WITNESSES
     }
     inputs, used = [table_input(motions)], config.canonical("patterns")
-    for name, rows in {FILE_NAME: patterns, **beside}.items():
+    for name, rows in {files.PATTERNS: patterns, **beside}.items():
         write_table(
             out / name,
             rows,
@@ -142,7 +136,7 @@ def run(
             extra=sources_record(sources, out),
         )
     notes = _delays_in_words(table, patterns, config)
-    return PatternsOutcome(out / FILE_NAME, patterns, outcome.errors, tuple(notes))
+    return PatternsOutcome(out / files.PATTERNS, patterns, outcome.errors, tuple(notes))
 
 
 def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> list[str]:
@@ -286,7 +280,7 @@ def _analyse(job: _Job) -> dict[str, pa.Table]:
                     )
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
     return {
-        FILE_NAME: pa.Table.from_pylist(patterns, schema=PATTERNS),
+        files.PATTERNS: pa.Table.from_pylist(patterns, schema=PATTERNS),
         **{
             witness.FILE_NAME: pa.Table.from_pylist(kept[witness.FILE_NAME], schema=witness.SCHEMA)
             for witness in WITNESSES

@@ -22,48 +22,13 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.chain.compared.discriminants import LatentModels
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, common_keys, cycle_counts
 from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import FEATURES, SCORES
 from opamc_cli.storage.sources import check_comparable
 from opamc_cli.storage.tables import table_input, table_provenance, write_table
 
-SCORES_NAME = "scores.parquet"
-FEATURES_NAME = "features.parquet"
-FILES = (SCORES_NAME, FEATURES_NAME)
+FILES = (files.SCORES, files.FEATURES)
 ALL_MOTIONS = -1
-
-SCORES = pa.schema(
-    [
-        ("role", pa.string()),
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("segment", pa.int32()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("n_patterns", pa.int64()),
-        ("n_pool", pa.int64()),
-        ("left_out", pa.string()),
-        ("jsd", pa.float64()),
-        ("chance", pa.float64()),
-        ("excess", pa.float64()),
-        ("base", pa.float64()),
-    ]
-)
-FEATURES = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("motion", pa.int32()),
-        ("order", pa.int8()),
-        ("delta_mu", pa.float64()),
-        ("delta_var", pa.float64()),
-        ("ks", pa.float64()),
-        ("n_baseline", pa.int64()),
-        ("n_target", pa.int64()),
-        ("f_max_hz", pa.float64()),
-        ("lda", pa.float64()),
-        ("base", pa.float64()),
-    ]
-)
 
 
 @dataclass(frozen=True)
@@ -139,12 +104,12 @@ def compare_sides(
     features = feature_table(scores, other, base, models)
     inputs = [table_input(sides.baseline.path), table_input(sides.target.path)]
     used = config.canonical("score")
-    for name, table in ((SCORES_NAME, scores), (FEATURES_NAME, features)):
+    for name, table in ((files.SCORES, scores), (files.FEATURES, features)):
         write_table(out / name, table, stage="score", config=used, inputs=inputs)
     notes += (*sides.notes(), *_missing_notes(own, other), *_short_notes(own))
     return ScoreOutcome(
-        out / SCORES_NAME,
-        out / FEATURES_NAME,
+        out / files.SCORES,
+        out / files.FEATURES,
         scores,
         features,
         notes,

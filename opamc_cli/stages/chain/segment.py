@@ -15,10 +15,10 @@ from opamc_cli.stages.chain.segments.joint import joint_segments
 from opamc_cli.stages.chain.segments.rows import AxisSegments
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.sources import RunSource, sources_record
-from opamc_cli.storage.tables import SEGMENTS, write_table
-
-FILE_NAME = "segments.parquet"
+from opamc_cli.storage.tables import write_table
 
 SAMPLES_PER_SHORTEST = 10
 """Samples that the shortest motion, or the period of the slowest carrier, has to have."""
@@ -134,7 +134,7 @@ def run(
         raise _nothing_usable(errors)
     moved = set(table.column("run").to_pylist())
     sources = [source for source in sources if source.name in moved]
-    path = out / FILE_NAME
+    path = out / files.SEGMENTS
     write_table(
         path,
         table,

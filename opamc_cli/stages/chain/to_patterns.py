@@ -9,8 +9,9 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain import identify, patterns, segment
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
+from opamc_cli.storage.schemas import files
 
-FILES = (segment.FILE_NAME, identify.FILE_NAME, *patterns.FILES)
+FILES = (files.SEGMENTS, files.MOTIONS, *patterns.FILES)
 """What the chain leaves in its folder."""
 
 

@@ -18,8 +18,6 @@ from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
 from opamc_cli.stages.model.axis_model import AxisModel, lay
 from opamc_cli.stages.model.tables import (
-    CANDIDATES,
-    FIT,
     candidate_row,
     explained_entry,
     extended_model,
@@ -34,15 +32,18 @@ from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.stages.recordings.axis_recording import axes_of
 from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
 from opamc_cli.storage.runs import Run
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
 from opamc_cli.storage.tables import write_table
 
-FIT_NAME = "fit.parquet"
-CANDIDATES_NAME = "candidates.parquet"
-LOOP_NAME = "loop.json"
-MODEL_NAME = "model.yaml"
-RESIDUALS_NAME = "residuals.parquet"
-SPECTRUM_NAME = "order_spectrum.parquet"
-CLOSE_FILES = (LOOP_NAME, MODEL_NAME, CANDIDATES_NAME, FIT_NAME, RESIDUALS_NAME, SPECTRUM_NAME)
+CLOSE_FILES = (
+    files.LOOP,
+    files.MODEL,
+    files.CANDIDATES,
+    files.FIT,
+    files.RESIDUALS,
+    files.ORDER_SPECTRUM,
+)
 """What closing the loop leaves, beside `model_axis1.yaml` and so on where there are many axes."""
 
 
@@ -87,7 +88,7 @@ def fit(
         return fit_summary(laid, result, known)
 
     results, errors, inputs = _each_axis(model, paths, axes, one, watch)
-    written = [_write(out / FIT_NAME, rows, FIT, model, inputs)] if results else []
+    written = [_write(out / files.FIT, rows, FIT, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
 
@@ -129,7 +130,7 @@ def trace(
         }
 
     results, errors, inputs = _each_axis(model, paths, axes, one, watch)
-    written = [_write(out / CANDIDATES_NAME, rows, CANDIDATES, model, inputs)] if results else []
+    written = [_write(out / files.CANDIDATES, rows, CANDIDATES, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
 
@@ -183,22 +184,22 @@ def close(
         return Outcome((), (), tuple(errors))
     ensure_directory(out)
     written = [
-        _write(out / CANDIDATES_NAME, candidates, CANDIDATES, model, inputs),
-        _write(out / FIT_NAME, fits, FIT, model, inputs),
-        _write_tables(out / RESIDUALS_NAME, residuals, model, inputs),
-        _write_tables(out / SPECTRUM_NAME, spectra, model, inputs),
+        _write(out / files.CANDIDATES, candidates, CANDIDATES, model, inputs),
+        _write(out / files.FIT, fits, FIT, model, inputs),
+        _write_tables(out / files.RESIDUALS, residuals, model, inputs),
+        _write_tables(out / files.ORDER_SPECTRUM, spectra, model, inputs),
     ]
     for axis, values in extended.items():
-        name = MODEL_NAME if len(extended) == 1 else f"model_axis{axis}.yaml"
+        name = files.MODEL if len(extended) == 1 else f"model_axis{axis}.yaml"
         with atomic_path(out / name) as temporary:
             temporary.write_text(
                 yaml.safe_dump(values, sort_keys=False, default_flow_style=None), encoding="utf-8"
             )
         written.append(out / name)
-    with atomic_path(out / LOOP_NAME) as temporary:
+    with atomic_path(out / files.LOOP) as temporary:
         text = json.dumps({"axes": results}, indent=2, allow_nan=False, ensure_ascii=False)
         temporary.write_text(text + "\n", encoding="utf-8")
-    written.append(out / LOOP_NAME)
+    written.append(out / files.LOOP)
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
 

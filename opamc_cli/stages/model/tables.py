@@ -15,57 +15,10 @@ from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Trial
 from opamc_cli.joint.noise.spectra import order_spectrum
 from opamc_cli.stages.model.axis_model import AxisModel
+from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 
 MOST_RESIDUALS = 20_000
 MOST_ORDERS = 4_000
-
-FIT = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("effect", pa.string()),
-        ("parameters", pa.string()),
-        ("regressor", pa.int16()),
-        ("coefficient", pa.float64()),
-        ("standard_error", pa.float64()),
-        ("low", pa.float64()),
-        ("high", pa.float64()),
-        ("condition_number", pa.float64()),
-        ("rmse_a", pa.float64()),
-    ]
-)
-CANDIDATES = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("round", pa.int16()),
-        ("effect", pa.string()),
-        ("domain", pa.string()),
-        ("parameters", pa.string()),
-        ("score", pa.float64()),
-        ("p_value", pa.float64()),
-        ("gain", pa.float64()),
-        ("t_value", pa.float64()),
-        ("added", pa.bool_()),
-        ("why_not", pa.string()),
-    ]
-)
-RESIDUALS = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("time_s", pa.float64()),
-        ("position_rad", pa.float64()),
-        ("velocity_rad_s", pa.float64()),
-        ("residual_before_a", pa.float64()),
-        ("residual_after_a", pa.float64()),
-    ]
-)
-SPECTRUM = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("order", pa.float64()),
-        ("before_a", pa.float64()),
-        ("after_a", pa.float64()),
-    ]
-)
 
 
 def fit_rows(axis: int, result: Fit, known: Certainty) -> list[dict[str, Any]]:
@@ -281,7 +234,7 @@ def spectrum_table(axis: int, loop: Loop) -> pa.Table:
     block = max(-(-orders.size // MOST_ORDERS), 1)
     usable = orders.size // block * block
     if usable == 0:
-        return SPECTRUM.empty_table()
+        return ORDER_SPECTRUM.empty_table()
     peaks = [values[:usable].reshape(-1, block).max(axis=1) for values in amplitudes]
     middle = orders[:usable].reshape(-1, block).mean(axis=1)
     return pa.table(
@@ -291,5 +244,5 @@ def spectrum_table(axis: int, loop: Loop) -> pa.Table:
             pa.array(peaks[0]),
             pa.array(peaks[1]),
         ],
-        schema=SPECTRUM,
+        schema=ORDER_SPECTRUM,
     )

@@ -10,6 +10,7 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.run import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
+from opamc_cli.storage.schemas import files
 
 OVER = {"silent": 0, "failed": 1, "not-judged": 2, "missing": 3, "cleared": 4}
 """Kinds of event that are a line of their own, in the order in which they are said."""
@@ -86,7 +87,7 @@ def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path) -> Iterato
     program = f", program {joint.program}" if robot.several_programs else ""
     yield f"{robot.name} axis {joint.axis}{program}: ALARM, not as it was since {alarm.since}"
     yield f"  {alarm.text}"
-    where = out / joint.report if joint.report else out / "index.html"
+    where = out / joint.report if joint.report else out / files.PAGE
     yield (
         f"  see {where}; silence it with: opamc nightly acknowledge {robot.name} "
         f"--axis {joint.axis} --why TEXT"

@@ -20,7 +20,6 @@ from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import (
     COMPUTE,
-    REPORT,
     Input,
     NightJob,
     ProgramJob,
@@ -30,13 +29,13 @@ from opamc_cli.stages.nightly.workers.workers import Broken, run_all
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history import (
-    FILE_NAME,
     History,
     MeasureRow,
     NightRow,
     VerdictRow,
     as_notes,
 )
+from opamc_cli.storage.schemas import files
 
 WORK, KEPT, COPIES = ".work", ".kept", ".copies"
 """Folders below `out` that nobody needs to look into."""
@@ -181,7 +180,7 @@ def run(
 
 def open_history(cell: CellConfig, *, read_only: bool = False) -> History:
     """Open a cell's history."""
-    return History(cell.out / FILE_NAME, read_only=read_only)
+    return History(cell.out / files.HISTORY, read_only=read_only)
 
 
 def _answers(
@@ -310,12 +309,12 @@ def _record(
     notes = [*night.notes, *(note for result in answer for note in result.notes)]
     folder = Path(night.robot) / night.night
     if judged:
-        files: dict[str, bytes] = {}
+        contents: dict[str, bytes] = {}
         for index, result in enumerate(judged):
             # the worst program's at the top, where scripts look
             below = "" if index == 0 else f"{_safe(result.program)}/"
-            files |= {below + name: content for name, content in result.files.items()}
-        replace_folder(cell.out / folder, files)
+            contents |= {below + name: content for name, content in result.files.items()}
+        replace_folder(cell.out / folder, contents)
     else:  # what an earlier start found must not pass for this night
         remove_folder(cell.out / folder)
     status = "failed" if not judged else "partial" if why else "done"
@@ -341,7 +340,7 @@ def _record(
                     wanted.payload_kg,
                     wanted.speed_percent,
                     len(wanted.targets),
-                    (place_of / REPORT).as_posix(),
+                    (place_of / files.REPORT).as_posix(),
                     job.config.digest(),
                     __version__,
                 )

@@ -16,13 +16,13 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import write_table
 from opamc_cli.testbed.effects import KINDS
 from opamc_cli.testbed.parameters import Damage
 from opamc_cli.testbed.robot import AxisRecording, Recording, simulate
 
 STAGE = "simulate"
-TRUTH_NAME = "truth.json"
 TRUTH_FOLDER = "truth"
 _FIRST_DAY = datetime(2021, 1, 1, tzinfo=UTC)
 """Sessions are one day apart from here: a recording's bytes must not depend on the clock."""
@@ -83,7 +83,7 @@ def run(
         "sampling_rate_hz": config.recording.sampling_rate_hz,
         "runs": list(outcome.results),
     }
-    write_text(out / TRUTH_NAME, json.dumps(truth, indent=1, sort_keys=True, allow_nan=False))
+    write_text(out / files.TRUTH, json.dumps(truth, indent=1, sort_keys=True, allow_nan=False))
     return outcome
 
 

@@ -3,9 +3,9 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from opamc_cli.stages.report.assemble import FILE_NAME, ReportOutcome, render, run
+    from opamc_cli.stages.report.assemble import ReportOutcome, render, run
 
-__all__ = ["FILE_NAME", "ReportOutcome", "render", "run"]
+__all__ = ["ReportOutcome", "render", "run"]
 
 
 def __getattr__(name: str) -> Any:

@@ -30,8 +30,7 @@ from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInp
 from opamc_cli.stages.report.results.provenance import provenance
 from opamc_cli.stages.report.views import axis_view, compared, heading, headline, loop_view
 from opamc_cli.storage.files.atomic import write_text
-
-FILE_NAME = "report.html"
+from opamc_cli.storage.schemas import files
 
 EVIDENCE = (
     ("divergence of every segment", jsd_scatter.figure),
@@ -107,7 +106,7 @@ def run(
     """
     inputs = read_inputs(out, {"baseline": _folders(baseline), "target": _folders(target)})
     page, omitted = render(inputs, title, figures)
-    path = out / FILE_NAME
+    path = out / files.REPORT
     write_text(path, page)
     return ReportOutcome(path, inputs, omitted)
 

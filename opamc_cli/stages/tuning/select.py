@@ -17,20 +17,10 @@ from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
 from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import MOTIONS, SELECTION
 from opamc_cli.storage.sources import RunSource, read_sources
-from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
-
-FILE_NAME = "selection.parquet"
-
-SELECTION = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("order", pa.int8()),
-        ("gamma", pa.float64()),
-        ("self_consistency", pa.float64()),
-        ("patterns_per_cell", pa.float64()),
-    ]
-)
+from opamc_cli.storage.tables import read_table, table_input, write_table
 
 
 @dataclass(frozen=True)
@@ -124,7 +114,7 @@ def run(
         raise NotEnoughDataError(msg)
     table = pa.Table.from_pylist(rated, schema=SELECTION)
     write_table(
-        out / FILE_NAME,
+        out / files.SELECTION,
         table,
         stage="select",
         config=config.canonical("patterns"),
@@ -141,7 +131,7 @@ def run(
         "divergence is mostly chance"
         for each, fewest in few.items()
     )
-    return SelectionOutcome(out / FILE_NAME, table, order, gamma, warnings, outcome.errors)
+    return SelectionOutcome(out / files.SELECTION, table, order, gamma, warnings, outcome.errors)
 
 
 @dataclass(frozen=True)

@@ -22,25 +22,10 @@ from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, current_offset, read_envelope
 from opamc_cli.stages.recordings.sessions import Sessions, lie_in_folders, sessions_of
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import MOTIONS, SWEEP
 from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
-from opamc_cli.storage.tables import MOTIONS, read_table, table_input, write_table
-
-FILE_NAME = "sweep.parquet"
-
-SWEEP = pa.schema(
-    [
-        ("role", pa.string()),
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("n_patterns", pa.int64()),
-        ("jsd", pa.float64()),
-        ("tau_opt", pa.int32()),
-    ]
-)
+from opamc_cli.storage.tables import read_table, table_input, write_table
 
 Counts = npt.NDArray[np.int64]
 
@@ -168,7 +153,7 @@ def run(
     own = sources["baseline"]
     sessions = sessions_of(own, config.score.day_starts_at, lie_in_folders(own))
     table = pa.Table.from_pylist(_rows(counted, sessions, config), schema=SWEEP)
-    path = out / FILE_NAME
+    path = out / files.SWEEP
     write_table(
         path,
         table,

@@ -9,7 +9,6 @@ from opamc_cli.stages.report.figures.figure import canvas, style, to_png
 from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.storage.files.atomic import atomic_path
 
-FIGURE_NAME = "sweep.png"
 ROLES = ("baseline", "target")
 
 

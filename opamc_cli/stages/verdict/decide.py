@@ -10,7 +10,7 @@ from typing import Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.chain import patterns, score, to_patterns
+from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.verdict import verdict
 from opamc_cli.stages.verdict.agreement.common import far_together
@@ -18,8 +18,9 @@ from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.findings import read_findings
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.schemas import files
 
-FILES = (verdict.FILE_NAME, *score.FILES)
+FILES = (files.VERDICT, *score.FILES)
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class DecideOutcome:
 
 def default_tables(folder: Path) -> tuple[Path, Path]:
     """Return the two pattern tables that a diagnosis leaves in its folder."""
-    baseline, target = (folder / role / patterns.FILE_NAME for role in ("baseline", "target"))
+    baseline, target = (folder / role / files.PATTERNS for role in ("baseline", "target"))
     return baseline, target
 
 

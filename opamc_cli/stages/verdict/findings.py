@@ -14,12 +14,11 @@ from pydantic_core import from_json
 
 from opamc_cli.config.reading import read_text
 from opamc_cli.errors import InputError
-from opamc_cli.stages.chain import patterns
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.files.json_documents import MOST_BYTES
 from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.schemas import files
 
-FILE_NAME = "findings.json"
 ROLES = ("baseline", "target")
 
 
@@ -35,20 +34,20 @@ def write_findings(folder: Path, findings: Findings) -> None:
     """Write the findings beside the pattern tables of a diagnosis."""
     content = {
         "tables": {
-            f"{role}/{patterns.FILE_NAME}": file_sha256(folder / role / patterns.FILE_NAME)
+            f"{role}/{files.PATTERNS}": file_sha256(folder / role / files.PATTERNS)
             for role in ROLES
         },
         "causes": {str(axis): dict(cause) for axis, cause in findings.causes.items()},
         "unjudged": {str(axis): list(why) for axis, why in findings.unjudged.items()},
     }
-    write_text(folder / FILE_NAME, json.dumps(content, indent=2, allow_nan=False) + "\n")
+    write_text(folder / files.FINDINGS, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
 
 def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
     """Return the findings in a folder; none where there are none, or of other tables."""
     try:
-        content = from_json(read_text(folder / FILE_NAME, InputError, MOST_BYTES))
-        vouched = [content["tables"][f"{role}/{patterns.FILE_NAME}"] for role in ROLES]
+        content = from_json(read_text(folder / files.FINDINGS, InputError, MOST_BYTES))
+        vouched = [content["tables"][f"{role}/{files.PATTERNS}"] for role in ROLES]
         found = Findings(
             {int(axis): dict(cause) for axis, cause in content["causes"].items()},
             {int(axis): [str(each) for each in why] for axis, why in content["unjudged"].items()},

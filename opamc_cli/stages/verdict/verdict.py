@@ -22,9 +22,8 @@ from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.stages.verdict.reasons import reasons
 from opamc_cli.storage.files.atomic import write_text
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import current_unit
-
-FILE_NAME = "verdict.json"
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
@@ -115,7 +114,7 @@ def write(
         Adds what is known of the diagnosis besides: joints that cannot be judged, notes, tables.
     """
     verdict = complete(content(decided, scored, config, causes or {}))
-    path = out / FILE_NAME
+    path = out / files.VERDICT
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
     return VerdictOutcome(path, verdict, exit_code(verdict))
 

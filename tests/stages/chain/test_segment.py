@@ -12,6 +12,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import InputError
 from opamc_cli.stages.chain import segment
 from opamc_cli.storage.runs import RunInfo, save_run, write_run
+from opamc_cli.storage.schemas import files
 
 SHARED = Path(__file__).parents[4] / "shared" / "data"
 MOVES = [Move(157, 1), Move(157, -1), Move(100, 1), Move(157, -1)]
@@ -164,7 +165,7 @@ class TestRefused:
         path = save(tmp_path / "bad.parquet", values, fs_hz)
         with pytest.raises(InputError) as caught:
             run_stage(tmp_path, path, **options)
-        assert not (tmp_path / "out" / segment.FILE_NAME).exists()
+        assert not (tmp_path / "out" / files.SEGMENTS).exists()
         message = str(caught.value)
         assert "bad.parquet" in message
         assert "\n" not in message

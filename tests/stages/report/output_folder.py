@@ -16,8 +16,9 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.signal.transform.analytic import clarke, envelope
 from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS
 from opamc_cli.storage.sources import RunSource, sources_record
-from opamc_cli.storage.tables import MOTIONS, PATTERNS, table_input, write_table
+from opamc_cli.storage.tables import table_input, write_table
 
 RATE_HZ = 1024.0
 MOVE = 900

@@ -10,8 +10,9 @@ import pyarrow as pa
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, group_patterns
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.recordings.sessions import Sessions, in_words, lie_in_folders, sessions_of
+from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.sources import RunSource, read_sources
-from opamc_cli.storage.tables import PATTERNS, read_table
+from opamc_cli.storage.tables import read_table
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,8 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.stages.recordings.sessions import Sessions
-from opamc_cli.storage.tables import PATTERNS
 
 Floats = npt.NDArray[np.float64]
-
-PLACE = ("run", "axis", "cycle", "motion", "segment", "start", "stop")
-"""Columns that say what a row is of."""
-
-PLACE_SCHEMA = pa.schema([PATTERNS.field(name) for name in PLACE])
 
 
 @dataclass(frozen=True)

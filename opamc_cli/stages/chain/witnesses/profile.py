@@ -10,17 +10,13 @@ import pyarrow as pa
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.signal.course import mean_course
-from opamc_cli.stages.chain.witnesses.kept_rows import PLACE, PLACE_SCHEMA, Names, rows_by_motion
+from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import PLACE, PROFILES
 
 NAME = "profile"
-FILE_NAME = "profiles.parquet"
-SCHEMA = pa.schema(
-    [
-        *PLACE_SCHEMA,
-        pa.field("parts", pa.int32()),
-        pa.field("current_a", pa.list_(pa.float32())),
-    ]
-)
+FILE_NAME = files.PROFILES
+SCHEMA = PROFILES
 
 
 def rows(

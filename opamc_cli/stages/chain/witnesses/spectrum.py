@@ -14,19 +14,13 @@ from opamc_cli.decision.witnesses.spectra import (
     variance_within_sessions,
 )
 from opamc_cli.signal.transform.short_time import short_time_log_power
-from opamc_cli.stages.chain.witnesses.kept_rows import PLACE, PLACE_SCHEMA, Names, rows_by_motion
+from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
+from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import PLACE, SPECTRA
 
 NAME = "spectrum"
-FILE_NAME = "spectra.parquet"
-SCHEMA = pa.schema(
-    [
-        *PLACE_SCHEMA,
-        pa.field("frames", pa.int32()),
-        pa.field("bins", pa.int32()),
-        pa.field("bin_hz", pa.float64()),
-        pa.field("log_power", pa.list_(pa.float32())),
-    ]
-)
+FILE_NAME = files.SPECTRA
+SCHEMA = SPECTRA
 
 
 def rows(

@@ -6,14 +6,14 @@ from datetime import UTC, datetime
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.storage.files.atomic import write_text
+from opamc_cli.storage.schemas import files
 
-FILE_NAME = "metrics.prom"
 STATES = ("healthy", "changed", "fault", "insufficient-data")
 
 
 def write_metrics(cell: CellConfig, summary: Summary) -> None:
     """Write the cell's metrics, unless they are as they were."""
-    path = cell.out / FILE_NAME
+    path = cell.out / files.METRICS
     text = "\n".join(_lines(summary)) + "\n"
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
         write_text(path, text)

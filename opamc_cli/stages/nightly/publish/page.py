@@ -15,8 +15,8 @@ from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.history import History
+from opamc_cli.storage.schemas import files
 
-FILE_NAME = "index.html"
 NIGHTS_SHOWN = 30
 """Width of a sparkline: a month."""
 
@@ -40,7 +40,7 @@ STATES = ("healthy", "changed", "fault", "insufficient-data", *MORE_STATES)
 
 def write_page(cell: CellConfig, history: History, summary: Summary) -> None:
     """Write the cell's page, unless it is as it was."""
-    path = cell.out / FILE_NAME
+    path = cell.out / files.PAGE
     page = render(history, summary)
     if not path.is_file() or path.read_text(encoding="utf-8") != page:
         write_text(path, page)

@@ -15,8 +15,6 @@ from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
 from opamc_cli.stages import diagnose
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.nightly.workers.night import (
-    REPORT,
-    VERDICT,
     AxisResult,
     Input,
     NightJob,
@@ -25,6 +23,7 @@ from opamc_cli.stages.nightly.workers.night import (
 )
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
+from opamc_cli.storage.schemas import files
 
 
 def compute(job: NightJob) -> tuple[ProgramResult, ...]:
@@ -87,10 +86,10 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
             kept=None if job.kept is None else KeptResults(job.kept),
             figures_of_healthy=False,
         )
-        temperatures = _temperatures(folder / "out" / "target" / "patterns.parquet")
-        files = {
-            VERDICT: outcome.verdict_path.read_bytes(),
-            REPORT: outcome.report_path.read_bytes(),
+        temperatures = _temperatures(folder / "out" / "target" / files.PATTERNS)
+        written = {
+            files.VERDICT: outcome.verdict_path.read_bytes(),
+            files.REPORT: outcome.report_path.read_bytes(),
         }
     except (InputError, NotEnoughDataError) as error:
         # the recordings' own fault: it would fail again; all other errors are the caller's
@@ -103,7 +102,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
     return ProgramResult(
         wanted.program,
         axes,
-        files,
+        written,
         tuple(_plain(str(error), folder) for error in outcome.errors),
         tuple(_plain(note, folder) for note in outcome.notes),
     )

@@ -15,7 +15,6 @@ from opamc_cli.storage.logs import LogFile
 COMPUTE = "opamc_cli.stages.nightly.workers.judge:compute"
 """What a worker calls; by name, since loading it takes longer than looking at a cell."""
 
-VERDICT, REPORT = "verdict.json", "report.html"
 STATES = ("fault", "changed", "insufficient-data", "healthy")
 
 

@@ -13,6 +13,7 @@ from opamc_cli.stages.report.results.columns import Columns, n_rows, to_columns
 from opamc_cli.storage.files.json_documents import read_json
 from opamc_cli.storage.files.parquet import read_schema, read_whole
 from opamc_cli.storage.runs import Run, file_sha256
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import TABLE_KEY, read_table, table_record
 
@@ -177,13 +178,13 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
         If neither scores nor a loop is there, or any file is damaged or of another kind.
     """
     folder = _Folder(out)
-    loop = folder.optional_json("loop.json")
-    verdict = folder.optional_json("verdict.json")
+    loop = folder.optional_json(files.LOOP)
+    verdict = folder.optional_json(files.VERDICT)
     scores: Columns = {}
     features: Columns = {}
-    if loop is None or verdict is not None or (out / "scores.parquet").exists():
-        scores = folder.stage_table("scores.parquet", SCORE_COLUMNS)
-        features = folder.stage_table("features.parquet", FEATURE_COLUMNS)
+    if loop is None or verdict is not None or (out / files.SCORES).exists():
+        scores = folder.stage_table(files.SCORES, SCORE_COLUMNS)
+        features = folder.stage_table(files.FEATURES, FEATURE_COLUMNS)
         if not n_rows(scores):
             msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
             raise InputError(msg)
@@ -196,8 +197,8 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
         verdict=verdict,
         roles=roles,
         loop=loop,
-        residuals=folder.optional_table("residuals.parquet", RESIDUAL_COLUMNS),
-        spectrum=folder.optional_table("order_spectrum.parquet", SPECTRUM_COLUMNS),
+        residuals=folder.optional_table(files.RESIDUALS, RESIDUAL_COLUMNS),
+        spectrum=folder.optional_table(files.ORDER_SPECTRUM, SPECTRUM_COLUMNS),
         files=tuple(folder.files),
     )
 
@@ -273,7 +274,7 @@ def _need_columns(path: Path, table: pa.Table, needed: Sequence[str]) -> None:
 
 
 def _sources(out: Path, role: str, moved_to: Sequence[Path]) -> tuple[RunSource, ...]:
-    for name in ("segments.parquet", "motions.parquet", "patterns.parquet"):
+    for name in (files.SEGMENTS, files.MOTIONS, files.PATTERNS):
         path = out / role / name
         if not path.exists():
             continue

@@ -5,9 +5,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs, merged_config
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import library_versions
 
-LOOP_TABLES = ("residuals.parquet", "order_spectrum.parquet")
+LOOP_TABLES = (files.RESIDUALS, files.ORDER_SPECTRUM)
 
 
 def provenance(inputs: ReportInputs) -> dict[str, Any]:

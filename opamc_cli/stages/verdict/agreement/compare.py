@@ -16,8 +16,9 @@ from opamc_cli.stages.verdict.agreement.unjudged import (
     sentence,
     unjudged,
 )
+from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import read_sources
-from opamc_cli.storage.tables import MOTIONS, read_table
+from opamc_cli.storage.tables import read_table
 
 
 @dataclass
