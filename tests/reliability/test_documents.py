@@ -152,6 +152,7 @@ def test_names_that_are_no_text(opamc, tmp_path, tonight):
         assert "UTF-8" in ended.sentences[0]
 
 
+@pytest.mark.long
 def test_a_hundred_wrong_inputs_of_every_kind():
     """The short form of `make fuzz`."""
     ends = fuzz(60, 1.0, 20260301)

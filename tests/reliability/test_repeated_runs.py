@@ -7,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import ExitCode
+from tests.marks import long
 
 
 def copied(source, to):
@@ -23,7 +24,9 @@ def written_again(source, to):
     pq.write_table(table.replace_schema_metadata(metadata), to, compression="zstd")
 
 
-@pytest.mark.parametrize("how", [copied, linked, written_again], ids=lambda how: how.__name__)
+@pytest.mark.parametrize(
+    "how", [long(copied), long(linked), written_again], ids=lambda how: how.__name__
+)
 def test_tonights_run_is_no_baseline_of_itself(opamc, baseline, tonight, tmp_path, how):
     folder = shutil.copytree(baseline, tmp_path / "baseline")
     how(tonight, folder / "again.parquet")

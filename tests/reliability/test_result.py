@@ -12,6 +12,7 @@ from opamc_cli.errors import InputError, UsageError
 from opamc_cli.stages import diagnose as stage
 from opamc_cli.storage.files import result as storage
 from opamc_cli.storage.files.result import clear, published, result
+from tests.marks import long
 
 NAMES = ("verdict.json", "tables/a", "tables/b")
 
@@ -189,7 +190,7 @@ def test_the_verdict_vouches_for_its_tables(diagnosed):
         assert hashlib.sha256((diagnosed / name).read_bytes()).hexdigest() == digest
 
 
-@pytest.mark.parametrize("name", ["scores.parquet", "target/patterns.parquet"])
+@pytest.mark.parametrize("name", ["scores.parquet", long("target/patterns.parquet")])
 def test_a_report_of_two_diagnoses_is_refused(opamc, diagnosed, tmp_path, name):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     assert opamc("report", "--out", out).code == 0
