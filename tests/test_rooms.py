@@ -18,12 +18,12 @@ LAYERS = (
     {"storage"},
     {"stages"},
     {"commands"},
-    {"__init__", "__main__", "entry"},
+    {"api", "__init__", "__main__", "entry"},
 )
 """From the ground up; a thing knows its own layer and those below."""
 
 MOST_THINGS = 9
-DOORS = {"entry.py", "py.typed"}
+DOORS = {"api.py", "entry.py", "py.typed"}
 """Beside `__init__` and `__main__`: where others come in."""
 ENTRIES = {("__init__",), ("entry",)}
 """What is imported for the version, or for what it does."""
