@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -18,9 +18,26 @@ class DeclaredEffect(Section):
     parameters: dict[str, float] = Field(
         default_factory=dict, description="Non-linear parameters; found from the data if absent."
     )
+    coefficients: tuple[float, ...] | None = Field(
+        None,
+        description="Of a closed model, one per regressor; `opamc model evaluate` applies them, "
+        "all else estimates them anew.",
+    )
     columns: tuple[Annotated[int, Field(ge=0)], ...] | None = Field(
         None, description="Regressors of the effect that are used; null: all."
     )
+
+
+class ClosedConfig(Section):
+    """What a closed model knows of the recordings that it was closed on."""
+
+    unit: Literal["A", "Nm"] = Field("A", description="Of the current, or of a torque for it.")
+    rmse: Annotated[float, Field(ge=0)] = Field(0.0, description="Error on the sealed data.")
+    r2: float = Field(0.0, description="Share of the sealed data's variance that it explains.")
+    speed_rad_s: Annotated[float, Field(gt=0)] = Field(
+        1.0, description="Speed by which regressors are measured."
+    )
+    temperature_c: float | None = Field(None, description="Likewise a temperature.")
 
 
 class JointModelConfig(Section):
@@ -37,6 +54,7 @@ class JointModelConfig(Section):
     without: tuple[str, ...] = Field(
         (), description="Effects of the library that the loop must not use."
     )
+    closed: ClosedConfig | None = Field(None, description="Written by `opamc model close`.")
 
     def declared(self) -> tuple[DeclaredEffect, ...]:
         """Return the effects, each with its parameters."""

@@ -193,6 +193,8 @@ def _check_values(
     low, high = LIMITS.get(name, (-LARGEST, LARGEST))
     if name == "counts":
         low = 0
+    if name == "order" and pa.types.is_floating(values.type):
+        low, high = 0, LARGEST  # of a line over the angle, not of patterns
     smallest, largest = (_known(values, find) for find in (pc.min, pc.max))
     for value in (smallest, largest):
         if value is not None and not low <= value <= high:

@@ -43,6 +43,8 @@ app.command()(effects)
 
 
 MOST_REJECTED = 3
+MOST_COEFFICIENTS = 4
+"""Shown on a terminal; a drive's answer has dozens, all are in fit.parquet."""
 
 
 @app.command()
@@ -145,6 +147,41 @@ def close(
     )
 
 
+@app.command()
+def evaluate(
+    runs: Runs,
+    model: Annotated[
+        Path,
+        typer.Option("--model", "--config", metavar="FILE", help="The model.yaml of a close."),
+    ],
+    overrides: Overrides = None,
+    axis: Axis = None,
+    out: Out = DEFAULT_OUT,
+    as_json: Json = False,
+    quiet: Quiet = False,
+) -> None:
+    """Apply a closed model to other runs, coefficients frozen; writes evaluation.json."""
+    from opamc_cli.config.joint_model import load_joint_model
+    from opamc_cli.stages.model import evaluate as stage
+    from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.runs import find_runs
+
+    output = Output(as_json, quiet)
+    declared = load_joint_model(model, overrides or ())
+    with output_lock(out), _naming(model), output.steps() as steps:
+        outcome = stage.evaluate(
+            declared, find_runs(runs), axis or (), out, watch=steps("evaluate")
+        )
+    output.result(
+        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
+        *(shown for result in outcome.results for shown in _evaluation(result)),
+        *(str(path) for path in outcome.written),
+    )
+    raise typer.Exit(
+        output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    )
+
+
 @contextmanager
 def _naming(model: Path) -> Iterator[None]:
     """Name the model's file in what is wrong with it, and a line of a user's own effect."""
@@ -192,19 +229,20 @@ def _table(title: str, *headings: str) -> Any:
 
 def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
     table = _table(
-        f"Axis {result['axis']}: {result['rmse_a']:.4g} A rms left, condition number "
-        f"{result['condition_number']:.3g}",
+        f"Axis {result['axis']}: {result['rmse_a']:.4g} {result['unit']} rms left, condition "
+        f"number {result['condition_number']:.3g}",
         "effect",
         "coefficients (95 % interval)",
         "parameters",
     )
     for term in result["terms"]:
-        shown = ", ".join(
-            f"{value:.4g} ({low:.3g} .. {high:.3g})"
-            for value, low, high in zip(
-                term["coefficients"], term["low"], term["high"], strict=True
-            )
-        )
+        known = zip(term["coefficients"], term["units"], term["low"], term["high"], strict=True)
+        each = [
+            f"{value:.4g} {unit} ({low:.3g} .. {high:.3g})".replace("  ", " ")
+            for value, unit, low, high in known
+        ]
+        more = [f"{len(each) - MOST_COEFFICIENTS} more"] if len(each) > MOST_COEFFICIENTS else []
+        shown = ", ".join(each[:MOST_COEFFICIENTS] + more)
         table.add_row(term["effect"], shown, _parameters(term["parameters"]))
     apart = [f"the data cannot tell apart: {', '.join(names)}" for names in result["inseparable"]]
     return [table, *apart]
@@ -240,13 +278,14 @@ def _headline(result: dict[str, Any]) -> str:
         + (f" ({step['effect']}, approximately)" if step["approximate"] else f" ({step['effect']})")
         for step in named
     ]
-    error = f"error {before:.4g} → {after:.4g} A"
+    error = f"error {before:.4g} → {after:.4g} {result['unit']}"
     reached = f"{result['explained_share']:.0%} of what can be explained"
     if named:
         listed = "; ".join(words)
         return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"
     if result["verdict"] == "nothing-missing":
-        return f"Axis {result['axis']} lacks nothing that the data can show: error {before:.4g} A"
+        error = f"error {before:.4g} {result['unit']}"
+        return f"Axis {result['axis']} lacks nothing that the data can show: {error}"
     curves = [step["interpretation"].split(";")[0] for step in result["steps"]]
     what = "; ".join(curves) or f"something in the {result['domain']} domain"
     return f"Axis {result['axis']} lacks {what}, which no effect of the library describes: {error}"
@@ -254,14 +293,16 @@ def _headline(result: dict[str, Any]) -> str:
 
 def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
     before, after, ceiling = result["before"], result["after"], result["ceiling"]
+    unit = result["unit"]
     shown: list[RenderableType] = [
         _headline(result),
         f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; ceiling "
         f"{ceiling['share']:.0%} ± {ceiling['standard_error']:.0%} of the mean square, floor "
-        f"{result['floor_a']:.4g} A",
+        f"{result['floor_a']:.4g} {unit}",
     ]
     if result["steps"]:
-        table = _table("Steps", "effect", "parameters", "gain", "form", "A before", "A after")
+        errors = (f"{unit} before", f"{unit} after")
+        table = _table("Steps", "effect", "parameters", "gain", "form", *errors)
         for step in result["steps"]:
             ties = f" (or {', '.join(step['ties'])})" if step["ties"] else ""
             table.add_row(
@@ -286,6 +327,21 @@ def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
         for entry in result["rejected"][:MOST_REJECTED]
     ]
     return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
+
+
+def _evaluation(result: dict[str, Any]) -> Sequence["RenderableType"]:
+    unit, closed = result["unit"], result["closed"]
+    shown: list[RenderableType] = [
+        f"Axis {result['axis']}: error {result['rmse_a']:.4g} {unit}, r2 {result['r2']:.4f}; on "
+        f"the sealed data of its own recordings {closed['rmse_a']:.4g} {unit}, {closed['r2']:.4f}"
+    ]
+    if len(result["runs"]) > 1:
+        table = _table("Runs", "run", f"error ({unit})", "r2")
+        for run in result["runs"]:
+            table.add_row(run["run"], f"{run['rmse_a']:.4g}", f"{run['r2']:.4f}")
+        shown.append(table)
+    shown += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
+    return shown
 
 
 def _untestable(result: dict[str, Any]) -> list["RenderableType"]:

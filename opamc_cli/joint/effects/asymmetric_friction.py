@@ -11,6 +11,7 @@ class AsymmetricFriction(Effect):
 
     name = "asymmetric_friction"
     domain = "velocity"
+    per = ("", "rad/s")
     meaning = "friction differs between directions: check bearing preload and seal lips"
     needs = ("position",)
     from_motion = True

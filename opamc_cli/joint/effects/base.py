@@ -50,6 +50,12 @@ class Effect:
     """True where parameters say which columns `columns` returns."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
+    per: tuple[str, ...] | None = None
+    """Unit of each regressor, "" for a bare number and "current" for one in the current's own; the
+    last one is that of all further ones. A coefficient is the current's unit by it."""
+    of_its_recordings: bool = False
+    """True where regressors are of the recordings that they were fitted to (a time since they
+    began, a place among their quantiles): their coefficients mean nothing elsewhere."""
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
@@ -118,6 +124,14 @@ class Effect:
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say what the effect with these parameters means to a maintainer."""
         return self.meaning
+
+    def coefficient_units(self, count: int, unit: str = "A") -> list[str]:
+        """Return the units of some coefficients, where the current's is `unit`."""
+        if self.per is None:
+            return [f"{unit} per regressor"] * count
+        each = [*self.per, *self.per[-1:] * count][:count]
+        known = {"": unit, "current": ""}
+        return [known.get(per, f"{unit} per {per}") for per in each]
 
 
 def stack(*columns: Floats) -> Floats:

@@ -9,6 +9,7 @@ class Coulomb(Effect):
 
     name = "coulomb"
     domain = "velocity"
+    per = ("",)
     meaning = "dry friction of bearings and seals: check the preload"
     needs = ("position",)
     from_motion = True

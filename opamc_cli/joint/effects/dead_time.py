@@ -16,6 +16,7 @@ class DeadTime(Effect):
 
     name = "dead_time"
     domain = "electrical"
+    per = ("",)
     origin = "measurement"
     meaning = "dead time of the inverter is not compensated: check the drive's setting"
     needs = ("electrical",)

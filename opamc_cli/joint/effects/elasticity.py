@@ -19,6 +19,7 @@ class Elasticity(Effect):
 
     name = "elasticity"
     domain = "acceleration"
+    per = ("rad/s²",)
     searches = ("resonance_hz", "damping")
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
     needs = ("position", "logged")

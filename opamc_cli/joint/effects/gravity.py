@@ -19,6 +19,7 @@ class Gravity(Effect):
 
     name = "gravity"
     domain = "joint-angle"
+    per = ("",)
     origin = "load"
     searches = ("joint_rad_per_rad",)
     meaning = "weight of the links; not a fault in itself"

@@ -16,6 +16,7 @@ class Hysteresis(Effect):
 
     name = "hysteresis"
     domain = "joint-angle"
+    per = ("",)
     searches = ("length_rad",)
     meaning = "torque lags behind after reversals: check gear preload and backlash"
     needs = ("position",)

@@ -9,6 +9,7 @@ class Inertia(Effect):
 
     name = "inertia"
     domain = "acceleration"
+    per = ("rad/s²",)
     origin = "load"
     meaning = "mass that is accelerated; not a fault in itself"
     needs = ("position",)

@@ -16,6 +16,7 @@ class LoadFriction(Effect):
 
     name = "load_friction"
     domain = "load"
+    per = ("current",)
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
     needs = ("position",)
 

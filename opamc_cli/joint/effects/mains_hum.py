@@ -48,6 +48,8 @@ class MainsHum(Effect):
 
     name = "mains_hum"
     domain = "frequency"
+    per = ("",)
+    of_its_recordings = True
     origin = "measurement"
     searches = ("frequency_hz",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"

@@ -11,6 +11,7 @@ class Offset(Effect):
 
     name = "offset"
     domain = "load"
+    per = ("",)
     origin = "measurement"
     meaning = "zero error of the current reading, or a constant force: check the sensor's zero"
     from_motion = True

@@ -18,6 +18,8 @@ class PayloadChange(Effect):
 
     name = "payload_change"
     domain = "load"
+    per = ("", "", "rad/s²")
+    of_its_recordings = True
     origin = "load"
     changes_in_time = True
     searches = ("since_s",)

@@ -11,6 +11,7 @@ class PositionDrag(Effect):
 
     name = "position_drag"
     domain = "joint-angle"
+    per = ("",)
     searches = ("place_rad", "width_rad", "flatness")
     meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)

@@ -11,6 +11,7 @@ class QuadraticFriction(Effect):
 
     name = "quadratic_friction"
     domain = "velocity"
+    per = ("rad²/s²",)
     meaning = "churning losses: too much grease"
     needs = ("position",)
     from_motion = True

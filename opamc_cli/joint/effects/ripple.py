@@ -48,6 +48,7 @@ class Ripple(Effect):
 
     name = "ripple"
     domain = "motor-angle"
+    per = ("",)
     searches = ("order",)
     meaning = "torque ripple"
     needs = ("position",)

@@ -11,6 +11,7 @@ class SensorGain(Effect):
 
     name = "sensor_gain"
     domain = "electrical"
+    per = ("current",)
     origin = "measurement"
     meaning = "gain error of a phase current sensor: recalibrate it"
     needs = ("electrical",)

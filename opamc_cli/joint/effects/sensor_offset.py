@@ -11,6 +11,7 @@ class SensorOffset(Effect):
 
     name = "sensor_offset"
     domain = "electrical"
+    per = ("",)
     origin = "measurement"
     meaning = "zero error of a phase current sensor: recalibrate it"
     needs = ("electrical",)

@@ -11,6 +11,7 @@ class Spring(Effect):
 
     name = "spring"
     domain = "joint-angle"
+    per = ("rad", "")
     meaning = "a force grows with the angle: check balancing spring and cable package"
     needs = ("position",)
     from_motion = True

@@ -16,6 +16,7 @@ class Stribeck(Effect):
 
     name = "stribeck"
     domain = "velocity"
+    per = ("",)
     searches = ("stribeck_speed",)
     meaning = "mixed lubrication at low speed: check the grease film"
     needs = ("position",)

@@ -11,6 +11,7 @@ class SublinearFriction(Effect):
 
     name = "sublinear_friction"
     domain = "velocity"
+    per = ("",)
     searches = ("exponent",)
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     needs = ("position",)

@@ -13,6 +13,7 @@ class ThermalViscous(Effect):
 
     name = "thermal_viscous"
     domain = "temperature"
+    per = ("rad/s",)
     origin = "environment"
     changes_in_time = True
     searches = ("rate_per_c",)
@@ -41,8 +42,7 @@ class ThermalViscous(Effect):
         """Speed times the relative viscosity above its middle."""
         assert track.temperature_c is not None
         rate = parameters["rate_per_c"]
-        middle = float(np.mean(track.temperature_c[track.moving]))
-        viscosity = np.expm1(-rate * (track.temperature_c - middle)) / rate
+        viscosity = np.expm1(-rate * (track.temperature_c - track.middle_temperature_c)) / rate
         return stack(track.velocity * viscosity)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:

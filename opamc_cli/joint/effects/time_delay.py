@@ -16,6 +16,8 @@ class TimeDelay(Effect):
 
     name = "time_delay"
     domain = "time"
+    per = ("current",)
+    of_its_recordings = True
     origin = "measurement"
     searches = ("delay_s",)
     meaning = "current and motion are logged with a delay: check the logger's clocks"

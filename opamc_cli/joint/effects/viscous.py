@@ -9,6 +9,7 @@ class Viscous(Effect):
 
     name = "viscous"
     domain = "velocity"
+    per = ("rad/s",)
     meaning = "lubricant friction: check grease amount and grade"
     needs = ("position",)
     from_motion = True

@@ -11,6 +11,8 @@ class Warmup(Effect):
 
     name = "warmup"
     domain = "time"
+    per = ("rad/s", "")
+    of_its_recordings = True
     origin = "environment"
     changes_in_time = True
     searches = ("time_constant_s",)

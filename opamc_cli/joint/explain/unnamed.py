@@ -26,6 +26,7 @@ class Smooth(Effect):
     """
 
     unnamed = True
+    of_its_recordings = True
 
     def __init__(
         self,
@@ -98,6 +99,7 @@ class Shift(Effect):
     """What a delay or a lag makes of the model: its rates of change."""
 
     unnamed = True
+    of_its_recordings = True
     name = "unnamed_shift"
     domain = "time"
     meaning = "a response of the model's own current; no effect of the library has its form"

@@ -100,6 +100,8 @@ class Track:
     full : Track or None
         What an averaged track is the block means of: the same recordings at the full rate, with
         current, position, speed and direction as smooth as the acceleration.
+    reference : Reference or None
+        What regressors are measured by, where it is not to be that of these recordings.
     own_clocks_s : tuple of float
         `time_s` at which each recording begins, where recordings have no common clock.
     """
@@ -134,6 +136,7 @@ class Track:
     blur: Floats | None = None
     full: "Track | None" = None
     own_clocks_s: tuple[float, ...] = ()
+    reference: "Reference | None" = None
 
     @property
     def size(self) -> int:
@@ -143,8 +146,19 @@ class Track:
     @cached_property
     def speed_scale(self) -> float:
         """Speed that moving samples reach at their 95th percentile."""
+        if self.reference is not None:
+            return self.reference.speed
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
+
+    @cached_property
+    def middle_temperature_c(self) -> float:
+        """Mean temperature of the moving samples; 0 where none is logged."""
+        if self.reference is not None and self.reference.temperature_c is not None:
+            return self.reference.temperature_c
+        return (
+            0.0 if self.temperature_c is None else float(np.mean(self.temperature_c[self.moving]))
+        )
 
     @cached_property
     def static_columns(self) -> Floats:
@@ -189,6 +203,14 @@ class Track:
             static_terms=static_terms,
             full=replace(self.full, load_a=load_a, model_a=model_a),
         )
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What regressors are measured by: a speed, in rad/s, and a temperature, if one is logged."""
+
+    speed: float
+    temperature_c: float | None
 
 
 class Regressors(Protocol):

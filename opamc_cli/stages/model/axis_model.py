@@ -39,12 +39,15 @@ class AxisModel:
         Model as declared.
     library : Library
         Effects that may be added.
+    unit : str
+        Of the current: "A", or "Nm" where a torque stands for it.
     """
 
     axis: int
     fit: Fit
     declared: tuple[tuple[Effect, DeclaredEffect], ...]
     library: Library
+    unit: str
 
     @property
     def session(self) -> Session:
@@ -82,23 +85,8 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
         If the axis does not move, or too little to seal anything off.
     """
     library = library_of(model)
-    # A closed model may hold functions without a name; the loop itself adds them only at its end.
-    known = {**unnamed_library(), **library}
-    declared = tuple((effect_named(known, d.effect), d) for d in model.declared())
-    recordings = [read_recording(run, axis) for run in runs]
-    rates = {recording.rate_hz for recording in recordings}
-    if len(rates) > 1:
-        msg = (
-            f"{runs[0].path}: the runs have different rates "
-            f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate"
-        )
-        raise InputError(msg)
-    if all(recording.started_s is not None for recording in recordings):
-        recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    for recording, run in zip(recordings, runs, strict=True):
-        if recording.size < 64:
-            msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
-            raise NotEnoughDataError(msg)
+    declared = declared_effects(model, library)
+    recordings, unit = recordings_of(runs, axis)
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
     _check_motion(recordings, joint, axis, named)
@@ -120,7 +108,53 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
         msg = f"{named}: axis {axis} moves too little to seal a part off; record more motion"
         raise NotEnoughDataError(msg)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, fit, declared, allowed)
+    return AxisModel(axis, fit, declared, allowed, unit)
+
+
+def declared_effects(
+    model: JointModelConfig, library: Library
+) -> tuple[tuple[Effect, DeclaredEffect], ...]:
+    """Return the effects that a model declares.
+
+    Raises
+    ------
+    ConfigError
+        If one is unknown.
+    """
+    # A closed model may hold functions without a name; the loop itself adds them only at its end.
+    known = {**unnamed_library(), **library}
+    return tuple((effect_named(known, d.effect), d) for d in model.declared())
+
+
+def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str]:
+    """Read one axis of some runs, in time order; return the unit of its current beside it.
+
+    Raises
+    ------
+    InputError
+        If rates or units differ, or a channel is missing.
+    NotEnoughDataError
+        If a run is too short.
+    """
+    recordings = [read_recording(run, axis) for run in runs]
+    units = {run.info.current_unit for run in runs}
+    if len(units) > 1:
+        msg = f"{runs[0].path}: some runs hold currents (A), others torques (Nm); give one kind"
+        raise InputError(msg)
+    rates = {recording.rate_hz for recording in recordings}
+    if len(rates) > 1:
+        msg = (
+            f"{runs[0].path}: the runs have different rates "
+            f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate"
+        )
+        raise InputError(msg)
+    for recording, run in zip(recordings, runs, strict=True):
+        if recording.size < 64:
+            msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
+            raise NotEnoughDataError(msg)
+    if all(recording.started_s is not None for recording in recordings):
+        recordings.sort(key=lambda recording: recording.started_s or 0.0)
+    return recordings, units.pop()
 
 
 def _check_motion(recordings: list[Recording], joint: Joint, axis: int, named: str) -> None:

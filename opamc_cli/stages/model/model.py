@@ -1,7 +1,7 @@
 """Stage `model`: runs and a declared model in; fit, candidates, loop and extended model out."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,10 +84,12 @@ def fit(
     def one(laid: AxisModel) -> dict[str, Any]:
         result = laid.fit
         known = certainty(result)
-        rows.extend(fit_rows(laid.axis, result, known))
+        rows.extend(fit_rows(laid.axis, result, known, laid.unit))
         return fit_summary(laid, result, known)
 
-    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
+    results, errors, inputs = each_axis(
+        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
+    )
     written = [_write(out / files.FIT, rows, FIT, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
@@ -111,6 +113,7 @@ def trace(
         rows.extend(candidate_row(laid.axis, 0, trial, False) for trial in tried)
         return {
             "axis": laid.axis,
+            "unit": laid.unit,
             "declared": [term.effect.name for term in base.terms],
             "explained": explained_entry(start, explained),
             "candidates": [
@@ -129,7 +132,9 @@ def trace(
             ],
         }
 
-    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
+    results, errors, inputs = each_axis(
+        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
+    )
     written = [_write(out / files.CANDIDATES, rows, CANDIDATES, model, inputs)] if results else []
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
@@ -173,13 +178,15 @@ def close(
             candidate_row(laid.axis, number, trial, id(trial.term) in added)
             for number, trial in loop.tried
         )
-        fits.extend(fit_rows(laid.axis, loop.after, certainty(loop.after)))
+        fits.extend(fit_rows(laid.axis, loop.after, certainty(loop.after), laid.unit))
         residuals.append(residual_table(laid.axis, loop))
         spectra.append(spectrum_table(laid.axis, loop))
-        extended[laid.axis] = extended_model(model, loop.after)
+        extended[laid.axis] = extended_model(model, laid, loop)
         return loop_entry(laid, loop)
 
-    results, errors, inputs = _each_axis(model, paths, axes, one, watch)
+    results, errors, inputs = each_axis(
+        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
+    )
     if not results:
         return Outcome((), (), tuple(errors))
     ensure_directory(out)
@@ -203,13 +210,19 @@ def close(
     return Outcome(tuple(results), tuple(written), tuple(errors))
 
 
-def _each_axis(
-    model: JointModelConfig,
+def each_axis(
     paths: Sequence[tuple[str, Path]],
     axes: Sequence[int],
-    one: Any,
+    one: Callable[[Sequence[Run], int], dict[str, Any]],
     watch: Watch,
 ) -> tuple[list[dict[str, Any]], list[OpamcError], list[tuple[Path, str]]]:
+    """Do something with each axis of some runs; return results, what failed, and the runs' hashes.
+
+    Raises
+    ------
+    OpamcError
+        If nothing can be done.
+    """
     runs: list[Run] = []
     results: list[dict[str, Any]] = []
     errors: list[OpamcError] = []
@@ -228,7 +241,7 @@ def _each_axis(
         for done, axis in enumerate(wanted):
             watch(done, len(wanted))
             try:
-                results.append(one(lay(model, runs, axis)))
+                results.append(one(runs, axis))
             except ConfigError:
                 raise
             except OpamcError as error:

@@ -21,13 +21,14 @@ MOST_RESIDUALS = 20_000
 MOST_ORDERS = 4_000
 
 
-def fit_rows(axis: int, result: Fit, known: Certainty) -> list[dict[str, Any]]:
+def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[str, Any]]:
     """Rows of fit.parquet, one per regressor."""
     rows = []
     rmse = result.rmse(sealed=False)
     for term, values, errors in zip(
         result.terms, result.coefficients, known.standard_errors, strict=True
     ):
+        units = term.effect.coefficient_units(len(values), unit)
         for k, (value, error) in enumerate(zip(values, errors, strict=True)):
             rows.append(
                 {
@@ -36,6 +37,7 @@ def fit_rows(axis: int, result: Fit, known: Certainty) -> list[dict[str, Any]]:
                     "parameters": json.dumps(shown_parameters(term), sort_keys=True),
                     "regressor": k,
                     "coefficient": float(value),
+                    "unit": units[k],
                     "standard_error": float(error),
                     "low": float(value - known.factor * error),
                     "high": float(value + known.factor * error),
@@ -50,6 +52,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
     """Summarise one axis for the terminal and `--json`."""
     return {
         "axis": laid.axis,
+        "unit": laid.unit,
         "groups": _groups_entry(laid.session),
         "condition_number": known.condition_number,
         "inseparable": [list(names) for names in known.inseparable],
@@ -59,6 +62,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
                 "effect": term.effect.name,
                 "parameters": shown_parameters(term),
                 "coefficients": [float(value) for value in values],
+                "units": term.effect.coefficient_units(len(values), laid.unit),
                 "low": [float(v - known.factor * e) for v, e in zip(values, errors, strict=True)],
                 "high": [float(v + known.factor * e) for v, e in zip(values, errors, strict=True)],
             }
@@ -144,6 +148,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
     grouping = laid.session.grouping
     return {
         "axis": laid.axis,
+        "unit": laid.unit,
         "declared": [effect.name for effect, _ in laid.declared],
         "sealed": [grouping.names[g] for g in grouping.sealed],
         "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
@@ -179,25 +184,32 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
     }
 
 
-def extended_model(model: JointModelConfig, after: Fit) -> dict[str, Any]:
-    """Write the extended model as a mapping."""
+def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict[str, Any]:
+    """Write the extended model as a mapping, with its coefficients."""
+    after = loop.after
     effects: list[Any] = []
-    for term in after.terms:
+    for term, values in zip(after.terms, after.coefficients, strict=True):
+        entry: dict[str, Any] = {"effect": term.effect.name}
         if term.parameters or term.keep is not None:
-            entry: dict[str, Any] = {
-                "effect": term.effect.name,
-                "parameters": shown_parameters(term),
-            }
-            if term.keep is not None:
-                entry["columns"] = list(term.keep)
-            effects.append(entry)
-        else:
-            effects.append(term.effect.name)
+            entry["parameters"] = shown_parameters(term)
+        if term.keep is not None:
+            entry["columns"] = list(term.keep)
+        entry["coefficients"] = [float(f"{value:.9g}") for value in values]
+        effects.append(entry)
+    track = after.session.fine.track
+    warm = track.temperature_c is not None
     return {
         "joint": {"gear_ratio": model.joint.gear_ratio, "pole_pairs": model.joint.pole_pairs},
         "effects": effects,
         "library": [str(path) for path in model.library],
         "without": list(model.without),
+        "closed": {
+            "unit": laid.unit,
+            "rmse": float(f"{loop.rmse_after_a:.6g}"),
+            "r2": float(f"{loop.r2_after:.6g}"),
+            "speed_rad_s": float(track.speed_scale),
+            "temperature_c": track.middle_temperature_c if warm else None,
+        },
     }
 
 

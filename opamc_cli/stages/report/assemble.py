@@ -176,6 +176,8 @@ def _draw(
     with warnings.catch_warnings():
         # a sign that the font lacks is drawn by the browser, which has more fonts
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
+        # names that are longer than the figure is wide
+        warnings.filterwarnings("ignore", message="constrained_layout not applied")
         for name, draw in parts:
             try:
                 figures.append(call(draw))

@@ -20,6 +20,7 @@ CANDIDATES = "candidates.parquet"
 RESIDUALS = "residuals.parquet"
 ORDER_SPECTRUM = "order_spectrum.parquet"
 LOOP = "loop.json"
+EVALUATION = "evaluation.json"
 MODEL = "model.yaml"
 
 TRUTH = "truth.json"

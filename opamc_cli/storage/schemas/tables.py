@@ -140,6 +140,7 @@ FIT = pa.schema(
         ("parameters", pa.string()),
         ("regressor", pa.int16()),
         ("coefficient", pa.float64()),
+        ("unit", pa.string()),
         ("standard_error", pa.float64()),
         ("low", pa.float64()),
         ("high", pa.float64()),

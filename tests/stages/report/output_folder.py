@@ -16,7 +16,14 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.signal.transform.analytic import clarke, envelope
 from opamc_cli.storage.runs import Run, RunInfo, save_run
-from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS
+from opamc_cli.storage.schemas.tables import (
+    FEATURES,
+    MOTIONS,
+    ORDER_SPECTRUM,
+    PATTERNS,
+    RESIDUALS,
+    SCORES,
+)
 from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import table_input, write_table
 
@@ -71,8 +78,8 @@ def make(out: Path, plan: Plan = Plan(), seed: int = 0) -> Path:
         _write(out / role / "motions.parquet", motions[role], MOTIONS, "identify", sources)
         _write(out / role / "patterns.parquet", patterns[role], PATTERNS, "patterns", sources)
     scores, features, verdict = _score(patterns, plan)
-    _write_plain(out / "scores.parquet", scores, "score", out)
-    _write_plain(out / "features.parquet", features, "score", out)
+    _write_plain(out / "scores.parquet", scores, "score", SCORES)
+    _write_plain(out / "features.parquet", features, "score", FEATURES)
     (out / "verdict.json").write_text(json.dumps(verdict))
     return out
 
@@ -96,7 +103,7 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
         "residual_before_a": ripple + noise,
         "residual_after_a": noise,
     }
-    _write_plain(out / "residuals.parquet", table, "close", out)
+    _write_plain(out / "residuals.parquet", table, "model", RESIDUALS)
     peak = 0.05 * np.exp(-(((order - 2) / 0.03) ** 2)) + 0.02 * np.exp(
         -(((order - 14) / 0.03) ** 2)
     )
@@ -108,8 +115,8 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
             "before_a": floor + peak,
             "after_a": floor,
         },
-        "close",
-        out,
+        "model",
+        ORDER_SPECTRUM,
     )
     step = {
         "effect": "ripple",
@@ -345,6 +352,9 @@ def _write(
     )
 
 
-def _write_plain(path: Path, columns: dict[str, Any], stage: str, out: Path) -> None:
-    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+def _write_plain(path: Path, columns: dict[str, Any], stage: str, schema: pa.Schema) -> None:
+    size = len(next(iter(columns.values())))
+    blank = {field.name: "" if field.type == pa.string() else 2 for field in schema}
+    columns = {name: columns.get(name, [value] * size) for name, value in blank.items()}
+    table = pa.table({f.name: pa.array(columns[f.name], f.type) for f in schema}, schema=schema)
     write_table(path, table, stage=stage, config={"score": {"base": 2.0}}, inputs=[])

@@ -11,25 +11,13 @@ import pyarrow as pa
 from opamc_cli.errors import InputError
 from opamc_cli.stages.report.results.columns import Columns, n_rows, to_columns
 from opamc_cli.storage.files.json_documents import read_json
-from opamc_cli.storage.files.parquet import read_schema, read_whole
+from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.runs import Run, file_sha256
-from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas import files, tables
 from opamc_cli.storage.sources import RunSource, read_sources
-from opamc_cli.storage.tables import TABLE_KEY, read_table, table_record
+from opamc_cli.storage.tables import read_table, table_record
 
 ROLES = ("baseline", "target")
-
-SCORE_COLUMNS = ("role", "run", "axis", "cycle", "motion", "order", "tau", "jsd")
-FEATURE_COLUMNS = ("axis", "motion", "order", "delta_mu", "delta_var", "ks")
-RESIDUAL_COLUMNS = (
-    "axis",
-    "time_s",
-    "position_rad",
-    "velocity_rad_s",
-    "residual_before_a",
-    "residual_after_a",
-)
-SPECTRUM_COLUMNS = ("axis", "order", "before_a", "after_a")
 
 
 class NothingToDrawError(Exception):
@@ -139,7 +127,7 @@ class ReportInputs:
     @property
     def unit(self) -> str:
         """Unit of the current: "A", or "Nm" where a torque stands for it."""
-        units = {s.info.current_unit for tables in self.roles.values() for s in tables.sources}
+        units = {s.info.current_unit for role in self.roles.values() for s in role.sources}
         units |= {str(entry.get("unit", "A")) for entry in (self.loop or {}).get("axes", ())}
         return "Nm" if units == {"Nm"} else "A"
 
@@ -183,8 +171,8 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
     scores: Columns = {}
     features: Columns = {}
     if loop is None or verdict is not None or (out / files.SCORES).exists():
-        scores = folder.stage_table(files.SCORES, SCORE_COLUMNS)
-        features = folder.stage_table(files.FEATURES, FEATURE_COLUMNS)
+        scores = folder.table(files.SCORES, "score", tables.SCORES)
+        features = folder.table(files.FEATURES, "score", tables.FEATURES)
         if not n_rows(scores):
             msg = f"{out / 'scores.parquet'}: has no rows; run `opamc score` on tables with motions"
             raise InputError(msg)
@@ -197,8 +185,8 @@ def read_inputs(out: Path, moved_to: Mapping[str, Sequence[Path]]) -> ReportInpu
         verdict=verdict,
         roles=roles,
         loop=loop,
-        residuals=folder.optional_table(files.RESIDUALS, RESIDUAL_COLUMNS),
-        spectrum=folder.optional_table(files.ORDER_SPECTRUM, SPECTRUM_COLUMNS),
+        residuals=folder.optional_table(files.RESIDUALS, "model", tables.RESIDUALS),
+        spectrum=folder.optional_table(files.ORDER_SPECTRUM, "model", tables.ORDER_SPECTRUM),
         files=tuple(folder.files),
     )
 
@@ -224,22 +212,14 @@ class _Folder:
         self.out = out
         self.files: list[SourceFile] = []
 
-    def stage_table(self, name: str, needed: Sequence[str]) -> Columns:
+    def table(self, name: str, stage: str, schema: pa.Schema) -> Columns:
         path = self.out / name
-        table = read_table(path, "score")
-        _need_columns(path, table, needed)
+        table = read_table(path, stage, schema)
         self._note(path, table_record(path, table.schema.metadata))
         return to_columns(table)
 
-    def optional_table(self, name: str, needed: Sequence[str]) -> Columns | None:
-        path = self.out / name
-        if not path.exists():
-            return None
-        table = read_whole(path, "make it again or remove it")
-        _need_columns(path, table, needed)
-        metadata = table.schema.metadata or {}
-        self._note(path, table_record(path, metadata) if TABLE_KEY in metadata else None)
-        return to_columns(table)
+    def optional_table(self, name: str, stage: str, schema: pa.Schema) -> Columns | None:
+        return self.table(name, stage, schema) if (self.out / name).exists() else None
 
     def optional_json(self, name: str) -> Mapping[str, Any] | None:
         path = self.out / name
@@ -254,23 +234,14 @@ class _Folder:
 
 
 def _role_tables(folder: _Folder, role: str, moved_to: Sequence[Path]) -> RoleTables:
-    interval = ("run", "axis", "start", "stop")
-    motions = folder.optional_table(f"{role}/motions.parquet", interval)
-    segments = folder.optional_table(f"{role}/segments.parquet", interval)
-    counts = ("axis", "motion", "order", "counts")
+    motions = folder.optional_table(f"{role}/motions.parquet", "identify", tables.MOTIONS)
+    segments = folder.optional_table(f"{role}/segments.parquet", "segment", tables.SEGMENTS)
     return RoleTables(
         motions=motions if motions is not None else segments,
-        patterns=folder.optional_table(f"{role}/patterns.parquet", counts),
+        patterns=folder.optional_table(f"{role}/patterns.parquet", "patterns", tables.PATTERNS),
         sources=_sources(folder.out, role, moved_to),
         config=_recorded_config(folder.files, role),
     )
-
-
-def _need_columns(path: Path, table: pa.Table, needed: Sequence[str]) -> None:
-    missing = [name for name in needed if name not in table.column_names]
-    if missing:
-        msg = f"{path}: column {missing[0]} is missing; make the table again with this opamc"
-        raise InputError(msg)
 
 
 def _sources(out: Path, role: str, moved_to: Sequence[Path]) -> tuple[RunSource, ...]:

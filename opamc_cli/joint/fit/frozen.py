@@ -1,0 +1,88 @@
+"""A fitted model applied to other recordings: nothing is estimated."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from opamc_cli.joint.fit.model import MOST_ROUNDS, SETTLED, Term
+from opamc_cli.joint.motion.track import Bools, Floats, Track
+
+PLACED = ("motor-angle", "joint-angle")
+"""Domains whose coefficients need an angle that begins at the same place in every recording."""
+
+
+@dataclass(frozen=True)
+class Applied:
+    """What a frozen model says of recordings.
+
+    Attributes
+    ----------
+    residual_a : array of shape (n,)
+        Current less model.
+    judged : bool array of shape (n,)
+        Samples at which it means something: the joint moves, and the smoothing of the motion takes
+        nothing from its acceleration.
+    """
+
+    track: Track
+    residual_a: Floats
+    judged: Bools
+
+    def rmse(self, among: Bools | None = None) -> float:
+        """Root mean square residual on the judged samples, or on those that are `among` them."""
+        values = self.residual_a[self._rows(among)]
+        return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+    def r2(self, among: Bools | None = None) -> float:
+        """Share of the current's variance that the model explains; negative if it adds to it."""
+        rows = self._rows(among)
+        current = self.track.current_a[rows]
+        variance = float(np.var(current)) if current.size else 0.0
+        return 1 - self.rmse(among) ** 2 / variance if variance else 0.0
+
+    def _rows(self, among: Bools | None) -> Bools:
+        return self.judged if among is None else self.judged & among
+
+
+def why_not_applied(term: Term, track: Track) -> str | None:
+    """Say why a term's coefficients mean nothing on other recordings; None where they do."""
+    if term.effect.of_its_recordings:
+        return "its coefficients are of the recordings that it was fitted to"
+    if term.effect.domain in PLACED and "logged" not in track.channels:
+        return "the phases tell how far the joint turns, but not where it begins: log the position"
+    # load_friction asks for a load, which comes with the model
+    return None if term.effect.name == "load_friction" else term.effect.untestable(track)
+
+
+def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Floats]) -> Applied:
+    """Apply terms with known coefficients; where some follow the model, until that settles.
+
+    Parameters
+    ----------
+    track : Track
+        Other recordings, at the full rate, with the reference that the terms were fitted with.
+    terms : sequence of Term
+    coefficients : sequence of arrays
+        One for each term.
+    """
+    judged = track.moving & track.clear
+    judged = judged if judged.any() else track.moving
+    circular = not all(term.is_constant for term in terms)
+    total = np.zeros(track.size)
+    for _ in range(MOST_ROUNDS if circular else 1):
+        before, total = total, np.zeros(track.size)
+        model, load = np.zeros(track.size), np.zeros(track.size)
+        static = []
+        for term, values in zip(terms, coefficients, strict=True):
+            part = term.columns(track) @ values
+            total += part
+            if term.effect.static and not term.effect.fast:
+                model += part
+                static.append(term)
+            if term.effect.carries_load:
+                load += part
+        if np.abs(total - before).max() <= SETTLED * max(np.abs(total).max(), 1e-12):
+            break
+        track = track.with_model(load, model, tuple(static))
+    return Applied(track, track.current_a - total, judged)

@@ -1,0 +1,152 @@
+"""Stage `evaluate`: runs and a closed model in, evaluation.json out; nothing is estimated."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
+from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
+from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.fit.declared import BETTER
+from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.kinematics import build_track, smoothings
+from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.track import Floats, Joint, Reference, Track
+from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
+from opamc_cli.stages.model.declared_terms import declared_term
+from opamc_cli.stages.model.model import Outcome, each_axis
+from opamc_cli.stages.processes.parallel import Watch, unwatched
+from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
+from opamc_cli.storage.runs import Run
+from opamc_cli.storage.schemas import files
+
+
+def evaluate(
+    model: JointModelConfig,
+    paths: Sequence[tuple[str, Path]],
+    axes: Sequence[int],
+    out: Path,
+    *,
+    watch: Watch = unwatched,
+) -> Outcome:
+    """Apply a closed model's frozen coefficients to each axis; writes evaluation.json.
+
+    Parameters
+    ----------
+    model : JointModelConfig
+        As `opamc model close` wrote it.
+    paths : sequence of (str, Path)
+        Names and files of the runs.
+    axes : sequence of int
+        Axes; empty for all.
+    out : Path
+        Output folder.
+    watch : callable
+        Called as axes get done.
+
+    Raises
+    ------
+    ConfigError
+        If the model has no coefficients, or not as many as its effects have regressors.
+    """
+    if model.closed is None:
+        msg = "the model has not been closed, it has no coefficients; run `opamc model close` first"
+        raise ConfigError(msg)
+    closed = model.closed
+    results, errors, _ = each_axis(
+        paths, axes, lambda runs, axis: _on_axis(model, closed, runs, axis), watch
+    )
+    if not results:
+        return Outcome((), (), tuple(errors))
+    ensure_directory(out)
+    with atomic_path(out / files.EVALUATION) as temporary:
+        text = json.dumps({"axes": results}, indent=2, allow_nan=False, ensure_ascii=False)
+        temporary.write_text(text + "\n", encoding="utf-8")
+    return Outcome(tuple(results), (out / files.EVALUATION,), tuple(errors))
+
+
+def _on_axis(
+    model: JointModelConfig, closed: ClosedConfig, runs: Sequence[Run], axis: int
+) -> dict[str, Any]:
+    effects = declared_effects(model, library_of(model))
+    recordings, unit = recordings_of(runs, axis)
+    if unit != closed.unit:
+        msg = f"{runs[0].path}: is in {unit}, the model was closed in {closed.unit}; give such runs"
+        raise InputError(msg)
+    joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
+    track, _ = grouped_track(recordings, joint)
+    if not is_moving(track):
+        msg = f"{runs[0].path}: axis {axis} does not move; give runs in which it does"
+        raise NotEnoughDataError(msg)
+    if any(recording.position_rad is None for recording in recordings):
+        # a speed is summed up from wherever the recording begins
+        track = replace(track, channels=track.channels - {"logged"})
+    applied, left_out = _apply(track, effects, closed)
+    for smoothing in smoothings(recordings):
+        other = build_track(recordings, joint, smoothing)
+        # all are judged where the first one takes nothing from the acceleration
+        same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}
+        found, _ = _apply(replace(other, **same), effects, closed)
+        # the motion is differentiated in the way that predicts best, as when the model was closed
+        if found.rmse() ** 2 < BETTER * applied.rmse() ** 2:
+            applied = found
+    return {
+        "axis": axis,
+        "unit": unit,
+        "rmse_a": applied.rmse(),
+        "r2": applied.r2(),
+        "closed": {"rmse_a": closed.rmse, "r2": closed.r2},
+        "runs": [
+            {
+                "run": recording.name,
+                "rmse_a": applied.rmse(_within(applied, place)),
+                "r2": applied.r2(_within(applied, place)),
+            }
+            for place, recording in enumerate(recordings)
+        ],
+        "not_applied": left_out,
+    }
+
+
+def _within(applied: Applied, place: int) -> "np.ndarray[Any, np.dtype[np.bool_]]":
+    """Mark the samples of one recording."""
+    start, stop = applied.track.bounds[place]
+    among = np.zeros(applied.track.size, dtype=bool)
+    among[start:stop] = True
+    return among
+
+
+def _apply(
+    track: Track, effects: Sequence[tuple[Effect, Any]], closed: ClosedConfig
+) -> tuple[Applied, list[dict[str, str]]]:
+    track = replace(track, reference=Reference(closed.speed_rad_s, closed.temperature_c))
+    terms: list[Term] = []
+    coefficients: list[Floats] = []
+    left_out = []
+    for effect, entry in effects:
+        if entry.coefficients is None:
+            msg = (
+                f"effect {effect.name!r} has no coefficients: it was added by hand; close the "
+                "model again, or take the effect out"
+            )
+            raise ConfigError(msg)
+        term = declared_term(effect, entry, track) or Term(effect, {}, entry.columns)
+        why = why_not_applied(term, track)
+        if why is not None:
+            left_out.append({"effect": effect.name, "why": why})
+            continue
+        needed = term.columns(track).shape[1]
+        if needed != len(entry.coefficients):
+            msg = (
+                f"effect {effect.name!r} has {len(entry.coefficients)} coefficients for {needed} "
+                "regressors; close the model again"
+            )
+            raise ConfigError(msg)
+        terms.append(term)
+        coefficients.append(np.asarray(entry.coefficients, dtype=np.float64))
+    return apply_frozen(track, terms, coefficients), left_out
