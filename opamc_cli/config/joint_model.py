@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import yaml
 from pydantic import Field
 
 from opamc_cli.config.files import read_values, validate
@@ -62,6 +63,26 @@ class JointModelConfig(Section):
             DeclaredEffect(effect=entry) if isinstance(entry, str) else entry
             for entry in self.effects
         )
+
+
+def line_naming(path: Path, name: str) -> int | None:
+    """Return the line of a model's file that names an effect, counted from 1; None: no line."""
+    try:
+        root = yaml.compose(
+            shipped_file(path, "configs").read_text("utf-8"), Loader=yaml.SafeLoader
+        )
+    except (OSError, UnicodeError, yaml.YAMLError):
+        return None
+    waiting = [root] if root else []
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, yaml.ScalarNode) and node.value == name:
+            return int(node.start_mark.line) + 1
+        if isinstance(node, yaml.MappingNode):
+            waiting += [part for pair in reversed(node.value) for part in reversed(pair)]
+        elif isinstance(node, yaml.SequenceNode):
+            waiting += reversed(node.value)
+    return None
 
 
 def load_joint_model(path: Path, overrides: Sequence[str] = ()) -> JointModelConfig:

@@ -101,11 +101,72 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
 
     extended = yaml.safe_load((folder / "out" / "model.yaml").read_text())
     assert extended["effects"][-1]["effect"] == "stribeck"
+    check_a_closed_model_applied_to_other_runs(folder, extended, capsys)
     (folder / "model.yaml").write_text((folder / "out" / "model.yaml").read_text())
     assert close(folder, "--axis", "1") == 0
     again = json.loads((folder / "out" / "loop.json").read_text())["axes"][0]
     assert again["verdict"] == "nothing-missing"
     assert again["before"]["rmse_a"] == pytest.approx(loop["after"]["rmse_a"], rel=0.01)
+
+
+def check_a_closed_model_applied_to_other_runs(folder, extended, capsys):
+    """Coefficients are those of the closed model; another load is an error, not another fit."""
+    assert all(len(entry["coefficients"]) >= 1 for entry in extended["effects"])
+    model = folder / "out" / "model.yaml"
+    errors = {}
+    for name, seed, load in (("own", 3, 1.0), ("other", 3, 1.5)):
+        made = simulate(seed, ("stribeck",), 0.8, rate=250.0, cycles=6)
+        current = made.current.astype("f4") * np.float32(load)
+        run = folder / f"{name}.parquet"
+        write_run(run, 250.0, axis1_current=current, axis1_position=made.position)
+        out = folder / f"evaluated-{name}"
+        assert opamc("model", "evaluate", run, "--model", model, "--out", out) == 0
+        (axis,) = json.loads((out / "evaluation.json").read_text())["axes"]
+        errors[name] = axis["rmse_a"]
+        assert axis["closed"]["rmse_a"] == pytest.approx(extended["closed"]["rmse"])
+        assert axis["not_applied"] == []
+    assert errors["own"] == pytest.approx(extended["closed"]["rmse"], rel=0.2)
+    # half of the current has no explanation in frozen coefficients
+    assert errors["other"] > 0.3 * np.std(made.current)
+    assert f"error {errors['other']:.4g} A" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("effects", "said"),
+    [
+        ("effects: [inertia]", "has not been closed"),
+        ("effects: [inertia]\nclosed: {rmse: 1}", "'inertia' has no coefficients"),
+        (
+            "effects: [{effect: inertia, coefficients: [1, 2]}]\nclosed: {rmse: 1}",
+            "2 coefficients for 1 regressors",
+        ),
+        (
+            "effects: [{effect: inertia, coefficients: [1]}]\nclosed: {unit: Nm}",
+            "is in A, the model was closed in Nm",
+        ),
+    ],
+)
+def test_a_model_that_cannot_be_evaluated(folder, capsys, effects, said):
+    (folder / "model.yaml").write_text(effects)
+    run, model = folder / "run.parquet", folder / "model.yaml"
+    code = opamc("model", "evaluate", run, "--model", model, "--axis", 1, "--out", folder / "o")
+    assert code in (2, 3)
+    assert said in capsys.readouterr().err
+
+
+def test_a_torque_is_never_called_a_current(folder, capsys):
+    table = pq.read_table(folder / "run.parquet")
+    record = {"sampling_rate_hz": 250.0, "current_unit": "Nm"}
+    table = table.replace_schema_metadata({b"opamc": json.dumps(record).encode()})
+    pq.write_table(table, folder / "run.parquet")
+    assert close(folder, "--axis", "1") == 0
+    assert opamc("model", "fit", folder / "run.parquet", "--axis", 1, "--out", folder / "out") == 0
+    shown = capsys.readouterr().out
+    assert "Nm rms left" in shown
+    assert "Nm per rad/s²" in shown
+    assert " A" not in shown.replace(" Axis", "")
+    (axis,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
+    assert axis["unit"] == "Nm"
 
 
 def test_fit_and_trace_write_their_tables(folder):
@@ -203,6 +264,46 @@ def test_a_mistake_in_a_users_effect_is_told_with_file_and_line(folder, capsys):
     told = capsys.readouterr().err
     assert f"{folder / 'mine.py'}:6: this effect cannot be used (AttributeError" in told
     assert "a bug" not in told
+
+
+@pytest.mark.parametrize(
+    ("method", "answer", "said"),
+    [
+        ("columns(self, track, parameters)", "track.velocity", "shape (1"),
+        ("columns(self, track, parameters)", "[1.0]", "returns list; ("),
+        ("columns(self, track, parameters)", "stack(track.velocity / 0)", "not finite"),
+        ("columns(self, track, parameters)", "stack(track.velocity[:9])", "shape (9, 1)"),
+        ("guesses(self, track, residual)", "{}", "a list of mappings"),
+        ("limits(self, track)", "{'x': 3}", "(lowest, highest)"),
+        ("untestable(self, track)", "7", "a text or None"),
+    ],
+)
+def test_what_a_users_effect_returns_is_checked(folder, capsys, method, answer, said):
+    (folder / "mine.py").write_text(
+        "from opamc_cli.joint.effects.base import Effect, stack\n"
+        "class Knee(Effect):\n"
+        "    name = 'knee'\n"
+        "    domain = 'velocity'\n"
+        "    def columns(self, track, parameters):\n"
+        "        return stack(track.velocity)\n"
+        f"    def {method}:\n"
+        f"        return {answer}\n"
+    )
+    (folder / "model.yaml").write_text("effects: [coulomb, knee]\nlibrary: [mine.py]\n")
+    run, model = folder / "run.parquet", folder / "model.yaml"
+    with np.errstate(all="ignore"):
+        code = opamc("model", "fit", run, "--model", model, "--axis", 1, "--out", folder / "o")
+    assert code == 2
+    told = capsys.readouterr().err
+    assert f"{folder / 'mine.py'}:7: " in told
+    assert said in told
+
+
+def test_an_unknown_effect_is_told_with_its_line(folder, capsys):
+    (folder / "model.yaml").write_text("effects:\n- inertia\n- grvity\n")
+    run, model = folder / "run.parquet", folder / "model.yaml"
+    assert opamc("model", "fit", run, "--model", model, "--axis", 1, "--out", folder / "o") == 2
+    assert f"{model}:3: Unknown effect 'grvity'" in capsys.readouterr().err
 
 
 def test_effects_are_listed_and_shown(capsys):

@@ -185,10 +185,14 @@ def evaluate(
 @contextmanager
 def _naming(model: Path) -> Iterator[None]:
     """Name the model's file in what is wrong with it, and a line of a user's own effect."""
+    from opamc_cli.config.joint_model import line_naming
+    from opamc_cli.joint.effects.library import UnknownEffectError
+
     try:
         yield
     except ConfigError as error:
-        msg = f"{model}: {error}"
+        named = isinstance(error, UnknownEffectError) and line_naming(model, error.name)
+        msg = f"{model}:{named}: {error}" if named else f"{model}: {error}"
         raise ConfigError(msg) from error
     except OpamcError:
         raise

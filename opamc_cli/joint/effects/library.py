@@ -28,6 +28,7 @@ from opamc_cli.joint.effects.stribeck import Stribeck
 from opamc_cli.joint.effects.sublinear_friction import SublinearFriction
 from opamc_cli.joint.effects.thermal_viscous import ThermalViscous
 from opamc_cli.joint.effects.time_delay import TimeDelay
+from opamc_cli.joint.effects.user import checked
 from opamc_cli.joint.effects.viscous import Viscous
 from opamc_cli.joint.effects.warmup import Warmup
 
@@ -60,6 +61,14 @@ BUILT_IN: tuple[type[Effect], ...] = (
 Library = dict[str, Effect]
 
 
+class UnknownEffectError(ConfigError):
+    """A name that the library does not have."""
+
+    def __init__(self, name: str, message: str) -> None:
+        super().__init__(message)
+        self.name = name
+
+
 def built_in_library(without: tuple[str, ...] = ()) -> Library:
     """Every effect that comes with the package.
 
@@ -84,7 +93,7 @@ def effect_named(library: Library, name: str) -> Effect:
     near = get_close_matches(name, library, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(library)}"
     msg = f"Unknown effect {name!r} in the model; {hint}"
-    raise ConfigError(msg)
+    raise UnknownEffectError(name, msg)
 
 
 def load_user_effects(path: Path) -> list[Effect]:
@@ -121,4 +130,4 @@ def load_user_effects(path: Path) -> list[Effect]:
     if not found or not all(named):
         msg = f"Effect file {path} defines no class of Effect with a name and a domain"
         raise ConfigError(msg)
-    return found
+    return [checked(effect, path) for effect in found]

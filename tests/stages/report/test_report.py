@@ -23,6 +23,7 @@ FIGURES = {
     "latent-axis",
     "motion-signal",
     "similarity",
+    "partial-residuals-3",
     "residual-3",
     "order-spectrum-3",
 }

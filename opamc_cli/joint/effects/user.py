@@ -1,0 +1,118 @@
+"""Effects from a user's file: what they give is checked before the loop works with it."""
+
+import inspect
+from collections.abc import Callable
+from functools import wraps
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.errors import ConfigError
+from opamc_cli.joint.effects.base import Effect
+
+
+def _columns(given: Any, track: Any) -> str | None:
+    if not isinstance(given, np.ndarray) or given.ndim != 2 or given.shape[0] != track.size:
+        is_array = isinstance(given, np.ndarray)
+        what = f"an array of shape {given.shape}" if is_array else type(given).__name__
+        return f"{what}; ({track.size}, m) is needed, a column for each regressor (see `stack`)"
+    if given.shape[1] == 0 or given.dtype.kind not in "fiu":
+        return f"{given.shape[1]} columns of {given.dtype}; at least one of float64 is needed"
+    return None if np.isfinite(given).all() else "numbers that are not finite"
+
+
+def _guesses(given: Any, track: Any) -> str | None:
+    return (
+        None
+        if isinstance(given, list) and given and all(map(_is_parameters, given))
+        else f"{given!r:.60}; a list of mappings from parameter to number is needed, such as [{{}}]"
+    )
+
+
+def _limits(given: Any, track: Any) -> str | None:
+    pairs = list(given.values()) if isinstance(given, dict) else [None]
+    if all(isinstance(pair, tuple) and len(pair) == 2 and pair[0] < pair[1] for pair in pairs):
+        return None
+    return f"{given!r:.60}; a mapping from parameter to (lowest, highest) is needed"
+
+
+def _sentence(given: Any, track: Any) -> str | None:
+    return None if isinstance(given, str) else f"{given!r:.60}; a text is needed"
+
+
+def _reason(given: Any, track: Any) -> str | None:
+    return None if given is None or isinstance(given, str) else f"{given!r:.60}; a text or None"
+
+
+def _is_parameters(given: Any) -> bool:
+    return isinstance(given, dict) and all(
+        isinstance(name, str) and isinstance(value, int | float) and isfinite(value)
+        for name, value in given.items()
+    )
+
+
+CHECKS: dict[str, Callable[[Any, Any], str | None]] = {
+    "columns": _columns,
+    "guesses": _guesses,
+    "limits": _limits,
+    "interpretation": _sentence,
+    "untestable": _reason,
+}
+"""By method: what is wrong with what it returns on a track, if anything."""
+
+TEXTS = ("needs", "searches", "forms")
+
+
+def checked(effect: Effect, path: Path) -> Effect:
+    """Have every answer of a user's effect checked, and say where the method is that gave it.
+
+    Parameters
+    ----------
+    effect : Effect
+        Of a user's file.
+    path : Path
+        The file.
+
+    Raises
+    ------
+    ConfigError
+        If a name or a list of names is none; later, from the methods, if they answer otherwise
+        than the loop needs.
+    """
+    kind = type(effect)
+    for name in TEXTS:
+        given = getattr(effect, name)
+        if not isinstance(given, tuple) or not all(isinstance(each, str) for each in given):
+            msg = (
+                f"{path}: {name} of effect {effect.name!r} is {given!r:.60}; write a tuple of texts"
+            )
+            raise ConfigError(msg)
+    for name, wrong in CHECKS.items():
+        method = getattr(kind, name)
+        if method is not getattr(Effect, name) and inspect.isfunction(method):
+            setattr(effect, name, _checked(effect, name, wrong, f"{path}:{_line(method)}"))
+    return effect
+
+
+def _checked(
+    effect: Effect, name: str, wrong: Callable[[Any, Any], str | None], where: str
+) -> Callable[..., Any]:
+    method = getattr(effect, name)
+
+    @wraps(method)
+    def call(*arguments: Any, **named: Any) -> Any:
+        given = method(*arguments, **named)
+        tracks = [value for value in (*arguments, *named.values()) if hasattr(value, "rate_hz")]
+        why = wrong(given, tracks[0]) if tracks else None
+        if why is not None:
+            msg = f"{where}: {name} of effect {effect.name!r} returns {why}; correct it"
+            raise ConfigError(msg)
+        return given
+
+    return call
+
+
+def _line(method: Callable[..., Any]) -> int:
+    return method.__code__.co_firstlineno
