@@ -196,7 +196,7 @@ def test_wrong_declarations_end_in_one_sentence(folder, capsys, model, axis, cod
     assert words in error
     assert len(error.splitlines()) == 1
     if code == 2:
-        assert "model.yaml: " in error
+        assert "model.yaml:" in error
 
 
 def test_too_little_motion_to_seal_anything_off(folder, capsys):
