@@ -11,6 +11,7 @@ import os
 import re
 import shutil
 import stat
+import uuid
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from datetime import date
@@ -163,12 +164,11 @@ def fetch(log: LogFile, to: Path) -> Path:
     """
     if not log.remote:
         return Path(log.path)
-    name = hashlib.sha256(f"{log.path} {log.size} {log.mtime_ns}".encode()).hexdigest()
-    copy = to / f"{name}.parquet"
+    copy = to / copy_name(log)
     if copy.exists():
         return copy
     to.mkdir(parents=True, exist_ok=True)
-    part = to / f"{name}.{os.getpid()}.part"
+    part = copy.with_suffix(f".{uuid.uuid4().hex}.part")  # other machines may fetch it, too
     try:
         filesystem, path = pa.fs.FileSystem.from_uri(log.path)
         with filesystem.open_input_stream(path) as source, part.open("wb") as target:
@@ -179,6 +179,12 @@ def fetch(log: LogFile, to: Path) -> Path:
         msg = f"{log.path}: cannot be fetched ({_first_line(error)}); check address and credentials"
         raise InputError(msg) from error
     return copy
+
+
+def copy_name(log: LogFile) -> str:
+    """Return how `fetch` calls its copy: another name for other bytes."""
+    told = f"{log.path} {log.size} {log.mtime_ns}"
+    return f"{hashlib.sha256(told.encode()).hexdigest()}.parquet"
 
 
 def _local(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:

@@ -35,6 +35,7 @@ from opamc_cli.storage.history import (
     VerdictRow,
     as_notes,
 )
+from opamc_cli.storage.logs import copy_name
 from opamc_cli.storage.schemas import files
 
 WORK, KEPT, COPIES = ".work", ".kept", ".copies"
@@ -172,6 +173,7 @@ def run(
             _record(cell, history, night, job, answer, attempts, outcome)
             watch(n_done, len(works))
     shutil.rmtree(cell.out / WORK, ignore_errors=True)
+    _drop_copies(cell.out / COPIES, outcome.planned)
     progress("alarms and pages")
     outcome.robots = tuple(sorted(recordings.by_robot))
     outcome.summary = settle_cell(cell, source, history, outcome.robots)
@@ -253,8 +255,18 @@ def _job(cell: CellConfig, source: str, night: PlannedNight) -> NightJob:
         config=cell.diagnosis_of(night.robot, source),
         axes=cell.axes_of(night.robot),
         kept=(cell.out / KEPT).absolute(),
+        copies=(cell.out / COPIES).absolute(),
         scratch=(cell.out / WORK).absolute(),
     )
+
+
+def _drop_copies(copies: Path, planned: Sequence[PlannedNight]) -> None:
+    """Keep copies of baselines only: every night needs them, and a target is not read again."""
+    baselines = (one for night in planned for each in night.comparisons for one in each.baseline)
+    keep = {copy_name(one.log) for one in baselines if one.log.remote}
+    for copy in copies.iterdir() if copies.is_dir() else ():
+        if copy.name not in keep:
+            copy.unlink(missing_ok=True)
 
 
 def _inputs(recordings: Sequence[Recording]) -> tuple[Input, ...]:

@@ -3,6 +3,9 @@
 import os
 import shutil
 import signal
+import socket
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -14,6 +17,7 @@ import pytest
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.workers.cluster import SchedulerLostError, run_all
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: opamc[cluster]")
 
@@ -59,3 +63,33 @@ def test_a_scheduler_that_is_not_there_is_a_sentence(cell, opamc, monkeypatch):
     ended = opamc("nightly", cell, "--scheduler", "tcp://127.0.0.1:9")
     assert ended.code == ExitCode.USAGE
     assert "does not answer" in ended.err
+
+
+def test_a_scheduler_that_is_lost_ends_with_a_sentence_and_what_was_done(monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
+    common = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--no-dashboard"]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    host, port = address.removeprefix("tcp://").split(":")
+    scheduler = subprocess.Popen([*common, "--host", host, "--port", port], **quiet)
+    worker = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-dashboard"),
+            *("--nworkers", "1", "--nthreads", "1", "--no-nanny", "--death-timeout", "20"),
+        ],
+        **quiet,
+    )
+    done = []
+    try:
+        answers = run_all("worker_jobs:behave", ["nap"] * 40, address, seconds=60)
+        done.append(next(answers))
+        scheduler.kill()
+        with pytest.raises(SchedulerLostError, match=r"is lost; \d+ of 40 nights are done"):
+            done += answers
+    finally:
+        for process in (scheduler, worker):
+            process.kill()
+            process.wait()
+    assert done[0] == ("nap", "NAP")

@@ -280,3 +280,31 @@ def test_what_follows_is_the_same_in_whatever_order_nights_come(cell, opamc):
 
 def test_compute_is_loaded_by_workers_only():
     assert stage.COMPUTE == "opamc_cli.stages.nightly.workers.judge:compute"
+
+
+def test_logs_in_a_store_are_fetched_once_and_baselines_kept(cell, opamc):
+    """A store by the path that object stores take, `file://` in the place of `s3://`."""
+    shutil.rmtree(cell.parent / "logs" / "r1" / NIGHTS[4])
+    cell.write_text(cell.read_text() + "robots: {r1: {}}\n")
+    here = opamc("nightly", cell, "--json")
+    axes = {
+        path.relative_to(cell.parent / "nightly"): json.loads(path.read_text())["axes"]
+        for path in (cell.parent / "nightly").glob("r*/*/verdict.json")
+    }
+    shutil.rmtree(cell.parent / "nightly")
+    logs = cell.parent / "logs"
+    cell.write_text(cell.read_text().replace("runs: logs", f"runs: {logs.as_uri()}"))
+    store = opamc("nightly", cell, "--json")
+    assert store == here
+    out = cell.parent / "nightly"
+    found = {path.relative_to(out): path for path in out.glob("r*/*/verdict.json")}
+    assert {name: json.loads(path.read_text())["axes"] for name, path in found.items()} == axes
+    assert len(list((out / ".copies").iterdir())) == 3
+    # nothing is fetched again, and a store that is gone is a sentence
+    before = sorted((path.name, path.stat().st_mtime_ns) for path in (out / ".copies").iterdir())
+    assert opamc("nightly", cell, "--quiet").out == ""
+    assert before == sorted((p.name, p.stat().st_mtime_ns) for p in (out / ".copies").iterdir())
+    cell.write_text(cell.read_text().replace("runs: file", "runs: nowhere"))
+    gone = opamc("nightly", cell)
+    assert gone.code == ExitCode.BAD_INPUT
+    assert "cannot be listed" in gone.err

@@ -73,9 +73,11 @@ def _scratch(job: NightJob) -> Path:
 def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
     if wanted.missing:
         return ProgramResult(wanted.program, failures=(wanted.missing,))
+    # a machine that does not see `out` throws its copies away
+    copies = job.copies if job.copies.parent.is_dir() else folder / "copies"
     try:
         sides = [
-            _laid_out(inputs, folder / role, folder / "copies")
+            _laid_out(inputs, folder / role, copies)
             for role, inputs in (("baseline", wanted.baseline), ("target", wanted.targets))
         ]
         outcome = diagnose.run(

@@ -57,6 +57,8 @@ class NightJob:
         Joints that are watched; None: all.
     kept
         Folder of what is kept of baselines; None where the worker cannot reach it.
+    copies
+        Folder for copies of recordings that lie in an object store.
     scratch
         Folder for what is thrown away.
     version
@@ -69,6 +71,7 @@ class NightJob:
     config: Config
     axes: tuple[int, ...] | None
     kept: Path | None
+    copies: Path
     scratch: Path
     version: str = __version__
 
