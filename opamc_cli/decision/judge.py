@@ -252,7 +252,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         p_values[axis] = _beyond_ranks(together.p_value(axis), step, ranked, asked)
         for name, kind in evidence.get(axis, {}).items():
             sure = asked * own[name]
-            if not kind.ranks and sure < min(p_values[axis], step):
+            if not kind.ranks and sure < min(p_values[axis], policy.false_alarm_rate):
                 heard, times, p_values[axis] = alone_by_witness[name], asked, sure
         shifts[axis] = heard.shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
         # who speaks for itself has to be odd among all siblings, not only among most
