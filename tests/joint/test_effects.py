@@ -12,13 +12,13 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
-from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.effects.ripple import order_ties, read_order
 from opamc_cli.joint.effects.second_order import discrete
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, averaged, block_mean, coarsen
-from opamc_cli.joint.noise.spectra import order_lines
+from opamc_cli.joint.noise.spectra import order_lines, order_resolution
 
 VOCABULARY = [
     "inertia",
@@ -184,7 +184,8 @@ def test_white_noise_has_no_order_peak():
     [
         (1.0, "eccentricity"),
         (2.0, "kinematic error, twice"),
-        (2.02, "flexspline tooth damage"),
+        (2.02, "flexspline tooth damage (2(N+1)/N)"),
+        (1.98, "flexspline tooth damage (2(N-1)/N)"),
         (4.0, "kinematic error, four"),
         (5.0, "electrical, 1p"),
         (30.0, "electrical, 6p"),
@@ -195,6 +196,25 @@ def test_white_noise_has_no_order_peak():
 def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
     _, track = track_of(Joint(100.0, 5))
     assert reading in read_order(order, track)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.98, 2.0, 2.01, 2.02, 4.0])
+def test_lines_of_healthy_gears_are_called_so_without_a_comparison(order):
+    _, track = track_of(Joint(100.0, 5))
+    told = built_in_library()["ripple"].interpretation({"order": order}, track)
+    assert "healthy gears" in told
+    assert "earlier recording" in told
+    assert "inspect" not in told
+    assert "check" not in told
+
+
+def test_orders_closer_than_the_resolution_are_tied():
+    _, track = track_of(Joint(100.0, 5))
+    width = order_resolution(track)
+    tied = order_ties(2.02, track)
+    assert any("kinematic error (order 2)" in name for name in tied) == (width > 0.02)
+    assert order_ties(3.3, track) == []
+    assert order_ties(2.02, track_of(Joint())[1]) == []
 
 
 def test_without_gear_ratio_orders_are_counted_per_joint_revolution():

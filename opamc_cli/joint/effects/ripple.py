@@ -133,7 +133,7 @@ class Ripple(Effect):
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""
-        return read_order(parameters["order"], track)
+        return read_order(parameters["order"], track, compared=False)
 
 
 def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> list[Floats]:
@@ -219,11 +219,48 @@ def named_orders(track: Track, order: float) -> list[float]:
     named = [float(max(round(order), 1))]
     ratio = track.joint.gear_ratio
     if track.angle_kind == "motor" and ratio:
-        named += [2 * (ratio + 1) / ratio * k for k in range(1, 5)]
+        for _, teeth in meshes(ratio):
+            named += [2 * teeth / ratio * k for k in range(1, 5)]
     return named
 
 
-def read_order(order: float, track: Track) -> str:
+def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
+    """Return the teeth that two lobes pass per output turn, with the line's formula.
+
+    The flexspline of a gear that turns its flexspline out meets a damaged tooth 2(N+1)/N times per
+    turn of the motor; one that is mounted the other way round, with the circular spline turning
+    out, 2(N-1)/N times.
+    """
+    return ("2(N+1)/N", ratio + 1), ("2(N-1)/N", ratio - 1)
+
+
+def order_ties(order: float, track: Track) -> list[str]:
+    """Return the known lines that lie within the order resolution of another one.
+
+    Parameters
+    ----------
+    order : float
+        As found, per revolution of the track's machine angle.
+    track : Track
+        Tells constants of the joint and the resolution.
+
+    Returns
+    -------
+    list of str
+        Names of those beside the nearest; empty where orders have no meaning.
+    """
+    ratio = track.joint.gear_ratio
+    if track.angle_kind != "motor" or not ratio:
+        return []
+    lines = [(float(k), f"kinematic error (order {k})") for k in (2, 4)]
+    for (formula, teeth), k in product(meshes(ratio), (1, 2)):
+        line = 2 * teeth / ratio * k
+        lines.append((line, f"flexspline tooth damage ({formula}, order {line:.4g})"))
+    close = [line for line in lines if abs(line[0] - order) < order_resolution(track)]
+    return [name for _, name in sorted(close, key=lambda line: abs(line[0] - order))[1:]]
+
+
+def read_order(order: float, track: Track, compared: bool = True) -> str:
     """Say what a ripple order means.
 
     Parameters
@@ -232,6 +269,9 @@ def read_order(order: float, track: Track) -> str:
         Cycles per revolution of the track's machine angle.
     track : Track
         Gives the kind of angle, gear ratio, pole pairs and angular resolution.
+    compared : bool
+        Whether the line has grown between recordings. Many healthy gears have one of the gear's
+        lines: without a comparison nothing is to be inspected.
 
     Returns
     -------
@@ -252,22 +292,32 @@ def read_order(order: float, track: Track) -> str:
     travel = float(np.ptp(track.machine_angle_rad[track.moving]))
     width = min(0.35 * 2 * math.pi / travel, 0.25)
     if ratio:
-        for harmonic in (1, 2):
-            tooth = 2 * (ratio + 1) / ratio * harmonic
+        for harmonic, (formula, teeth) in product((1, 2), meshes(ratio)):
+            tooth = 2 * teeth / ratio * harmonic
+            damage = (
+                f"flexspline tooth damage ({formula}): inspect the flexspline"
+                if compared
+                else f"line of the tooth mesh ({formula}), which healthy gears may have: only its "
+                "growth since an earlier recording tells tooth damage"
+            )
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
-                return "flexspline tooth damage (2(N+1)/N): inspect the flexspline"
+                return damage
             for sideband in (-2, -1, 1, 2):
                 if harmonic == 1 and abs(order - tooth - sideband / ratio) < min(
                     width, 0.35 / ratio
                 ):
                     if abs(order - 2.0) < 0.35 / ratio:
                         continue
-                    return "sideband of 2(N+1)/N, flexspline tooth damage: inspect the flexspline"
+                    return f"sideband of {formula}, {damage}"
+    advice = {
+        True: ("check rotor and wave generator", "check the wave generator"),
+        False: ("many healthy gears have it, compare with an earlier recording",) * 2,
+    }[compared]
     if abs(order - 1) < width:
-        return "eccentricity, once per motor revolution: check rotor and wave generator"
+        return f"eccentricity, once per motor revolution: {advice[0]}"
     if abs(order - 2) < width or abs(order - 4) < width:
         times = "twice" if abs(order - 2) < width else "four times"
-        return f"kinematic error, {times} per wave generator turn: check the wave generator"
+        return f"kinematic error, {times} per wave generator turn: {advice[1]}"
     if poles:
         for multiple in (1, 2, 6):
             if abs(order - multiple * poles) < width:

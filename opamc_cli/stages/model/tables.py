@@ -1,19 +1,21 @@
 """What the model commands write: tables, loop.json's entries, the extended model."""
 
 import json
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
+from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Fit, Session, Term
 from opamc_cli.joint.loop import Loop, Step
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Trial
-from opamc_cli.joint.noise.spectra import order_spectrum
+from opamc_cli.joint.noise.spectra import order_resolution, order_spectrum
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 
@@ -115,9 +117,17 @@ def explained_entry(start: Chain, explained: Chain) -> dict[str, Any]:
     }
 
 
-def step_entry(step: Step) -> dict[str, Any]:
-    """One entry of `steps`."""
+def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, Any]:
+    """One entry of `steps`; ripples whose orders the travel cannot tell apart are tied."""
     curve = step.curve
+    order = step.term.parameters.get("order")
+    ties = list(step.ties)
+    if order is not None:
+        ties += order_ties(order, track)
+        for other in others:
+            near = other.term.parameters.get("order")
+            if other is not step and near and abs(near - order) < order_resolution(track):
+                ties.append(f"ripple of order {near:.5g}")
     return {
         "effect": step.term.effect.name,
         "domain": step.term.effect.domain,
@@ -127,7 +137,7 @@ def step_entry(step: Step) -> dict[str, Any]:
         "t_value": step.t_value,
         "p_value": step.p_value,
         "decoy_gain": step.decoy_gain,
-        "ties": list(step.ties),
+        "ties": ties,
         "separating_experiment": step.experiment,
         "fit_of_name": step.fit_of_name,
         "approximate": step.approximate,
@@ -152,7 +162,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "declared": [effect.name for effect, _ in laid.declared],
         "sealed": [grouping.names[g] for g in grouping.sealed],
         "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
-        "steps": [step_entry(step) for step in loop.steps],
+        "steps": [step_entry(step, loop.steps, laid.session.fine.track) for step in loop.steps],
         "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
         "floor_a": loop.floor_a,
         "explained_share": loop.explained_share,
