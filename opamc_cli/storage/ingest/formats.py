@@ -1,30 +1,48 @@
 """Formats of foreign recordings: which endings tell them, and what each needs to be read."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
-FORMAT_OF_ENDING = {
-    ".csv": "csv",
-    ".txt": "csv",
-    ".tsv": "csv",
-    ".dat": "csv",
-    ".mat": "mat",
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".hdf": "hdf5",
-    ".tdms": "tdms",
-    ".parquet": "parquet",
-    ".pq": "parquet",
-    ".feather": "feather",
-    ".arrow": "feather",
-    ".bag": "ros",
-    ".mcap": "ros",
-    ".db3": "ros",
-    ".mf4": "mdf",
-    ".mdf": "mdf",
-}
 
-EXTRA_OF_FORMAT = {"hdf5": "ingest", "tdms": "ingest", "ros": "ros", "mdf": "mdf"}
-"""Which extra of the package brings a format's library; the others are always there."""
+@dataclass(frozen=True)
+class Format:
+    """One format of foreign recordings.
+
+    Attributes
+    ----------
+    shown
+        What users call it.
+    endings
+        Of its files.
+    reader
+        ``module:function`` in `readers`, imported only where the format is read; called with the
+        path, it is a context manager that yields a `Source`.
+    extra
+        Of the package, which brings the library that it needs.
+    laid_out
+        The map says how a text is laid out: the reader takes the map, too.
+    """
+
+    shown: str
+    endings: tuple[str, ...]
+    reader: str
+    extra: str | None = None
+    laid_out: bool = False
+
+
+FORMATS = {
+    "csv": Format("CSV", (".csv", ".txt", ".tsv", ".dat"), "csv:CsvSource", laid_out=True),
+    "mat": Format("MAT", (".mat",), "mat:open_mat"),
+    "hdf5": Format("HDF5", (".h5", ".hdf5", ".hdf"), "hdf5:open_hdf5", "ingest"),
+    "tdms": Format("TDMS", (".tdms",), "tdms:open_tdms", "ingest"),
+    "parquet": Format("Parquet", (".parquet", ".pq"), "arrow:open_parquet"),
+    "feather": Format("Feather", (".feather", ".arrow"), "arrow:open_feather"),
+    "ros": Format("ROS bags (.bag, .mcap, .db3)", (".bag", ".mcap", ".db3"), "ros:open_ros", "ros"),
+    "mdf": Format("MDF (.mf4)", (".mf4", ".mdf"), "mdf:open_mdf", "mdf"),
+}
+"""By the name that a map gives as `format`."""
+
+FORMAT_OF_ENDING = {ending: name for name, one in FORMATS.items() for ending in one.endings}
 
 ROS2_INDEX = "metadata.yaml"
 """A ROS 2 bag is a folder that holds this file."""
@@ -51,4 +69,5 @@ def is_ros2_bag(path: Path) -> bool:
 
 def known_endings() -> str:
     """Return what can be read, for a message."""
-    return "CSV, MAT, HDF5, TDMS, Parquet, Feather, ROS bags (.bag, .mcap, .db3) and MDF (.mf4)"
+    *most, last = (one.shown for one in FORMATS.values())
+    return f"{', '.join(most)} and {last}"

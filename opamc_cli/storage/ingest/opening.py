@@ -1,14 +1,15 @@
 """Open a foreign recording, by its format, and let every error name the file."""
 
+import importlib
 import struct
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 
 from opamc_cli.config.reading import require_regular_file
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.formats import is_ros2_bag
+from opamc_cli.storage.ingest.formats import FORMATS, is_ros2_bag
 from opamc_cli.storage.ingest.map.map_file import IngestMap, format_of
 from opamc_cli.storage.ingest.source import Block, Listed, Name, Selection, Source
 
@@ -56,40 +57,13 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
 
 
 def _opened(path: Path, channels: IngestMap) -> AbstractContextManager[Source]:
+    form = FORMATS[format_of(path, channels)]
+    module, _, function = form.reader.partition(":")
     # each format's library is imported only where that format is read
-    match format_of(path, channels):
-        case "csv":
-            from opamc_cli.storage.ingest.readers.csv import CsvSource
-
-            return CsvSource(path, channels)
-        case "mat":
-            from opamc_cli.storage.ingest.readers.mat import open_mat
-
-            return open_mat(path)
-        case "hdf5":
-            from opamc_cli.storage.ingest.readers.hdf5 import open_hdf5
-
-            return open_hdf5(path)
-        case "parquet":
-            from opamc_cli.storage.ingest.readers.arrow import open_parquet
-
-            return open_parquet(path)
-        case "feather":
-            from opamc_cli.storage.ingest.readers.arrow import open_feather
-
-            return open_feather(path)
-        case "ros":
-            from opamc_cli.storage.ingest.readers.ros import open_ros
-
-            return open_ros(path)
-        case "mdf":
-            from opamc_cli.storage.ingest.readers.mdf import open_mdf
-
-            return open_mdf(path)
-        case _:
-            from opamc_cli.storage.ingest.readers.tdms import open_tdms
-
-            return open_tdms(path)
+    reader: Callable[..., AbstractContextManager[Source]] = getattr(
+        importlib.import_module(f"opamc_cli.storage.ingest.readers.{module}"), function
+    )
+    return reader(path, channels) if form.laid_out else reader(path)
 
 
 @contextmanager

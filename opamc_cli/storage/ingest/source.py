@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.formats import EXTRA_OF_FORMAT
+from opamc_cli.storage.ingest.formats import FORMATS
 
 Name = int | str
 """A channel: column number from 0 or name (CSV), "struct.field" (MAT), "group/dataset" (HDF5),
@@ -99,7 +99,7 @@ def missing_channel(path: Path, source: Name, known: list[str]) -> InputError:
 
 def missing_library(path: Path, name: str, format_name: str) -> InputError:
     """Return the error for a format whose library is not installed."""
-    extra = EXTRA_OF_FORMAT[format_name]
+    extra = FORMATS[format_name].extra
     return InputError(
         f"{path}: reading this format needs {name}; install it with pip install 'opamc[{extra}]'"
     )

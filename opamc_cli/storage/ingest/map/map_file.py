@@ -3,12 +3,12 @@
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
+from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
 from opamc_cli.storage.ingest.map.axes import expand, has_placeholder
 from opamc_cli.storage.ingest.map.units import QUANTITY_OF_KIND, conversion
 from opamc_cli.storage.ingest.source import Listed, Name
@@ -17,7 +17,10 @@ Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
 Finite = Annotated[float, Field(ge=-1e15, le=1e15, allow_inf_nan=False)]
 MOST_SKIPPED = 1_000_000
 """Lines before the data: no logger writes a longer heading."""
-Format = Literal["csv", "mat", "hdf5", "tdms", "parquet", "feather", "ros", "mdf"]
+if TYPE_CHECKING:
+    Format = str
+else:
+    Format = Literal[tuple(FORMATS)]
 
 
 class _Strict(BaseModel):
