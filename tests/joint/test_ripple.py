@@ -12,6 +12,7 @@ from opamc_cli.joint.effects.ripple import Ripple
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import build_track
 from opamc_cli.joint.motion.track import Joint
+from tests.marks import long
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
 ANSWERED = EVERYTHING | {"answer": 2.0, "top_hz": 60.0}
@@ -40,7 +41,7 @@ def resonant(wave, rate_hz, resonance_hz=12.0, damping=0.2):
     return lfilter(*bilinear((2 * damping * w, w * w), (1, 2 * damping * w, w * w), rate_hz), wave)
 
 
-@pytest.mark.parametrize("seed", [4, 8])
+@pytest.mark.parametrize("seed", [long(4), long(8)])
 def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
     made = simulate(seed, (), 0.0, rate=1000.0, kind="quintic")
     wave = np.cos(2 * made.gear_ratio * made.position + 0.4)
@@ -52,7 +53,7 @@ def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
     assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
-@pytest.mark.parametrize("seed", [4, 8])
+@pytest.mark.parametrize("seed", [long(4), 8])
 def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     made = simulate(seed, (), 0.0, rate=1000.0)
     made = replace(made, gear_ratio=None, pole_pairs=None)

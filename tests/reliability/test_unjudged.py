@@ -7,6 +7,7 @@ import pytest
 from recordings import RATE_HZ, record
 
 from opamc_cli.errors import ExitCode
+from tests.marks import long
 
 
 def gone(columns):
@@ -73,7 +74,15 @@ def diagnose(opamc, baseline, target, out, *more):
     )
 
 
-@pytest.mark.parametrize("wrong", REASONS, ids=lambda wrong: wrong.__name__)
+QUICK = (gone, dead, exchanged, milliampere)
+"""Of the rest `make test-all` has as much to say."""
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [one if one in QUICK else long(one) for one in REASONS],
+    ids=lambda wrong: wrong.__name__,
+)
 def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp_path, wrong):
     target = record(tmp_path / "tonight.parquet", 9, wrong)
     ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
@@ -86,7 +95,9 @@ def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp
     assert REASONS[wrong] in " ".join(second["reasons"])
 
 
-@pytest.mark.parametrize("wrong", [milliampere, frozen, one_phase], ids=lambda w: w.__name__)
+@pytest.mark.parametrize(
+    "wrong", [milliampere, long(frozen), long(one_phase)], ids=lambda w: w.__name__
+)
 def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     opamc, baseline, tonight, tmp_path, wrong
 ):

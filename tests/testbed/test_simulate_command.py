@@ -56,6 +56,7 @@ def test_it_writes_runs_and_the_truth(config: Path, tmp_path: Path) -> None:
         assert not any("position" in column for column in run.columns)
 
 
+@pytest.mark.long
 def test_workers_do_not_change_the_bytes(config: Path, tmp_path: Path) -> None:
     for name, jobs in (("one", "1"), ("two", "2")):
         result = _simulate(config, tmp_path / name, "--sessions", "2", "--jobs", jobs)

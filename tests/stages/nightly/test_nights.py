@@ -107,6 +107,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
 
 
+@pytest.mark.long
 def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r1: {}, r3: {axes: [1]}, r4: {}}\n")
     logs = cell.parent / "logs"
@@ -226,6 +227,7 @@ def test_a_start_that_is_under_way_holds_the_folder(cell, opamc):
         assert opamc("nightly", cell).code == ExitCode.LOCKED
 
 
+@pytest.mark.long
 def test_limits_are_the_robots_own(cell, opamc):
     shutil.rmtree(cell.parent / "logs" / "r3")
     cell.write_text(cell.read_text() + "limits: {seconds: 0.01}\n")
