@@ -41,4 +41,8 @@ class Witness(Protocol):
         """Return the evidence that its tables hold about an axis."""
 
 
-WITNESSES: tuple[Witness, ...] = (spectrum, profile)
+WITNESSES: tuple[Witness, ...] = (
+    spectrum,
+    profile,
+)
+"""In the order in which they are asked."""
