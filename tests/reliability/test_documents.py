@@ -6,10 +6,8 @@ import math
 
 import pytest
 import yaml
-from fuzz import fuzz
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from mutations import ODD_YAML
 from recordings import record
 
 from opamc_cli.config.yaml.values import MOST_VALUES, YamlError, plain_values
@@ -54,17 +52,6 @@ def test_any_text_is_yaml_or_is_refused(text):
     assert len(said) < 400
 
 
-@pytest.mark.parametrize("odd", ODD_YAML, ids=range(len(ODD_YAML)))
-def test_odd_yaml_in_a_configuration(opamc, tmp_path, odd):
-    file = tmp_path / "c.yaml"
-    file.write_text(f"score:\n  base: {odd}\n")
-    for arguments in (["--config", file], ["--set", f"score.base={odd}"]):
-        ended = opamc("config", "check", *arguments)
-        assert ended.code == 2, ended
-        (sentence,) = ended.sentences
-        assert len(sentence) < 600
-
-
 def test_aliases_that_multiply_are_counted():
     layers = ["a: &l0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]"]
     for number in range(1, 9):
@@ -72,27 +59,6 @@ def test_aliases_that_multiply_are_counted():
         layers.append(f"b{number}: &l{number} [{many}]")
     with pytest.raises(YamlError, match=f"more than {MOST_VALUES} values"):
         plain_values("\n".join(layers))
-
-
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import sys\nsys.exit(0)",
-        "def (",
-        "x = 1",
-        "from opamc_cli.joint.effects.base import Effect\n"
-        "class Mine(Effect):\n    name, domain = 'mine', 7\n",
-        "from opamc_cli.joint.effects.base import Effect\n"
-        "class Mine(Effect):\n    name, domain = 'mine', 'time'\n"
-        "    def __init__(self): raise RuntimeError('no')\n",
-    ],
-)
-def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
-    (tmp_path / "mine.py").write_text(code)
-    (tmp_path / "model.yaml").write_text("library: [mine.py]\n")
-    ended = opamc("model", "fit", tonight, "--model", tmp_path / "model.yaml", "--out", tmp_path)
-    assert ended.code == 2
-    assert "mine.py" in ended.sentences[0]
 
 
 METADATA = [
@@ -138,23 +104,3 @@ def test_columns_that_no_run_has(tmp_path):
 
     with pytest.raises(InputError, match="axes count from 1 to 999"):
         Run(record(tmp_path / "r.parquet", 0, out_of_range))
-
-
-def test_names_that_are_no_text(opamc, tmp_path, tonight):
-    import os
-
-    name = os.fsdecode(b"\xff.parquet")
-    (tmp_path / "runs").mkdir()
-    (tmp_path / "runs" / name).write_bytes(tonight.read_bytes())
-    for given_path in (tmp_path / "runs", tmp_path / "runs" / name):
-        ended = opamc("segment", given_path, "--out", tmp_path / "out")
-        assert ended.code in (2, 3)
-        assert "UTF-8" in ended.sentences[0]
-
-
-@pytest.mark.long
-def test_a_hundred_wrong_inputs_of_every_kind():
-    """The short form of `make fuzz`."""
-    ends = fuzz(60, 1.0, 20260301)
-    assert sum(ends.values()) > 10
-    assert not [end for end in ends if "WRONG" in end]

@@ -3,16 +3,13 @@
 import hashlib
 import json
 import os
-import shutil
 
-import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.stages import diagnose as stage
 from opamc_cli.storage.files import result as storage
 from opamc_cli.storage.files.result import clear, published, result
-from tests.marks import long
 
 NAMES = ("verdict.json", "tables/a", "tables/b")
 
@@ -188,18 +185,6 @@ def test_the_verdict_vouches_for_its_tables(diagnosed):
     assert set(verdict["tables"]) == {n for n in stage.FILES if n.endswith(".parquet")}
     for name, digest in verdict["tables"].items():
         assert hashlib.sha256((diagnosed / name).read_bytes()).hexdigest() == digest
-
-
-@pytest.mark.parametrize("name", ["scores.parquet", long("target/patterns.parquet")])
-def test_a_report_of_two_diagnoses_is_refused(opamc, diagnosed, tmp_path, name):
-    out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
-    assert opamc("report", "--out", out).code == 0
-    table = pq.read_table(out / name)
-    pq.write_table(table.slice(0, table.num_rows - 1), out / name)
-    ended = opamc("report", "--out", out)
-    assert ended.code == 3
-    (sentence,) = ended.sentences
-    assert f"{out / name}: is not the table that" in sentence
 
 
 def test_no_verdict_is_seen_before_the_last_one(baseline, tonight, tmp_path, monkeypatch):

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import recordings
 from recordings import RATE_HZ, record
 
 from opamc_cli.errors import ExitCode
@@ -131,6 +132,51 @@ def test_a_baseline_in_another_unit_does_not_make_all_healthy(opamc, tonight, tm
     ended = diagnose(opamc, tmp_path / "baseline", tonight, tmp_path / "out", "--quiet")
     assert ended.code == ExitCode.NOT_ENOUGH_DATA
     assert "another unit" in ended.sentences[0]
+
+
+def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path, monkeypatch):
+    """Four joints, each current three times as large: no fault of one joint, but no health."""
+    monkeypatch.setitem(recordings.MOTIONS, 3, ((48.0, 1.1, 1), (70.0, 1.2, -1)))
+    monkeypatch.setitem(recordings.MOTIONS, 4, ((62.0, 1.3, -1), (85.0, 1.0, 1)))
+
+    def amplify(columns):
+        for name in columns:
+            columns[name] *= np.float32(3)
+
+    for seed in range(4):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed)
+    target = record(tmp_path / "tonight.parquet", 9, amplify)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    axes = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert [axis["state"] for axis in axes] == ["insufficient-data"] * 4
+    assert all("so do the other joints" in " ".join(axis["reasons"]) for axis in axes)
+
+
+def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, monkeypatch):
+    """Whatever the search names: below a twentieth of the change it is not the cause."""
+    from opamc_cli.stages import diagnose as stage
+
+    def louder(columns):
+        for name in "abc":
+            columns[f"axis2_{name}"] *= np.float32(4)
+
+    named = {
+        **{"effect": "ripple", "domain": "motor-angle", "parameters": {"order": 2.02}},
+        **{"interpretation": "flexspline tooth damage: inspect the flexspline", "p_value": 1e-6},
+        **{"ties": [], "harmless": False, "origin": "joint", "clear": True, "evidence": {}},
+        **{"why": ["It explains next to nothing."], "others": []},
+    }
+    target = record(tmp_path / "tonight.parquet", 9, louder)
+    for share in (0.0, 0.04, 0.9):
+        found = {**named, "share": share, "explained": share}
+        monkeypatch.setattr(stage.cause, "explain", lambda *_, found=found: found)
+        arguments = ("--baseline", baseline, "--target", target, "--out", tmp_path / "out")
+        ended = opamc("diagnose", *arguments)
+        assert ended.code == ExitCode.UNHEALTHY
+        _, axis = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+        assert (axis["cause"] is not None) == (share == 0.9)
+        assert ("flexspline" in ended.out) == (share == 0.9)
 
 
 def test_healthy_joints_are_judged_without_a_word(opamc, baseline, tonight, tmp_path):

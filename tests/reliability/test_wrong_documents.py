@@ -1,0 +1,57 @@
+"""Wrong documents, given to the command: one sentence and the right code, whatever is in them."""
+
+import os
+
+import pytest
+from fuzz import fuzz
+from mutations import ODD_YAML
+
+
+@pytest.mark.parametrize("odd", ODD_YAML, ids=range(len(ODD_YAML)))
+def test_odd_yaml_in_a_configuration(opamc, tmp_path, odd):
+    file = tmp_path / "c.yaml"
+    file.write_text(f"score:\n  base: {odd}\n")
+    for arguments in (["--config", file], ["--set", f"score.base={odd}"]):
+        ended = opamc("config", "check", *arguments)
+        assert ended.code == 2, ended
+        (sentence,) = ended.sentences
+        assert len(sentence) < 600
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "import sys\nsys.exit(0)",
+        "def (",
+        "x = 1",
+        "from opamc_cli.joint.effects.base import Effect\n"
+        "class Mine(Effect):\n    name, domain = 'mine', 7\n",
+        "from opamc_cli.joint.effects.base import Effect\n"
+        "class Mine(Effect):\n    name, domain = 'mine', 'time'\n"
+        "    def __init__(self): raise RuntimeError('no')\n",
+    ],
+)
+def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
+    (tmp_path / "mine.py").write_text(code)
+    (tmp_path / "model.yaml").write_text("library: [mine.py]\n")
+    ended = opamc("model", "fit", tonight, "--model", tmp_path / "model.yaml", "--out", tmp_path)
+    assert ended.code == 2
+    assert "mine.py" in ended.sentences[0]
+
+
+def test_names_that_are_no_text(opamc, tmp_path, tonight):
+    name = os.fsdecode(b"\xff.parquet")
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / name).write_bytes(tonight.read_bytes())
+    for given_path in (tmp_path / "runs", tmp_path / "runs" / name):
+        ended = opamc("segment", given_path, "--out", tmp_path / "out")
+        assert ended.code in (2, 3)
+        assert "UTF-8" in ended.sentences[0]
+
+
+@pytest.mark.long
+def test_a_hundred_wrong_inputs_of_every_kind():
+    """The short form of `make fuzz`."""
+    ends = fuzz(60, 1.0, 20260301)
+    assert sum(ends.values()) > 10
+    assert not [end for end in ends if "WRONG" in end]
