@@ -62,7 +62,7 @@ def judged(pair: Pair, change: Change) -> Outcome:
         elif pair.name == "ripple":
             right = right and "flexspline" not in first.interpretation
     wrong = any(
-        not cause.benign
+        not cause.harmless
         and cause.share >= FAULT_SHARE
         and expected not in (cause.effect, *cause.ties)
         for cause in change.causes
@@ -70,8 +70,8 @@ def judged(pair: Pair, change: Change) -> Outcome:
     return Outcome(
         named=first is not None,
         right=right,
-        harmless=change.benign,
-        wrong_fault=wrong and not change.benign,
+        harmless=change.harmless,
+        wrong_fault=wrong and not change.harmless,
         share=first.share if first is not None and right else float("nan"),
     )
 

@@ -32,7 +32,7 @@ import cell_logs
 
 from opamc_cli.__main__ import main
 from opamc_cli.stages.nightly import run as stage
-from opamc_cli.storage.history import dump
+from opamc_cli.storage.history import DERIVED, History
 
 STAND_IN = "night_stand_in:stand_in"
 OURS = (".work", ".kept", ".copies", ".opamc.lock")
@@ -79,6 +79,27 @@ ssize_t pwrite64(int fd, const void *data, size_t n, off64_t at) {
   return full(fd) ? -1 : next(fd, data, n, at);
 }
 """
+
+
+def dump(path: Path) -> dict[str, list[tuple]]:
+    """Return everything that a history holds but for what holds a clock, in a fixed order.
+
+    A file's modification time and the time at which a user declared something are left out.
+    """
+    with History(path, read_only=True) as history:
+        tables = [
+            row["name"]
+            for row in history.rows("SELECT name FROM sqlite_master WHERE type = 'table'")
+        ]
+        found = {}
+        for table in sorted(tables):
+            rows = history.rows(f"SELECT * FROM {table}")
+            for row in rows:
+                row.pop("mtime_ns", None)
+                if table == "declared" or (table == "event" and row["kind"] not in DERIVED):
+                    row.pop("time")
+            found[table] = sorted((tuple(row.values()) for row in rows), key=repr)
+        return found
 
 
 def end_state(out: Path) -> dict[str, object]:

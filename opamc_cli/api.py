@@ -23,13 +23,12 @@ from opamc_cli.stages.chain import score as scores
 from opamc_cli.stages.chain import segment as motions
 from opamc_cli.stages.model import model as joint_model
 from opamc_cli.storage.files.lock import output_lock
-from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.files.result import result
 from opamc_cli.storage.runs import Run, RunInfo, find_runs
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import TABLES
 from opamc_cli.storage.tables import read_table as read_stage_table
-from opamc_cli.storage.tables import table_record
+from opamc_cli.storage.tables import record_at
 
 OUT = "opamc-out"
 
@@ -165,8 +164,8 @@ def read_table(path: AnyPath) -> Rows:
         If it is missing, damaged or no stage table.
     """
     file = Path(path)
-    record = table_record(file, read_schema(file, "make the table again").metadata)
-    return Rows(read_stage_table(file, record["stage"], TABLES.get(file.name)), file)
+    stage = record_at(file)["stage"]
+    return Rows(read_stage_table(file, stage, TABLES.get(file.name)), file)
 
 
 def segment(

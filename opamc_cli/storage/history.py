@@ -8,7 +8,7 @@ the clock, but the times at which a user acknowledged or declared something.
 
 import json
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
 from pathlib import Path
@@ -488,27 +488,6 @@ def arrow_schema(table: str) -> pa.Schema:
 def as_notes(notes: Iterable[str]) -> str:
     """Return notes as a night keeps them."""
     return json.dumps(list(notes), ensure_ascii=False)
-
-
-def dump(path: Path) -> Mapping[str, list[tuple[Any, ...]]]:
-    """Return everything that a history holds but for what holds a clock, in a fixed order.
-
-    A file's modification time and the time at which a user declared something are left out.
-    """
-    with History(path, read_only=True) as history:
-        tables = [
-            row["name"]
-            for row in history.rows("SELECT name FROM sqlite_master WHERE type = 'table'")
-        ]
-        found = {}
-        for table in sorted(tables):
-            rows = history.rows(f"SELECT * FROM {table}")
-            for row in rows:
-                row.pop("mtime_ns", None)
-                if table == "declared" or (table == "event" and row["kind"] not in DERIVED):
-                    row.pop("time")
-            found[table] = sorted((tuple(row.values()) for row in rows), key=repr)
-        return found
 
 
 def _marks(values: Sequence[object]) -> str:

@@ -37,7 +37,6 @@ RECENT_GROUPS = 2
 RATE_TOLERANCE = 1e-3
 """Largest relative disagreement of `time_s` with the declared sampling rate."""
 
-CURRENT_UNITS = ("A", "Nm")
 """A torque in Nm may stand for a current; nothing of it is called a current then."""
 
 MOST_HZ = 1e8

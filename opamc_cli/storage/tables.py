@@ -10,7 +10,6 @@ import json
 import os
 import platform
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from math import factorial
@@ -35,28 +34,6 @@ from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL
 TABLE_KEY = b"opamc_table"
 SCHEMA_VERSION = 1
 LIBRARIES = ("numpy", "scipy", "numba", "pyarrow", "scikit-learn")
-
-
-@dataclass(frozen=True)
-class Provenance:
-    """Where a table came from.
-
-    Attributes
-    ----------
-    stage
-        Name of the stage that made it.
-    config
-        The stage's canonical configuration.
-    config_hash
-        SHA-256 of the canonical configuration.
-    inputs
-        Path of each input, relative to the table's folder, and its SHA-256.
-    """
-
-    stage: str
-    config: Mapping[str, Any]
-    config_hash: str
-    inputs: tuple[tuple[str, str], ...]
 
 
 def write_table(
@@ -282,21 +259,15 @@ class _Record(Document):
         return config
 
 
-def table_provenance(path: Path) -> Provenance:
-    """Return where the table at `path` came from.
+def record_at(path: Path) -> dict[str, Any]:
+    """Return the JSON object of a stage table's metadata: stage, config, inputs and so on.
 
     Raises
     ------
     InputError
         If it is not a stage table.
     """
-    record = table_record(path, read_schema(path, "make the table again").metadata)
-    return Provenance(
-        stage=record["stage"],
-        config=record["config"],
-        config_hash=record["config_hash"],
-        inputs=tuple((entry["path"], entry["sha256"]) for entry in record["inputs"]),
-    )
+    return table_record(path, read_schema(path, "make the table again").metadata)
 
 
 def table_input(path: Path) -> tuple[Path, str]:

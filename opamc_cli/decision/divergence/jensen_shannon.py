@@ -30,33 +30,6 @@ def normalise(counts: ArrayLike) -> FloatArray:
     return rows
 
 
-def kullback_leibler(p: ArrayLike, q: ArrayLike, base: float = 2.0) -> Any:
-    """Kullback-Leibler divergence KL(p‖q), row by row.
-
-    Parameters
-    ----------
-    p, q : array_like, shape (..., K)
-        Counts or probabilities, broadcast against each other; rows are normalised.
-    base : float, default 2
-        Base of the logarithm: 2 for bits, e for nats.
-
-    Returns
-    -------
-    float or ndarray, shape (...)
-        Not negative. A cell with p = 0 adds nothing; one with q = 0 < p makes it infinite; a
-        row without counts makes it NaN.
-
-    Notes
-    -----
-    Thesis (2021), equation (2-7); S. Kullback and R. A. Leibler, 1951.
-    """
-    p_rows, q_rows = np.broadcast_arrays(normalise(p), normalise(q))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cells = np.where(p_rows > 0, p_rows * (np.log(p_rows) - np.log(q_rows)), 0.0 * p_rows)
-    total = cells.sum(axis=-1) / math.log(base)
-    return np.maximum(total, 0.0) + 0.0 * q_rows.sum(axis=-1)
-
-
 def divergence_by_cell(p: ArrayLike, q: ArrayLike, base: float = 2.0) -> FloatArray:
     """Contribution of each pattern to the Jensen-Shannon divergence.
 
@@ -289,40 +262,6 @@ def _few_sizes(
     groups = np.array_split(order, min(most, len(order)))
     sizes = np.array([[segment[g].mean(), rest[g].mean()] for g in groups]).T
     return sizes, np.array([len(g) for g in groups], dtype=np.float64)
-
-
-def excess_divergence(
-    divergences: ArrayLike,
-    pool: ArrayLike,
-    n_segment: ArrayLike,
-    n_pool: ArrayLike,
-    inflation: float,
-    base: float = 2.0,
-) -> FloatArray:
-    """Divergence beyond what finite, autocorrelated counts produce by themselves.
-
-    Parameters
-    ----------
-    divergences : array_like, shape (S,)
-        Divergences of segments from a pool.
-    pool : array_like, shape (K,)
-        The baseline's pooled counts.
-    n_segment, n_pool : array_like, shape (S,)
-        Pattern counts of each segment and of the pool it was compared with.
-    inflation : float
-        φ of `chance_inflation`, estimated on the baseline.
-    base : float, default 2
-        Base of the logarithm of `divergences`.
-
-    Returns
-    -------
-    ndarray, shape (S,)
-        May be negative: zero is the expectation without any change.
-    """
-    segment = np.asarray(n_segment, dtype=np.float64) / inflation
-    rest = np.asarray(n_pool, dtype=np.float64) / inflation
-    chance = chance_divergence(pool, segment, rest, base)
-    return np.asarray(np.asarray(divergences, dtype=np.float64) - chance)
 
 
 def effect_size(excess: ArrayLike, base: float = 2.0) -> FloatArray:

@@ -35,7 +35,7 @@ SMALLEST_SHARE = 0.03
 VISIBLE = 0.5
 """A shift of which the mean square shows less is hidden by what sessions differ by."""
 
-BENIGN_SHARE = 0.5
+HARMLESS_SHARE = 0.5
 FAULT_SHARE = 0.2
 GROWTH, CLEAR_GROWTH = 4.0, 10.0
 """A mesh's ripple of twice the amplitude, four times the power, is a fault however much more cold
@@ -85,7 +85,7 @@ class Cause:
     evidence: Parameters = field(default_factory=dict)
 
     @property
-    def benign(self) -> bool:
+    def harmless(self) -> bool:
         """Whether the joint is no worse for it."""
         return self.origin != "joint"
 
@@ -104,7 +104,7 @@ class Change:
         beyond the sessions' own differences.
     explained_share : float
         Share of that excess which all causes explain together.
-    benign : bool
+    harmless : bool
         True where harmless causes explain at least half of the excess and no cause is serious.
     units : tuple of int
         Baseline and target units that were compared.
@@ -119,7 +119,7 @@ class Change:
     causes: tuple[Cause, ...]
     excess_a: float
     explained_share: float
-    benign: bool
+    harmless: bool
     units: tuple[int, int] = (0, 0)
     sessions: bool = False
     angle: str = "motor"
@@ -195,13 +195,13 @@ def explain_change(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
         key=lambda one: (not one.serious, not one.clear, -one.share),
     )
-    harmless = sum(cause.share for cause in causes if cause.benign)
+    harmless = sum(cause.share for cause in causes if cause.harmless)
     serious = any(cause.serious for cause in causes)
     return Change(
         causes=tuple(causes),
         excess_a=float(np.sqrt(whole)) if causes else float(np.sqrt(energy.total)),
         explained_share=min(sum(cause.share for cause in causes), 1.0),
-        benign=harmless >= BENIGN_SHARE and not serious,
+        harmless=harmless >= HARMLESS_SHARE and not serious,
         units=(len(before), len(after)),
         sessions=not cycles,
         angle=units[0].fine.angle_kind,
@@ -234,7 +234,7 @@ def _slow_entries(
                 p_value=found.p_value,
                 ties=found.ties,
                 origin=effect.origin,
-                serious=not effect.benign and share >= FAULT_SHARE,
+                serious=not effect.harmless and share >= FAULT_SHARE,
             )
         )
     return causes
@@ -258,7 +258,7 @@ def _periodic_entry(reading: Reading, share: float, library: Library, loaded: bo
         p_value=min(line.p_value for line in reading.lines),
         ties=reading.ties,
         origin=effect.origin,
-        serious=clear or (not effect.benign and enough),
+        serious=clear or (not effect.harmless and enough),
         clear=clear,
         evidence=reading.evidence,
     )

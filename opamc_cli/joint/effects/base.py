@@ -61,7 +61,7 @@ class Effect:
     are computed once and kept from one fit to the next."""
 
     @property
-    def benign(self) -> bool:
+    def harmless(self) -> bool:
         """Whether a joint that has more of it is no worse for it: changed, but not at fault."""
         return self.origin != "joint"
 

@@ -181,26 +181,6 @@ def temporal_fine_structure(
     return tfs
 
 
-def instantaneous_frequency(z: NDArray[np.complexfloating], fs_hz: float) -> NDArray[np.floating]:
-    """Frequency between successive samples, from the step of the angle.
-
-    Parameters
-    ----------
-    z : array, shape (n,), A
-        Analytic signal.
-    fs_hz : float
-        Sampling rate, Hz.
-
-    Returns
-    -------
-    array, shape (max(0, n - 1),), Hz
-        Between -fs/2 and fs/2; negative where the vector turns backwards.
-    """
-    step = z[1:] * np.conj(z[:-1])
-    frequency: NDArray[np.floating] = np.angle(step) * (fs_hz / (2 * np.pi))
-    return frequency
-
-
 @njit(cache=True, nogil=True)
 def _fine_structure(re, im, smallest, tfs):  # type: ignore[no-untyped-def]
     zero = smallest - smallest

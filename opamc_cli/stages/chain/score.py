@@ -25,7 +25,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import FEATURES, SCORES
 from opamc_cli.storage.sources import check_comparable
-from opamc_cli.storage.tables import table_input, table_provenance, write_table
+from opamc_cli.storage.tables import record_at, table_input, write_table
 
 FILES = (files.SCORES, files.FEATURES)
 ALL_MOTIONS = -1
@@ -122,7 +122,7 @@ def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
     Of unequal orders those in common can be compared; an envelope, an offset or frames of another
     kind make other numbers of the same current.
     """
-    own, other = (table_provenance(side.path).config for side in (sides.baseline, sides.target))
+    own, other = (record_at(side.path)["config"] for side in (sides.baseline, sides.target))
     for section in sorted(own.keys() & other.keys()):
         for key in sorted(own[section].keys() | other[section].keys()):
             values = own[section].get(key), other[section].get(key)

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
-from opamc_cli.stages.verdict.reasons import CHECK_FIRST, FOUND, INSPECT
+from opamc_cli.stages.verdict.reasons import CHECK_FIRST, FOUND, INSPECT, lies_outside
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
 
@@ -149,7 +149,7 @@ def inspection(entry: Mapping[str, Any]) -> str | None:
         return INSPECT
     meaning, told, action = _meaning(cause)
     first = action[:1].upper() + action[1:] if told else f"Look for {meaning}"
-    if cause.get("harmless") or cause.get("origin", "joint") != "joint":
+    if lies_outside(cause):
         return f"{first}; do that before opening the gear."
     return (
         f"{first}; after that the rest of the strain wave gear, brake, motor connector and "

@@ -8,6 +8,7 @@ from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
+from opamc_cli.stages.verdict.reasons import lies_outside
 
 MOST_EVIDENCE = 2
 FEW_SESSIONS = 4
@@ -54,7 +55,7 @@ def _inspect(cause: Mapping[str, Any] | None) -> str:
             "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
         )
     meaning = cause.get("interpretation") or cause.get("effect")
-    if cause.get("harmless") or cause.get("origin", "joint") != "joint":
+    if lies_outside(cause):
         return f"Check before the gear: {meaning}."
     return f"Inspect the joint for {meaning}."
 

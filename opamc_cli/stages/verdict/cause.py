@@ -102,7 +102,7 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "share": first.share,
         "p_value": first.p_value,
         "ties": list(first.ties),
-        "harmless": change.benign,
+        "harmless": change.harmless,
         "origin": first.origin,
         "explained": change.explained_share,
         "clear": first.clear,

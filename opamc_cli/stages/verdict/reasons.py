@@ -86,7 +86,7 @@ def reasons(
     ]
     if unhealthy and cause is not None:
         meaning = cause.get("interpretation") or cause.get("effect")
-        outside = cause.get("harmless") or cause.get("origin", "joint") != "joint"
+        outside = lies_outside(cause)
         known = [CHECK_FIRST] if outside else [FOUND, REPEAT]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
         if outside and judgement.state == "fault":
@@ -94,6 +94,11 @@ def reasons(
     elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]
     return [*sentences, *_short(cells)]
+
+
+def lies_outside(cause: Mapping[str, Any]) -> bool:
+    """Tell whether a cause of verdict.json is no fault of the joint: load, environment, sensors."""
+    return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"
 
 
 def _change(

@@ -1,6 +1,6 @@
 """What a foreign recording offers, whatever its format."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
@@ -103,6 +103,21 @@ def missing_library(path: Path, name: str, format_name: str) -> InputError:
     return InputError(
         f"{path}: reading this format needs {name}; install it with pip install 'opamc[{extra}]'"
     )
+
+
+def check_mark(path: Path, marks: Sequence[bytes], kind: str) -> None:
+    """Refuse a file that does not begin with one of some marks of equal length.
+
+    Raises
+    ------
+    InputError
+        Naming what it begins with.
+    """
+    with path.open("rb") as handle:
+        mark = handle.read(len(marks[0]))
+    if mark not in marks:
+        msg = f"{path}: is not {kind} (it starts with {mark!r}); check format in the map"
+        raise InputError(msg)
 
 
 def samples_of(

@@ -59,7 +59,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
 def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
     change = change_of("nothing", seed, sessions=sessions)
     assert change.causes == ()
-    assert not change.benign
+    assert not change.harmless
 
 
 @pytest.mark.parametrize("sessions", [True, False])
@@ -74,7 +74,7 @@ def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     # An order that a stroke cannot tell from 2 is not sold as one that it can.
     if cause.evidence["order_resolution"] > 0.05:
         assert "kinematic error" in cause.ties[0]
-    assert not change.benign
+    assert not change.harmless
 
 
 def test_tooth_damage_is_a_fault_even_where_a_payload_hides_it():
@@ -82,14 +82,14 @@ def test_tooth_damage_is_a_fault_even_where_a_payload_hides_it():
     assert change.causes[0].effect == "ripple"
     assert change.causes[1].effect == "payload_change"
     assert change.causes[1].share > 0.7
-    assert not change.benign
+    assert not change.harmless
 
 
 def test_a_line_that_keeps_its_frequency_is_no_ripple():
     change = change_of("hum")
     assert change.causes[0].effect == "mains_hum"
     assert change.causes[0].parameters == {"frequency_hz": 50.0}
-    assert change.benign
+    assert change.harmless
 
 
 def test_unknown_gear_ratio_leaves_the_order_per_joint_revolution():
@@ -106,18 +106,18 @@ def test_unknown_gear_ratio_leaves_the_order_per_joint_revolution():
 def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
     change = change_of(kind, seed, colder)
     assert change.causes[0].effect == effect
-    assert change.benign
+    assert change.harmless
 
 
 @pytest.mark.parametrize(
-    ("kind", "effect", "benign"),
+    ("kind", "effect", "harmless"),
     [
         ("hum of a phase", "mains_hum", True),
         ("gain of a phase", "sensor_gain", True),
         ("order 7", "ripple", False),
     ],
 )
-def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, benign):
+def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, harmless):
     rng = np.random.default_rng(5)
     made = simulate(5, (), 0.0, cycles=2 * (BASELINE + TARGET), rate=1000.0)
     joint = Joint(gear_ratio=50.0, pole_pairs=4)  # a carrier well below half the rate
@@ -139,13 +139,13 @@ def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, benign):
     change = explain_change(recordings[:BASELINE], recordings[BASELINE:], joint)
     assert change.causes[0].effect == effect
     assert change.causes[0].share > 0.6
-    assert change.benign == benign
+    assert change.harmless == harmless
 
 
-def test_more_friction_at_the_same_temperature_is_not_benign():
+def test_more_friction_at_the_same_temperature_is_not_harmless():
     change = change_of("friction")
     assert "viscous" in {change.causes[0].effect, *change.causes[0].ties}
-    assert not change.benign
+    assert not change.harmless
 
 
 def test_a_variance_of_few_is_drawn_towards_that_of_all():

@@ -15,7 +15,7 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
 from opamc_cli.stages.tuning import sweep
 from opamc_cli.storage.runs import Run
-from opamc_cli.storage.tables import table_provenance
+from opamc_cli.storage.tables import record_at
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
 NORMAL, FAULT = SAMPLES / "normal", SAMPLES / "fault"
@@ -117,7 +117,7 @@ def test_a_changed_key_changes_the_hash_of_its_stage_alone(chain, tmp_path, stag
     source = {"segment": [ONE], "identify": outcome.segments, "patterns": outcome.motions}[stage]
     run = {"segment": segment.run, "identify": identify.run, "patterns": patterns.run}[stage]
     hashes = [
-        table_provenance(run(source, load_config(None, overrides), tmp_path).path).config_hash
+        record_at(run(source, load_config(None, overrides), tmp_path).path)["config_hash"]
         for overrides in ([], [setting], [other])
     ]
     assert hashes[0] != hashes[1]
@@ -126,9 +126,9 @@ def test_a_changed_key_changes_the_hash_of_its_stage_alone(chain, tmp_path, stag
 
 def test_provenance_names_the_inputs(chain):
     _, outcome = chain
-    provenance = table_provenance(outcome.motions)
-    assert provenance.stage == "identify"
-    assert [path for path, _ in provenance.inputs] == ["segments.parquet"]
+    record = record_at(outcome.motions)
+    assert record["stage"] == "identify"
+    assert [entry["path"] for entry in record["inputs"]] == ["segments.parquet"]
 
 
 def test_a_run_that_has_changed_is_refused(tmp_path):

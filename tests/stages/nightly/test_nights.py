@@ -14,7 +14,6 @@ import pytest
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly import run as stage
 from opamc_cli.stages.nightly.workers.workers import run_all
-from opamc_cli.storage.history import dump
 
 NIGHTS = [cell_logs.night(i) for i in range(7)]
 COLUMNS = (
@@ -268,10 +267,10 @@ def test_what_follows_is_the_same_in_whatever_order_nights_come(cell, opamc):
     with nightly_kills.with_stand_in():
         opamc("nightly", cell, "--night", NIGHTS[4], "--quiet")
         opamc("nightly", cell, "--quiet")
-        piecewise = dump(cell.parent / "nightly" / "history.sqlite")
+        piecewise = nightly_kills.dump(cell.parent / "nightly" / "history.sqlite")
         shutil.rmtree(cell.parent / "nightly")
         opamc("nightly", cell, "--jobs", 2, "--quiet")
-        assert dump(cell.parent / "nightly" / "history.sqlite") == piecewise
+        assert nightly_kills.dump(cell.parent / "nightly" / "history.sqlite") == piecewise
 
     # old folders are pruned, the history is not
     folders = sorted(path.name for path in (cell.parent / "nightly" / "r2").iterdir())

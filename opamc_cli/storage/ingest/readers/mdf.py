@@ -21,6 +21,7 @@ from opamc_cli.storage.ingest.source import (
     Name,
     Selection,
     check_lengths,
+    check_mark,
     missing_channel,
     missing_library,
 )
@@ -38,11 +39,7 @@ def open_mdf(path: Path) -> Iterator["MdfSource"]:
     InputError
         If asammdf is not installed or it is not MDF.
     """
-    with path.open("rb") as handle:
-        mark = handle.read(8)
-    if mark not in MARKS:
-        msg = f"{path}: is not an MDF file (it starts with {mark!r}); check format in the map"
-        raise InputError(msg)
+    check_mark(path, MARKS, "an MDF file")
     try:
         from asammdf import MDF
         from asammdf.blocks.utils import MdfException

@@ -15,6 +15,7 @@ from opamc_cli.storage.ingest.source import (
     Name,
     Selection,
     check_lengths,
+    check_mark,
     missing_channel,
     missing_library,
 )
@@ -34,11 +35,7 @@ def open_tdms(path: Path) -> Iterator["TdmsSource"]:
         from nptdms import TdmsFile
     except ImportError as error:
         raise missing_library(path, "npTDMS", "tdms") from error
-    with path.open("rb") as handle:
-        mark = handle.read(4)
-    if mark != b"TDSm":
-        msg = f"{path}: is not a TDMS file (it starts with {mark!r}); check format in the map"
-        raise InputError(msg)
+    check_mark(path, (b"TDSm",), "a TDMS file")
     with TdmsFile.open(path) as file:
         yield TdmsSource(path, file)
 
