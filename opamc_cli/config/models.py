@@ -6,6 +6,7 @@ The descriptions are the documentation: `configs/default.yaml` is made from them
 import hashlib
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
@@ -34,6 +35,11 @@ class JointConfig(Section):
     )
     explain_minutes: Positive = Field(
         2.0, description="Most minutes of recordings of each side that the cause is sought in."
+    )
+    library: tuple[Path, ...] = Field(
+        (),
+        description="Python files with effects of your own that may be a cause, too; their paths "
+        "are absolute or count from the working directory.",
     )
 
 

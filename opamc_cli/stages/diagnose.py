@@ -131,6 +131,9 @@ def _diagnose(
     figures_of_healthy: bool,
 ) -> DiagnoseOutcome:
     _check_before(baseline, target)
+    cause.library_of(
+        config.joint
+    )  # a mistake in a user's effect is better told now than at the end
     repeats, left_out = repeated(baseline, target)
     agreement = Agreement(config.identify)
     normal = run_chain(

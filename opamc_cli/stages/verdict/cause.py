@@ -1,5 +1,6 @@
 """Why a joint has changed: the effect that target runs have and baseline runs lack."""
 
+import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -7,8 +8,9 @@ from typing import Any
 import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
-from opamc_cli.errors import OpamcError
+from opamc_cli.errors import ConfigError, OpamcError
 from opamc_cli.joint.change.explain import Cause, Change, explain_change
+from opamc_cli.joint.effects.library import Library, built_in_library, load_user_effects
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
@@ -43,7 +45,7 @@ def explain(
     baseline, target
         Runs in which the axis moves, in time order.
     config
-        Gear ratio and pole pairs, and how much is looked at.
+        Gear ratio and pole pairs, effects of the user's own, and how much is looked at.
     first_motion
         Sample at which the axis first moves, by run; where it waits for others, what is looked
         at is counted from there.
@@ -53,6 +55,11 @@ def explain(
     dict or None
         The `cause` of verdict.json; None where nothing in the library explains the change, or
         where the runs do not hold what a model of the joint needs.
+
+    Raises
+    ------
+    ConfigError
+        If an effect of the user's own cannot be used.
     """
     sides = []
     seconds = 60.0 * config.explain_minutes
@@ -62,7 +69,35 @@ def explain(
             return None
         sides.append(recordings)
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
-    return _entry(explain_change(sides[0], sides[1], joint))
+    library = library_of(config)
+    try:
+        return _entry(explain_change(sides[0], sides[1], joint, library=library))
+    except Exception as error:
+        where = _in_an_own_effect(error, config)
+        if where is None:
+            raise
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        msg = f"{where}: this effect cannot be used ({what}); correct it"
+        raise ConfigError(msg) from error
+
+
+def library_of(config: JointConfig) -> Library:
+    """Return the effects that may be a cause: those that come with the package, and the user's.
+
+    Raises
+    ------
+    ConfigError
+        If a file defines no effect.
+    """
+    own = [effect for path in config.library for effect in load_user_effects(path)]
+    return built_in_library() | {effect.name: effect for effect in own}
+
+
+def _in_an_own_effect(error: Exception, config: JointConfig) -> str | None:
+    """Return file and line where an error arose in a user's effect, None where in none."""
+    files = {str(path) for path in config.library}
+    frames = reversed(traceback.extract_tb(error.__traceback__))
+    return next((f"{one.filename}:{one.lineno}" for one in frames if one.filename in files), None)
 
 
 def first_motions(patterns: pa.Table) -> dict[int, dict[str, int]]:

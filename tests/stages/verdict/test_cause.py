@@ -2,11 +2,13 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from opamc_cli.config.models import JointConfig
+from opamc_cli.errors import ConfigError
 from opamc_cli.stages.verdict import cause
-from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.runs import Run, RunInfo, find_runs, save_run
 from opamc_cli.storage.sources import RunSource
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
@@ -57,3 +59,52 @@ def test_joints_that_nothing_happened_to_have_no_cause(axis):
 def test_healthy_sessions_against_healthy_ones_have_no_cause(axis):
     normal = sources("normal")
     assert cause.explain(axis, normal[::2], normal[1::2], KNOWN) is None
+
+
+TOOTH = """
+import numpy as np
+from opamc_cli.joint.effects.base import Effect
+
+class Notch(Effect):
+    name, domain, meaning = "notch", "joint-angle", "a notch in the ring"
+    needs = ("position",)
+    from_motion = True
+    def columns(self, track, parameters):
+        {body}
+"""
+
+
+def pushed(folder, extra_a):
+    """Write three sessions of strokes with dry friction; the current of a notch in later ones."""
+    rng = np.random.default_rng(1)
+    time = np.arange(0, 24, 0.01)
+    q = 1.2 * np.sin(time) + 0.3 * np.sin(2.3 * time)
+    for k in range(3):
+        current = (1 + 0.02 * rng.normal()) * np.sign(np.gradient(q)) + 0.8 * np.sin(q)
+        current += extra_a * np.exp(-(((q - 0.4) / 0.1) ** 2)) + 0.05 * rng.normal(size=q.size)
+        columns = {"axis1_current": current.astype(np.float32), "axis1_position": q}
+        save_run(folder / f"{k}.parquet", RunInfo(sampling_rate_hz=100.0), columns)
+    found = []
+    for name, path in find_runs([folder]):
+        with Run(path, name) as run:
+            found.append(RunSource(name, path, "", run.n_samples, run.info))
+    return found
+
+
+def test_an_effect_of_the_user_s_own_may_be_the_cause(tmp_path):
+    before, after = pushed(tmp_path / "before", 0.0), pushed(tmp_path / "after", 0.6)
+    assert (cause.explain(1, before, after, JointConfig()) or {}).get("effect") != "notch"
+    own = tmp_path / "notch.py"
+    own.write_text(
+        TOOTH.format(body="return np.exp(-((track.position_rad - 0.4) / 0.1) ** 2)[:, None]")
+    )
+    found = cause.explain(1, before, after, JointConfig(library=(own,)))
+    assert found["effect"] == "notch"
+    assert found["share"] > max([0.5, *(other["share"] for other in found["others"])])
+    assert found["interpretation"] == "a notch in the ring"
+    assert found["origin"] == "joint"
+    own.write_text(TOOTH.format(body="return track.no_such_thing"))
+    with pytest.raises(ConfigError, match=r"notch.py:10: this effect cannot be used"):
+        cause.explain(1, before, after, JointConfig(library=(own,)))
+    with pytest.raises(ConfigError, match="cannot be read"):
+        cause.library_of(JointConfig(library=(tmp_path / "none.py",)))
