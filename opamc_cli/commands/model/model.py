@@ -1,6 +1,6 @@
 """`opamc model`: fit a declared joint model, trace what it lacks, close the loop."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,6 +14,8 @@ from opamc_cli.errors import ConfigError, OpamcError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
+
+    from opamc_cli.stages.model.model import Outcome
 
 app = typer.Typer(
     help="Fit a joint's declared model to runs, trace what it lacks, close the loop.",
@@ -58,23 +60,10 @@ def fit(
     quiet: Quiet = False,
 ) -> None:
     """Fit the declared effects jointly; writes fit.parquet."""
-    from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages.model import model as stage
-    from opamc_cli.storage.files.lock import output_lock
-    from opamc_cli.storage.runs import find_runs
 
-    output = Output(as_json, quiet)
-    declared = load_joint_model(model, overrides or ())
-    with output_lock(out), _naming(model), output.steps() as steps:
-        outcome = stage.fit(declared, find_runs(runs), axis or (), out, watch=steps("fit"))
-    output.result(
-        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
-        *(shown for result in outcome.results for shown in _fit_tables(result)),
-        *(str(path) for path in outcome.written),
-    )
-    raise typer.Exit(
-        output.failures([str(error) for error in outcome.errors], len(outcome.results))
-    )
+    given = (runs, model, overrides, axis, out)
+    _on_axes("fit", stage.fit, _fit_tables, *given, Output(as_json, quiet))
 
 
 @app.command()
@@ -88,23 +77,10 @@ def trace(
     quiet: Quiet = False,
 ) -> None:
     """Trace the declared model's residual to its causes; writes candidates.parquet."""
-    from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages.model import model as stage
-    from opamc_cli.storage.files.lock import output_lock
-    from opamc_cli.storage.runs import find_runs
 
-    output = Output(as_json, quiet)
-    declared = load_joint_model(model, overrides or ())
-    with output_lock(out), _naming(model), output.steps() as steps:
-        outcome = stage.trace(declared, find_runs(runs), axis or (), out, watch=steps("trace"))
-    output.result(
-        {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
-        *(shown for result in outcome.results for shown in _trace_tables(result)),
-        *(str(path) for path in outcome.written),
-    )
-    raise typer.Exit(
-        output.failures([str(error) for error in outcome.errors], len(outcome.results))
-    )
+    given = (runs, model, overrides, axis, out)
+    _on_axes("trace", stage.trace, _trace_tables, *given, Output(as_json, quiet))
 
 
 @app.command()
@@ -161,20 +137,34 @@ def evaluate(
     quiet: Quiet = False,
 ) -> None:
     """Apply a closed model to other runs, coefficients frozen; writes evaluation.json."""
+    from opamc_cli.stages.model.evaluate import evaluate as stage
+
+    given = (runs, model, overrides, axis, out)
+    _on_axes("evaluate", stage, _evaluation, *given, Output(as_json, quiet))
+
+
+def _on_axes(
+    step: str,
+    work: Callable[..., "Outcome"],
+    shown: Callable[[dict[str, Any]], Sequence["RenderableType"]],
+    runs: list[Path],
+    model: Path,
+    overrides: list[str] | None,
+    axis: list[int] | None,
+    out: Path,
+    output: Output,
+) -> None:
+    """Do one step on every axis that was asked for, print what came of it, and end."""
     from opamc_cli.config.joint_model import load_joint_model
-    from opamc_cli.stages.model import evaluate as stage
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.runs import find_runs
 
-    output = Output(as_json, quiet)
     declared = load_joint_model(model, overrides or ())
     with output_lock(out), _naming(model), output.steps() as steps:
-        outcome = stage.evaluate(
-            declared, find_runs(runs), axis or (), out, watch=steps("evaluate")
-        )
+        outcome = work(declared, find_runs(runs), axis or (), out, watch=steps(step))
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
-        *(shown for result in outcome.results for shown in _evaluation(result)),
+        *(line for result in outcome.results for line in shown(result)),
         *(str(path) for path in outcome.written),
     )
     raise typer.Exit(
