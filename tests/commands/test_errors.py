@@ -409,6 +409,7 @@ def test_one_cycle_is_no_baseline(opamc, tmp_path, pair):
     assert any("cycle" in reason for reason in axis["reasons"])
 
 
+@pytest.mark.long
 def test_a_diagnosis_of_what_is_left(opamc, tmp_path, pair):
     bad = bad_runs.constant(tmp_path / "bad.parquet")
     ended = opamc(
@@ -427,6 +428,7 @@ def test_a_baseline_in_which_nothing_repeats(opamc, tmp_path, pair):
     check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "no motion repeats", "two cycles")
 
 
+@pytest.mark.long
 def test_patterns_longer_than_the_motions_are_shortened_and_it_is_said(opamc, tmp_path):
     run = bad_runs.moving_joint(tmp_path / "joint.parquet")
     other = bad_runs.moving_joint(tmp_path / "other.parquet", seed=1)
@@ -436,6 +438,7 @@ def test_patterns_longer_than_the_motions_are_shortened_and_it_is_said(opamc, tm
     assert "delay was limited to" in ended.err
 
 
+@pytest.mark.long
 def test_an_unknown_gear_ratio_leaves_the_delay_to_the_baseline_and_is_said(opamc, tmp_path):
     run = bad_runs.moving_joint(tmp_path / "joint.parquet")
     other = bad_runs.moving_joint(tmp_path / "other.parquet", seed=1)

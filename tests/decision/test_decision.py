@@ -43,7 +43,7 @@ def test_healthy_joints_stay_healthy(n_baseline, between_sessions):
     assert len(states) - states.count("healthy") <= allowed
 
 
-@pytest.mark.parametrize("n_baseline", [long(1), 2, long(3), 6])
+@pytest.mark.parametrize("n_baseline", [long(1), 2, long(3), long(6)])
 def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
     plan = Fleet(n_baseline=n_baseline, severity=1.0)
     found, others = [], []
@@ -80,6 +80,7 @@ def test_what_moves_all_joints_together_is_not_a_fault():
     assert alone.count("healthy") < len(alone) / 3
 
 
+@pytest.mark.long
 def test_a_faulty_joint_stands_out_from_a_common_shift():
     plan = Fleet(common=0.15, severity=1.0)
     found = [judge(cells(plan, seed)) for seed in SEEDS]

@@ -10,6 +10,7 @@ from opamc_cli.decision.witnesses.evidence import session_distances, weigh_toget
 from opamc_cli.decision.witnesses.patterns import PatternEvidence
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, deviation_from_rest, size_effect
 from tests.decision.fleet import Fleet, cells, judge, spectra
+from tests.marks import long
 
 SEEDS = range(40)
 
@@ -84,7 +85,7 @@ def test_a_change_of_size_alone_is_found_by_the_spectrum():
     )
 
 
-@pytest.mark.parametrize("n_target_cycles", [1, 8])
+@pytest.mark.parametrize("n_target_cycles", [long(1), 8])
 def test_targets_of_fewer_or_more_cycles_keep_the_level(n_target_cycles):
     p = []
     for seed in SEEDS:
@@ -103,7 +104,7 @@ def test_targets_of_fewer_or_more_cycles_keep_the_level(n_target_cycles):
     assert 0.3 < np.median(p) < 0.7
 
 
-@pytest.mark.parametrize("n_target_cycles", [1, 2, 8])
+@pytest.mark.parametrize("n_target_cycles", [1, long(2), long(8)])
 def test_sessions_of_any_number_of_cycles_are_judged_alike(n_target_cycles):
     plan = Fleet(n_axes=1, n_motions=1)
     ratios = []

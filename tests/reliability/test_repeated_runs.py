@@ -41,6 +41,7 @@ def test_tonights_run_is_no_baseline_of_itself(opamc, baseline, tonight, tmp_pat
     assert any("again.parquet" in note for note in verdict["notes"])
 
 
+@pytest.mark.long
 def test_a_run_twice_in_the_baseline_counts_once(opamc, baseline, tonight, tmp_path):
     folder = shutil.copytree(baseline, tmp_path / "baseline")
     copied(folder / "night-0.parquet", folder / "night-7.parquet")

@@ -75,7 +75,7 @@ def diagnose(opamc, baseline, target, out, *more):
     )
 
 
-QUICK = (gone, dead, exchanged, milliampere)
+QUICK = (gone, dead, exchanged)
 """Of the rest `make test-all` has as much to say."""
 
 
@@ -196,6 +196,7 @@ def test_joints_exchanged_with_one_another_fit_nothing(opamc, baseline, tmp_path
     assert "no axis can be judged" in ended.sentences[0]
 
 
+@pytest.mark.long
 def test_a_gain_of_ten_per_cent_is_a_change_without_its_name(opamc, baseline, tmp_path):
     """A limit: the current alone does not tell a sensor's gain from a load."""
 

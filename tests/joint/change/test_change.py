@@ -10,6 +10,7 @@ from opamc_cli.joint.change.explain import explain_change
 from opamc_cli.joint.change.moderated import moderated_t
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from tests.marks import long
 
 BASELINE, TARGET = 4, 3
 
@@ -55,7 +56,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
 
 
 @pytest.mark.parametrize("sessions", [True, False])
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, long(2), long(3)])
 def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
     change = change_of("nothing", seed, sessions=sessions)
     assert change.causes == ()
@@ -63,7 +64,7 @@ def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
 
 
 @pytest.mark.parametrize("sessions", [True, False])
-@pytest.mark.parametrize("seed", [1, 4])
+@pytest.mark.parametrize("seed", [1, long(4)])
 def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     change = change_of("tooth", seed, sessions=sessions)
     cause = change.causes[0]
@@ -102,7 +103,7 @@ def test_unknown_gear_ratio_leaves_the_order_per_joint_revolution():
     ("kind", "colder", "effect"),
     [("payload", 0.0, "payload_change"), ("friction", 15.0, "thermal_viscous")],
 )
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, long(2)])
 def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
     change = change_of(kind, seed, colder)
     assert change.causes[0].effect == effect

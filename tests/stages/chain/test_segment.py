@@ -61,6 +61,7 @@ def test_rows_hold_what_the_moves_were(tmp_path, two_axes):
         assert row["temperature_c"] is None
 
 
+@pytest.mark.long
 def test_result_does_not_depend_on_jobs_or_row_groups(tmp_path, two_axes):
     path, _ = two_axes
     alone = run_stage(tmp_path, path)

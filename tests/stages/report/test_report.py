@@ -158,6 +158,7 @@ def test_provenance_holds_every_input(made: Path, page: str) -> None:
     assert str(made) not in page
 
 
+@pytest.mark.long
 def test_names_from_files_stay_text(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -240,6 +241,7 @@ def test_one_healthy_axis_alone_with_reported_current(tmp_path: Path) -> None:
     assert 'class="card' not in text
 
 
+@pytest.mark.long
 def test_a_trained_discriminant_takes_the_place_of_the_health_index(folder: Path) -> None:
     path = folder / "features.parquet"
     table = pq.read_table(path)
@@ -251,6 +253,7 @@ def test_a_trained_discriminant_takes_the_place_of_the_health_index(folder: Path
     assert "discriminant (unit: within-class standard deviations)" in words
 
 
+@pytest.mark.long
 def test_an_axis_without_scores_is_named_all_the_same(folder: Path) -> None:
     verdict = json.loads((folder / "verdict.json").read_text())
     missing = {"axis": 9, "state": "insufficient-data", "reasons": ["it never moves"]}
@@ -261,6 +264,7 @@ def test_an_axis_without_scores_is_named_all_the_same(folder: Path) -> None:
     assert "it never moves" in words
 
 
+@pytest.mark.long
 def test_numbers_that_are_not_known_are_dashes(folder: Path) -> None:
     verdict = json.loads((folder / "verdict.json").read_text())
     for entry in verdict["axes"]:

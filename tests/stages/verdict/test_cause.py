@@ -10,6 +10,7 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.stages.verdict import cause
 from opamc_cli.storage.runs import Run, RunInfo, find_runs, save_run
 from opamc_cli.storage.sources import RunSource
+from tests.marks import long
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
 KNOWN = JointConfig(gear_ratio=100, pole_pairs=5)
@@ -50,12 +51,12 @@ def test_without_the_joint_s_constants_the_order_is_electrical_and_read_with_a_c
     assert "if it has 5 pole pairs" in found["interpretation"]
 
 
-@pytest.mark.parametrize("axis", [1, 2])
+@pytest.mark.parametrize("axis", [1, long(2)])
 def test_joints_that_nothing_happened_to_have_no_cause(axis):
     assert cause.explain(axis, sources("normal"), sources("fault"), KNOWN) is None
 
 
-@pytest.mark.parametrize("axis", [1, 2, 3])
+@pytest.mark.parametrize("axis", [long(1), long(2), 3])
 def test_healthy_sessions_against_healthy_ones_have_no_cause(axis):
     normal = sources("normal")
     assert cause.explain(axis, normal[::2], normal[1::2], KNOWN) is None

@@ -55,6 +55,7 @@ def test_the_same_options_decide_the_same(diagnosed, tmp_path):
     assert not any("no cause was sought" in note for note in before["notes"])
 
 
+@pytest.mark.long
 def test_other_limits_decide_otherwise_and_keep_the_cause(diagnosed):
     before = verdict_in(diagnosed)
     cause = before["axes"][2]["cause"]
