@@ -90,6 +90,12 @@ def test_chance_term_agrees_with_simulation(n, even):
     assert chance_divergence(pmf, n, 4 * n) == pytest.approx(drawn.mean(), rel=0.1)
 
 
+def test_the_chance_term_is_in_the_unit_of_its_base():
+    pmf = np.full(24, 1 / 24)
+    bits, nats = (chance_divergence(pmf, 100, 400, base) for base in (2.0, math.e))
+    assert bits * math.log(2) == pytest.approx(nats, rel=1e-12)
+
+
 def test_excess_is_fair_to_targets_of_another_length():
     # Patterns that come in runs of eight, as overlapping windows do: eight times fewer are
     # independent. A target four times shorter than the baseline must not look changed.

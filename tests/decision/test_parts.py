@@ -99,6 +99,15 @@ def test_one_odd_sibling_does_not_move_the_spread():
     assert spread_among_siblings(0.01, [], 5).dof < usual.dof
 
 
+def test_more_siblings_draw_a_joint_nearer_to_their_spread():
+    own = [spread_among_siblings(0.01, [4.0] * count, 5) for count in (0, 1, 5, 500)]
+    scales = [spread.scale for spread in own]
+    assert scales == sorted(scales)
+    assert [spread.dof for spread in own] == sorted(spread.dof for spread in own)
+    # so many siblings leave nothing to what is usual elsewhere, and next to nothing to its own
+    assert scales[-1] == pytest.approx(2.0, rel=0.1)
+
+
 def test_the_tail_widens_with_fewer_degrees_of_freedom():
     assert upper_tail(3.0, Spread(1.0, 3.0)) > 4 * upper_tail(3.0, Spread(1.0, 100.0))
     assert upper_tail(0.0, Spread(1.0, 3.0)) == 0.5

@@ -6,7 +6,7 @@ import pytest
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
-from opamc_cli.storage.schemas.tables import SEGMENTS
+from opamc_cli.storage.schemas.tables import PATTERNS, SEGMENTS
 from opamc_cli.storage.tables import (
     TABLE_KEY,
     read_table,
@@ -119,6 +119,8 @@ def test_files_that_are_not_parquet_are_refused(tmp_path, content):
         ("stop", None, "column stop is null in 1 of 2 rows; run `opamc segment` again"),
         ("run", "x", "names run 'x', it was made from r"),
         ("temperature_c", None, None),
+        ("sampling_rate_hz", 0.0, "column sampling_rate_hz holds 0, 1e-09 to"),
+        ("direction", 2, "column direction holds 2, -1 to 1 is possible"),
     ],
 )
 def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected):
@@ -131,6 +133,18 @@ def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected
     with pytest.raises(InputError) as caught:
         read_table(path, "segment", SEGMENTS)
     assert expected in str(caught.value)
+
+
+@pytest.mark.parametrize(("length", "fits"), [(6, True), (5, False), (24, False)])
+def test_counts_are_as_many_as_their_order_has_patterns(tmp_path, length, fits):
+    row = dict.fromkeys(PATTERNS.names, 1) | {"run": "r", "signal": "phases", "order": 3}
+    rows = pa.Table.from_pylist([{**row, "counts": [1] * length}], schema=PATTERNS)
+    path = write(tmp_path / "patterns.parquet", rows, stage="patterns")
+    if fits:
+        assert read_table(path, "patterns", PATTERNS).equals(rows.replace_schema_metadata(None))
+        return
+    with pytest.raises(InputError, match=f"counts of order 3 are {length}, there are 6 patterns"):
+        read_table(path, "patterns", PATTERNS)
 
 
 def test_metadata_that_is_not_json_is_refused(tmp_path):
