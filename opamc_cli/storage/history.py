@@ -12,12 +12,14 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import Any, Self, get_args, get_type_hints
+from typing import Any, NoReturn, Self, TypeVar, get_args, get_type_hints
 
 import pyarrow as pa
+from pydantic import TypeAdapter, ValidationError
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import ensure_directory
+from opamc_cli.storage.logs import Facts
 
 SCHEMA_VERSION = 1
 BUSY_S = 60.0
@@ -211,6 +213,50 @@ class AlarmRow:
     trend: str
 
 
+Row = TypeVar("Row")
+
+
+@dataclass(frozen=True)
+class NightKey:
+    """What a night was judged from."""
+
+    version: str
+    config: str
+    baseline: str
+    files: list[str]
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Where a joint under alarm is heading, as far as it is looked at again."""
+
+    reach: list[int] | None = None
+
+
+DOCUMENTS: Mapping[type, tuple[str, Any]] = {
+    NightRow: ("key", NightKey),
+    FileRow: ("facts", Facts),
+    AlarmRow: ("trend", Trend),
+}
+"""Columns that hold JSON, and what it has to be."""
+
+
+_ADAPTERS = {document: TypeAdapter(document) for _, document in DOCUMENTS.values()}
+
+
+def _columns() -> dict[str, tuple[type, ...]]:
+    """Return what may stand in each column, by its name, in whatever table it is."""
+    found: dict[str, tuple[type, ...]] = {}
+    for row in (VerdictRow, MeasureRow, NightRow, FileRow, Event, Declared, AlarmRow):
+        for name, hint in get_type_hints(row).items():
+            kinds = get_args(hint) or (hint,)
+            found[name] = (*found.get(name, ()), *kinds, *((int,) if float in kinds else ()))
+    return found
+
+
+COLUMNS = _columns()
+
+
 class History:
     """An open history.
 
@@ -292,17 +338,55 @@ class History:
             self._db.execute("COMMIT")
 
     def rows(self, query: str, values: Sequence[Any] = ()) -> list[dict[str, Any]]:
-        """Return all rows of a query, each by its columns' names."""
+        """Return all rows of a query, each by its columns' names.
+
+        Raises
+        ------
+        InputError
+            If a value is none of its column's: somebody else wrote it.
+        """
         with self._errors():
             cursor = self._db.execute(query, values)
             names = [column[0] for column in cursor.description]
-            return [dict(zip(names, row, strict=True)) for row in cursor]
+            found = [dict(zip(names, row, strict=True)) for row in cursor]
+        for name in COLUMNS.keys() & set(names):
+            for row in found:
+                if not isinstance(row[name], COLUMNS[name]):
+                    self._refuse(name, f"{row[name]!r:.60}")
+        return found
+
+    def _refuse(self, column: str, why: str) -> NoReturn:
+        msg = (
+            f"{self.path}: column {column} holds what opamc did not write ({why}); move the file "
+            "away, nights are judged again"
+        )
+        raise InputError(msg)
+
+    def _read(self, kind: type[Row], query: str) -> list[Row]:
+        """Return all rows of a query as what they have to be.
+
+        Raises
+        ------
+        InputError
+            If one is something else: it was edited.
+        """
+        found = [kind(**row) for row in self.rows(query)]
+        if kind in DOCUMENTS:
+            column, document = DOCUMENTS[kind]
+            for row in found:
+                try:
+                    _ADAPTERS[document].validate_json(getattr(row, column))
+                except ValidationError as error:
+                    first = error.errors(include_url=False)[0]
+                    place = ".".join(str(part) for part in first["loc"])
+                    self._refuse(column, f"{place} {first['msg']}".strip()[:200])
+        return found
 
     # -- what the next start needs -----------------------------------------------------------
 
     def files(self) -> dict[str, FileRow]:
         """Return every recording that is remembered, by path."""
-        return {row["path"]: FileRow(**row) for row in self.rows("SELECT * FROM file")}
+        return {row.path: row for row in self._read(FileRow, "SELECT * FROM file")}
 
     def remember_files(self, files: Iterable[FileRow]) -> None:
         """Remember recordings that were read."""
@@ -311,7 +395,7 @@ class History:
 
     def nights(self) -> dict[tuple[str, str], NightRow]:
         """Return what became of every robot's night."""
-        found = (NightRow(**row) for row in self.rows("SELECT * FROM night"))
+        found = self._read(NightRow, "SELECT * FROM night")
         return {(row.robot, row.night): row for row in found}
 
     def baselines(self) -> dict[tuple[str, str, str, str], list[str]]:
@@ -418,14 +502,12 @@ class History:
     def alarms(self, *, standing: bool = False) -> list[AlarmRow]:
         """Return all alarms, or those that stand, by robot, program, axis and night."""
         where = "WHERE cleared IS NULL" if standing else ""
-        return [
-            AlarmRow(**row)
-            for row in self.rows(f"SELECT * FROM alarm {where} ORDER BY robot, axis, raised")
-        ]
+        query = f"SELECT * FROM alarm {where} ORDER BY robot, axis, raised"
+        return self._read(AlarmRow, query)
 
     def declared(self, robot: str | None = None) -> list[Declared]:
         """Return what users declared, in the order in which they did."""
-        found = [Declared(**row) for row in self.rows("SELECT * FROM declared ORDER BY rowid")]
+        found = self._read(Declared, "SELECT * FROM declared ORDER BY rowid")
         return [one for one in found if robot in (None, one.robot)]
 
     def declare(self, said: Declared, text: str) -> None:
@@ -438,7 +520,7 @@ class History:
     def events(self, *, untold: bool = False) -> list[Event]:
         """Return events in time order, or those that nobody was told of."""
         query = "SELECT * FROM event ORDER BY time, robot, axis, kind, text"
-        found = [Event(**row) for row in self.rows(query)]
+        found = self._read(Event, query)
         return self.untold(found) if untold else found
 
     def untold(self, events: Sequence[Event]) -> list[Event]:

@@ -19,6 +19,7 @@ from pathlib import Path
 
 import pyarrow as pa
 import pyarrow.fs
+from pydantic import TypeAdapter
 
 from opamc_cli.errors import InputError, OpamcError
 from opamc_cli.storage.runs import Run, RunInfo
@@ -90,8 +91,14 @@ class Facts:
 
     @classmethod
     def from_json(cls, text: str) -> "Facts":
-        """Read what `to_json` wrote."""
-        return cls(**json.loads(text))
+        """Read what `to_json` wrote.
+
+        Raises
+        ------
+        ValueError
+            If it is something else.
+        """
+        return TypeAdapter(cls).validate_json(text)
 
     def to_json(self) -> str:
         """Return the facts as the history keeps them."""

@@ -17,6 +17,7 @@ import re
 import resource
 import shutil
 import signal
+import sqlite3
 import sys
 import tempfile
 import time
@@ -27,8 +28,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import yaml
+from pyarrow import feather
+from scipy.io import savemat
 
 sys.path.insert(0, str(Path(__file__).parent))
 from mutations import ODD_YAML, damaged, mutated, table_mutated
@@ -41,6 +45,26 @@ LONGEST_S = 30
 MOST_BYTES = 2 << 30
 GOOD_CODES = {0, 1, 2, 3, 4, 5}
 ALONE = ("--set", "joint.explain=false")
+
+
+CELL = {
+    "runs": "logs/{robot}/{night}/*.parquet",
+    "robots": "auto",
+    "baseline": {"nights": 2},
+    "out": "nightly",
+    "set": {"joint.explain": False},
+    "alarm": {"nights": 2, "of": 3, "gross": 0.9},
+    "keep": {"reports": 30},
+}
+CLOSED = {
+    "joint": {"gear_ratio": 100, "pole_pairs": 5},
+    "effects": [
+        {"effect": "inertia", "coefficients": [0.1]},
+        {"effect": "coulomb", "coefficients": [0.5]},
+        {"effect": "ripple", "parameters": {"order": 2.0}, "coefficients": [0.1, 0.2]},
+    ],
+    "closed": {"unit": "A", "rmse": 0.1, "r2": 0.9, "speed_rad_s": 2.0, "temperature_c": None},
+}
 
 
 class TooLongError(Exception):
@@ -256,6 +280,63 @@ class Inputs:
         (out / name).write_bytes(raw)
         return ["report", "--out", out]
 
+    def _cell(self, rng: random.Random, place: Path) -> list[object]:
+        for number, run in enumerate(self.runs):
+            night = place / "logs" / "r1" / f"2026-03-0{number + 1}"
+            night.mkdir(parents=True)
+            (night / "run.parquet").symlink_to(run)
+        file = self._yaml(CELL, rng, place / "cell.yaml")
+        return ["nightly", file, "--dry-run", "--jobs", "1"]
+
+    def _history(self, rng: random.Random, place: Path) -> list[object]:
+        """Change a value of the history of a cell, or its bytes."""
+        good = self.folder / "cell"
+        if not good.exists():
+            self._cell(random.Random(0), good)
+            (good / "cell.yaml").write_text(yaml.safe_dump(CELL))
+            code, _, err = call("nightly", good / "cell.yaml", "--jobs", "1")
+            assert code == 0, err
+        (place / "cell").mkdir()
+        for name in ("cell.yaml", "logs"):
+            (place / "cell" / name).symlink_to(good / name)
+        out = place / "cell" / "nightly"
+        out.mkdir()
+        history = out / "history.sqlite"
+        with sqlite3.connect(good / "nightly" / "history.sqlite") as source:
+            source.execute("VACUUM INTO ?", (str(history),))
+        if rng.random() < 0.3:
+            history.write_bytes(damaged(history.read_bytes(), rng))
+        else:
+            with sqlite3.connect(history) as base, contextlib.suppress(sqlite3.Error):
+                table = rng.choice(("file", "night", "verdict", "measure", "event", "baseline"))
+                names = [row[1] for row in base.execute(f"PRAGMA table_info({table})")]
+                value = rng.choice((None, "x", "", "[]", "{}", "1e300", -1, 2**40, 1e300, b"\xff"))
+                base.execute(f"UPDATE {table} SET {rng.choice(names)} = ?", (value,))
+            base.close()
+        seen = ["history", "--cell", place / "cell" / "cell.yaml"]
+        return rng.choice((["nightly", place / "cell" / "cell.yaml", "--jobs", "1"], seen))
+
+    def _closed(self, rng: random.Random, place: Path) -> list[object]:
+        file = self._yaml(CLOSED, rng, place / "model.yaml")
+        return ["model", "evaluate", self.short, "--model", file, "--out", place / "out"]
+
+    def _foreign(self, rng: random.Random, place: Path) -> list[object]:
+        """Damage a table of another program, guess its map or use one."""
+        table = pa.table({"t": np.arange(500) / 1000, "i_1": np.sin(np.arange(500) / 9)})
+        name = rng.choice(("log.parquet", "log.feather", "log.mat"))
+        good = place / name
+        if name.endswith("parquet"):
+            pq.write_table(table, good)
+        elif name.endswith("feather"):
+            feather.write_feather(table, good)
+        else:
+            savemat(good, {n: table[n].to_numpy() for n in table.column_names})
+        good.write_bytes(damaged(good.read_bytes(), rng))
+        if rng.random() < 0.4:
+            return ["ingest", good, "--guess"]
+        (place / "map.yaml").write_text("time: t\ncolumns: {axis1_current: {source: i_1, unit: A}}")
+        return ["ingest", good, "--map", place / "map.yaml", "--out", place / "out"]
+
     def _latent(self, rng: random.Random, place: Path) -> list[object]:
         sides = _sides(self.out)
         good = self.folder / "latent.json"
@@ -294,6 +375,10 @@ KINDS = {
     "table": 5,
     "verdict": 2,
     "latent": 1,
+    "cell": 1,
+    "history": 2,
+    "closed": 2,
+    "foreign": 2,
 }
 """How often each kind of input is drawn."""
 

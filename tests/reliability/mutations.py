@@ -77,8 +77,9 @@ def mutated(tree: Any, rng: random.Random, odd: tuple[Any, ...] = ODD) -> Any:
     tree = copy.deepcopy(tree)
     for _ in range(rng.choice((1, 1, 1, 2, 4))):
         path = rng.choice(places(tree)[1:] or [()])
+        other = copy.deepcopy(rng.choice(odd))
         if not path:
-            return rng.choice(odd)
+            return other
         owner = tree
         for part in path[:-1]:
             owner = owner[part]
@@ -88,13 +89,11 @@ def mutated(tree: Any, rng: random.Random, odd: tuple[Any, ...] = ODD) -> Any:
             case 1 if isinstance(owner, dict):
                 owner[f"{path[-1]}x"] = owner.pop(path[-1])
             case 2 if isinstance(owner, dict):
-                owner[rng.choice(("x", "", "axis0_a", "axis9999999999_a", "é" * 50))] = rng.choice(
-                    odd
-                )
+                owner[rng.choice(("x", "", "axis0_a", "axis9999999999_a", "é" * 50))] = other
             case 3 if isinstance(owner, list):
                 owner.append(copy.deepcopy(owner[path[-1]]))
             case _:
-                owner[path[-1]] = rng.choice(odd)
+                owner[path[-1]] = other
     return tree
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow.parquet as pq
 
 from opamc_cli import __version__
 from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
@@ -24,6 +23,8 @@ from opamc_cli.stages.nightly.workers.night import (
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import PATTERNS
+from opamc_cli.storage.tables import read_table
 
 
 def compute(job: NightJob) -> tuple[ProgramResult, ...]:
@@ -128,7 +129,7 @@ def _laid_out(inputs: Sequence[Input], folder: Path, copies: Path) -> Path:
 
 def _temperatures(patterns: Path) -> dict[int, float]:
     """Return the median temperature of each joint, where it is logged."""
-    table = pq.read_table(patterns, columns=["axis", "temperature_c"])
+    table = read_table(patterns, "patterns", PATTERNS)
     axis = table["axis"].to_numpy()
     warm = table["temperature_c"].to_numpy(zero_copy_only=False).astype(np.float64)
     return {
