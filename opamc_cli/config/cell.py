@@ -10,6 +10,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from opamc_cli.config.files import read_yaml, validate
 from opamc_cli.config.models import Config, Positive, Section
+from opamc_cli.config.reading import shown
 from opamc_cli.errors import ConfigError
 
 ROBOT, NIGHT = "{robot}", "{night}"
@@ -103,11 +104,12 @@ class CellConfig(Section):
             if pattern is None:
                 continue
             if ROBOT not in pattern and (name == "runs" or self.robots == "auto"):
-                msg = f"{name} is {pattern!r}; it needs {{robot}} in the place of the robot's name"
+                needed = "it needs {robot} in the place of the robot's name"
+                msg = f"{name} is {shown(pattern)}; {needed}"
                 raise ValueError(msg)
             unknown = set(re.findall(r"\{[^}]*\}", pattern)) - {ROBOT, NIGHT}
             if unknown:
-                msg = f"{name} holds {sorted(unknown)[0]}; known are {{robot}} and {{night}}"
+                msg = f"{name} holds {shown(sorted(unknown)[0])}; known are {{robot}} and {{night}}"
                 raise ValueError(msg)
         return self
 

@@ -121,7 +121,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
             hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
             msg = f"{source}: unknown key {key!r}; {hint}"
         elif first["type"] == "value_error":
-            msg = f"{source}: {key}: {first['ctx']['error']}"
+            named = f"{key}: " if key else ""
+            msg = f"{source}: {named}{first['ctx']['error']}"
         elif first["type"] == "missing":
             msg = f"{source}: {key} is missing; add it"
         else:
