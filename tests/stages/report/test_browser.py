@@ -31,6 +31,7 @@ function look(frame) {
     figures: all("figure svg").map(seen),
     rows: all("section > .scroll .stack tbody tr").map((row) => row.innerText.trim()),
     cut: all("section > .scroll").filter(beyond).map((area) => area.getAttribute("aria-label")),
+    sideways: all("figure .plot").filter(beyond).length,
     unreachable: all(".scroll, .plot, pre").filter((area) => area.tabIndex !== 0).length,
     scopeless: all("th:not([scope])").length,
   };
@@ -88,6 +89,7 @@ def test_nothing_sticks_out_or_is_hidden(looks):
         assert all(look["rows"])
     # on a narrow screen rows are cards, none of which needs to be pushed sideways
     assert looks[1]["cut"] == []
+    assert [look["sideways"] for look in looks] == [0, 0]
 
 
 def test_a_card_says_first_what_to_do(looks):
