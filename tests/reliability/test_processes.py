@@ -77,6 +77,40 @@ def test_nothing_outlives_a_command(tmp_path, number):
         assert not [path for path in (tmp_path / "out").rglob("*") if path.name != ".opamc.lock"]
 
 
+class Last:
+    """Its end is a place from which no exception gets out."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+
+
+def answered_by_a_library(_):
+    try:
+        signal.raise_signal(signal.SIGTERM)
+    except SystemExit:
+        msg = "half imported"
+        raise ValueError(msg) from None
+
+
+def come_in_a_destructor(_):
+    last = Last()
+    del last
+    time.sleep(10)
+
+
+@pytest.mark.parametrize(
+    ("work", "code"), [(answered_by_a_library, 143), (come_in_a_destructor, 130)]
+)
+def test_a_signal_is_the_end_whatever_a_library_makes_of_it(opamc, monkeypatch, work, code):
+    monkeypatch.setattr("opamc_cli.__main__._run", work)
+    begun = time.monotonic()
+    ended = opamc("--help")
+    assert ended.code == code
+    assert time.monotonic() - begun < 5
+    (sentence,) = ended.err.splitlines()
+    assert sentence.startswith("opamc: ended by SIG")
+
+
 def test_what_a_killed_run_left_goes_with_the_next(opamc, tmp_path, tonight):
     out = tmp_path / "out"
     (out / ".result.part" / "baseline").mkdir(parents=True)

@@ -1,10 +1,15 @@
 """Wrong documents, given to the command: one sentence and the right code, whatever is in them."""
 
 import os
+import sqlite3
+from contextlib import closing
 
 import pytest
 from fuzz import fuzz
 from mutations import ODD_YAML
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.history import History, NightRow
 
 
 @pytest.mark.parametrize("odd", ODD_YAML, ids=range(len(ODD_YAML)))
@@ -37,6 +42,27 @@ def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
     ended = opamc("model", "fit", tonight, "--model", tmp_path / "model.yaml", "--out", tmp_path)
     assert ended.code == 2
     assert "mine.py" in ended.sentences[0]
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        "UPDATE night SET key = '[]'",
+        "UPDATE night SET key = 'rubbish'",
+        "UPDATE night SET attempts = 'many'",
+    ],
+)
+def test_a_history_that_was_edited(tmp_path, edit):
+    path = tmp_path / "history.sqlite"
+    key = '{"version": "1", "config": "c", "baseline": "b", "files": []}'
+    with History(path) as history:
+        history.record_night(NightRow("r1", "2026-03-01", key, "done"))
+        assert len(history.nights()) == 1
+    with closing(sqlite3.connect(path)) as base:
+        base.execute(edit)
+        base.commit()
+    with History(path) as history, pytest.raises(InputError, match="did not write"):
+        history.nights()
 
 
 def test_names_that_are_no_text(opamc, tmp_path, tonight):
