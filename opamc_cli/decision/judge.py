@@ -464,15 +464,17 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     Returns
     -------
     float
-        Median over the siblings, as a log ratio, or in units of each joint's own spread if that
-        is more; 0 if negative or with fewer than two siblings.
+        Median over the siblings, the lower one of an even number, as a log ratio, or in units of
+        each joint's own spread if that is more; 0 if negative or with fewer than two siblings.
     """
     others = [shift for key, shift in shifts.items() if key != axis]
     if len(others) < 2:
         return 0.0
-    over = np.max if largest else np.median
-    plain = float(over([shift.log_ratio for shift in others]))
-    scaled = float(over([shift.log_ratio / shift.spread.scale for shift in others]))
+    # of two siblings the one that moved less: else one that fails would excuse the others
+    share = 1.0 if largest else 0.5
+    plain = float(np.quantile([shift.log_ratio for shift in others], share, method="lower"))
+    moved = [shift.log_ratio / shift.spread.scale for shift in others]
+    scaled = float(np.quantile(moved, share, method="lower"))
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 

@@ -80,6 +80,14 @@ def test_what_moves_all_joints_together_is_not_a_fault():
     assert alone.count("healthy") < len(alone) / 3
 
 
+def test_a_failing_joint_of_three_excuses_no_other():
+    plan = Fleet(n_axes=3, severity=1.0)
+    for seed in range(5):
+        judged = judge(cells(plan, seed))
+        assert judged[plan.faulty].state == "fault"
+        assert max(judged[axis].common_log_ratio for axis in (1, 2)) < 0.7
+
+
 @pytest.mark.long
 def test_a_faulty_joint_stands_out_from_a_common_shift():
     plan = Fleet(common=0.15, severity=1.0)
