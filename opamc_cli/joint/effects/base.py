@@ -48,6 +48,8 @@ class Effect:
     """Parameters that switch regressors on (not 0); never searched, off where not declared."""
     flags_choose_columns: bool = False
     """True where parameters say which columns `columns` returns."""
+    whole: bool = False
+    """True where the coefficients are one, and the parameters alone say how large the effect is."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
     per: tuple[str, ...] | None = None

@@ -23,6 +23,7 @@ class TimeDelay(Effect):
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     needs = ("position", "logged")
     static = False
+    whole = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """From half a millisecond to 64 ms either way, filters to 8 ms.

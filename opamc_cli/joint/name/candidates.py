@@ -60,12 +60,12 @@ def batches_of(session: Session, terms: Sequence[Term], fine: bool) -> list[Batc
     """Compute the regressors of guesses and their products, by width."""
     parts = session.parts[0 if fine else 1]
     current = parts.taken(session.grid_of(fine).track.current_a)[:, None]
-    by_width: dict[int, list[tuple[Term, Floats]]] = {}
+    alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
         columns = parts.taken(session.computed(term, fine))
-        by_width.setdefault(columns.shape[1], []).append((term, columns))
+        alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
-    for width, members in by_width.items():
+    for (width, _), members in alike.items():
         count = len(members)
         columns = np.concatenate([block for _, block in members], axis=1)
         own = _own_products(columns, parts, count, width)
@@ -157,9 +157,11 @@ class Beside:
         if self.fast_part is not None:
             fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
             moment = moment - fast.reshape(moment.shape)
-        return self.drops_of(cross, batch.own, moment)
+        return self.drops_of(cross, batch.own, moment, whole=batch.terms[0].effect.whole)
 
-    def drops_of(self, cross: Floats, own: Floats, moment: Floats) -> Floats:
+    def drops_of(
+        self, cross: Floats, own: Floats, moment: Floats, *, whole: bool = False
+    ) -> Floats:
         """Likewise, from products: cross (p, K, b, w), own (p, K, w, w), moment (p, K, w)."""
         unit = self.parts.unit
         rest_cross, rest_own, rest_moment = (self._rest(one) for one in (cross, own, moment))
@@ -171,7 +173,7 @@ class Beside:
         floor = RIDGE * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
         left = left + floor[..., None] * np.eye(width)
         asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, self.alone)
-        gamma = np.linalg.solve(left, asked[..., None])[..., 0]
+        gamma = np.ones_like(asked) if whole else np.linalg.solve(left, asked[..., None])[..., 0]
         beta = self.alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
         gamma, beta = gamma[unit], beta[unit]
         sums = self.sums
@@ -186,10 +188,11 @@ class Beside:
         drop: Floats = self.weight * (self.before[:, None] - error)[self.counted].sum(axis=0)
         return drop
 
-    def fitted_drop(self, columns: Floats) -> float:
+    def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
         """Sum of squares that columns on the parts' rows take away beside the chain, when fitted.
 
-        Smooth in the effect's parameters, so that these can be refined.
+        Smooth in the effect's parameters, so that these can be refined. Those of a `whole` effect
+        are not fitted: they are one.
         """
         gram, moment = self._whole
         cross = self.columns.T @ columns
@@ -197,6 +200,8 @@ class Beside:
         left = columns.T @ columns - cross.T @ projected
         left += RIDGE * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
         asked = columns.T @ self.current - projected.T @ moment
+        if whole:
+            return float(self.weight * (2 * asked.sum() - left.sum()))
         return float(self.weight * asked @ np.linalg.solve(left, asked))
 
     @cached_property

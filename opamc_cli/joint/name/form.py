@@ -6,8 +6,8 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.name.chain import Chain
-from opamc_cli.joint.name.search import LEAST_T, Pool, trials
+from opamc_cli.joint.name.chain import LEAST_T, Chain
+from opamc_cli.joint.name.search import Pool, trials
 
 EXACT, APPROXIMATE = 0.9, 0.5
 """Shares of its domain's curve that a form holds: from the first on it has the name, from the

@@ -18,8 +18,6 @@ CHAINS = 4
 """Followed side by side: a bump that imitates a spring shows itself only beside the spring."""
 LEAST_SHARE = 0.05
 """Of the held-out mean square error: what a user would care about."""
-LEAST_T = 2.0
-"""A drop over its standard error, over parts of the open data."""
 MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
 REFINED, TRIED = 6, 4
@@ -203,11 +201,9 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
-    share, t_value = child.gain_over(parent)
+    share, _ = child.gain_over(parent)
     if share < pool.least_share:
         return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
-    if t_value < LEAST_T and "certain" not in pool.without:
-        return "takes something off the held-out error here and there, not everywhere"
     if "sign" not in pool.without and not child.plausible:
         return "its sign, or its size, is not physical"
     drifts = child.terms[-1].effect.changes_in_time and "drift" not in pool.without

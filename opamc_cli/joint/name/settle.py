@@ -3,8 +3,8 @@
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.name.chain import Chain, extended, without
-from opamc_cli.joint.name.search import LEAST_T, Pool, Trial, objection, paired, trials
+from opamc_cli.joint.name.chain import LEAST_T, Chain, extended, without
+from opamc_cli.joint.name.search import Pool, Trial, objection, paired, trials
 
 CLEARLY = 0.05
 """Of the score: where an effect stands against another or a function without a name, a difference
