@@ -118,19 +118,17 @@ EXACT = {
 a constant in one direction, which in turn is a constant and Coulomb friction."""
 
 
-IMITATED = pytest.mark.xfail(
-    reason="a ripple of a few turns over the travel, with the answer of the drive, imitates it"
-)
+HELD = pytest.mark.xfail(reason="a Stribeck curve and sublinear friction hold it together")
 
 
 @pytest.mark.parametrize(
     "effect",
     ["offset", "ripple"]
-    + [long(name) for name in ("asymmetric_friction", "mains_hum", "spring", "position_drag")]
     + [
-        pytest.param(name, marks=[IMITATED, pytest.mark.long])
-        for name in ("stribeck", "quadratic_friction")
-    ],
+        long(name)
+        for name in ("asymmetric_friction", "mains_hum", "spring", "position_drag", "stribeck")
+    ]
+    + [pytest.param("quadratic_friction", marks=[HELD, pytest.mark.long])],
 )
 def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
     shapes = SHAPES | {

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.effects.second_order import at_rest, discrete
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.noise.spectra import LOWEST_ORDER, order_lines, order_resolution
+from opamc_cli.joint.noise.spectra import order_lines, order_resolution
 
 SWITCHES = ("speed", "direction", "load", "current")
 DAMPING = 0.4
@@ -22,8 +22,6 @@ velocity loop answers as if nothing moved; and the highest one as a share of the
 FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 """From which power of a line on, in units of white noise's: each of their columns must earn its
 keep. Every other filter, and every fourth, are the smaller forms."""
-LOWEST_ANSWERED = 2.0
-"""Times the lowest order of all: what is slower than that, filtered, looks like friction."""
 MOST_ANSWERED = 90_000
 """Above so many moving samples lines are left plain: a hundred regressors of a recording of ten
 minutes would take gigabytes and minutes."""
@@ -73,12 +71,16 @@ class Ripple(Effect):
 
     def _density(self, track: Track, order: float, power: float) -> float:
         """Choose how many filters per octave a line may be worth; 0 where it has no answer."""
-        lowest = LOWEST_ANSWERED * LOWEST_ORDER[track.angle_kind]
-        if order < lowest or _top_hz(track, order) <= LOWEST_HZ:
+        top_hz = _top_hz(track, order)
+        if top_hz <= LOWEST_HZ or np.count_nonzero(track.moving) > MOST_ANSWERED:
             return 0.0
-        if np.count_nonzero(track.moving) > MOST_ANSWERED:
-            return 0.0
-        return next((n for least, n in FILTERS_PER_OCTAVE.items() if power > least), 0.0)
+        turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)
+        for least, density in FILTERS_PER_OCTAVE.items():
+            # With fewer turns than coefficients in each direction a wave takes the form of any
+            # friction.
+            if power > least and turns > 4 * _filters(top_hz, density):
+                return density
+        return 0.0
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anything above joint-angle orders."""

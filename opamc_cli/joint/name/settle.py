@@ -61,6 +61,8 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
             if changed is not None:
                 break
             named += found
+        if changed is None and "unnamed" not in pool.without:
+            changed = _one_for_several(best, unnamed)
         if changed is None:
             return best, named
         best = changed
@@ -103,6 +105,25 @@ def _asked_again(
             ties.append(other.term.effect.name)
     names = tuple(name for name in dict.fromkeys(ties) if name != term.effect.name)
     return None, [Named(trial, tuple(others), names)]
+
+
+def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:
+    """Return the chain in which one function without a name does better than two names did.
+
+    Two effects of one domain may each be the wrong form of a third, and asked for one by one each
+    is needed beside the other.
+    """
+    domains = [term.effect.domain for term in best.terms if not term.effect.unnamed]
+    for domain in dict.fromkeys(name for name in domains if domains.count(name) > 1):
+        parent = best
+        for place in reversed(range(best.added)):
+            effect = best.terms[place].effect
+            if effect.domain == domain and not effect.unnamed:
+                parent = without(parent, place)
+        for rival in trials(parent, _slow(unnamed)):
+            if rival.why_not is None and rival.chain.score < best.score:
+                return rival.chain
+    return None
 
 
 def _slow(pool: Pool) -> Pool:
