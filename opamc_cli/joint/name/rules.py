@@ -3,6 +3,7 @@
 RULES = {
     "beam": "four chains instead of one",
     "share": "an effect takes 5 % of the held-out error",
+    "certain": "a function without a name takes twice its standard error over parts of the data",
     "sign": "coefficients have the sign that physics gives them",
     "drift": "a change in time must be seen beside a free offset in each part",
     "exchange": "an effect gives way to one that explains the data better beside the others",

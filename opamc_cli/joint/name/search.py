@@ -11,7 +11,7 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Session, Term
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
-from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
+from opamc_cli.joint.name.chain import LEAST_T, Chain, Signature, extended, signature_of
 from opamc_cli.joint.name.refine import refined
 
 CHAINS = 4
@@ -201,9 +201,12 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
-    share, _ = child.gain_over(parent)
+    share, t_value = child.gain_over(parent)
     if share < pool.least_share:
         return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
+    if child.terms[-1].effect.unnamed and t_value < LEAST_T and "certain" not in pool.without:
+        # What may have any form has to show it everywhere; a payload changes once.
+        return "takes something off the held-out error here and there, not everywhere"
     if "sign" not in pool.without and not child.plausible:
         return "its sign, or its size, is not physical"
     drifts = child.terms[-1].effect.changes_in_time and "drift" not in pool.without
