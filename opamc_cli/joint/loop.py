@@ -14,7 +14,7 @@ from opamc_cli.joint.name.decoy import decoy_gain
 from opamc_cli.joint.name.experiments import separating_experiment
 from opamc_cli.joint.name.form import APPROXIMATE, EXACT, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import Pool, Trial, beam, trials
-from opamc_cli.joint.name.settle import Named, settled
+from opamc_cli.joint.name.settle import Named, settled, worth_their_price
 from opamc_cli.joint.noise.spectra import highest_order, order_resolution
 
 CLOSED_SHARE = 0.9
@@ -168,11 +168,12 @@ def close_loop(
     pool = Pool.of(session, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
-    only_named = best
-    for place in reversed(range(best.added)):
-        if best.terms[place].effect.unnamed:
+    # Beside a function without a name an effect may no longer be worth its price.
+    final = worth_their_price(beam(best, unnamed, width=1))
+    only_named = final
+    for place in reversed(range(final.added)):
+        if final.terms[place].effect.unnamed:
             only_named = without(only_named, place)
-    final = beam(best, unnamed, width=1)
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial, *one.others)]
     last = trials(best, pool)

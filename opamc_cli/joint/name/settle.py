@@ -75,6 +75,15 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
     return best, named
 
 
+def worth_their_price(chain: Chain) -> Chain:
+    """Drop what is not worth its price beside all the others."""
+    for place in range(chain.added):
+        parent = without(chain, place)
+        if parent.score <= chain.score:
+            return worth_their_price(parent)
+    return chain
+
+
 def _asked_again(
     best: Chain, place: int, pool: Pool, unnamed: Pool
 ) -> tuple[Chain | None, list[Named]]:
