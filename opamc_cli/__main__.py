@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from opamc_cli.commands.terminal.streams import open_streams, say
+from opamc_cli.commands.terminal.streams import finish, open_streams, say
 from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
 from opamc_cli.stages.processes.interruption import interruptible
 
@@ -34,6 +34,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
             message, code = _told(error)
             _tell(message, code, given)
             sys.exit(code)
+        finally:
+            finish()
 
 
 def _told(error: Exception) -> tuple[str, ExitCode]:

@@ -43,6 +43,15 @@ def say(text: str, stream: "TextIO") -> None:
             say(f"opamc: standard output cannot be written ({reason})\n", sys.stderr)
 
 
+def finish() -> None:
+    """Write what is left in the buffers, or drop it: the interpreter's end would exit with 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            _silence(stream)
+
+
 def _silence(stream: "TextIO") -> None:
     """Send what is left in the stream's buffer nowhere: its end must not change the exit code."""
     with suppress(OSError, ValueError):

@@ -187,7 +187,7 @@ def test_other_conditions_have_a_baseline_of_their_own(cell, opamc):
     ("text", "part"),
     [
         ("runs: logs/*.parquet", "needs {robot}"),
-        ("runs: logs/{robot}/{day}/*.parquet", "{day}; known are"),
+        ("runs: logs/{robot}/{day}/*.parquet", "{day}'; known are"),
         ("runs: '{robot}/*.parquet'\nrobot: auto", "did you mean 'robots'"),
         ("runs: '{robot}/*.parquet'\nbaseline: {nights: 3, runs: 'x/{robot}'}", "give either"),
         (

@@ -44,7 +44,8 @@ def write_history(path: Path, names: list[str]) -> History:
                 measures.append(
                     MeasureRow(name, "pick", axis, night, "b", distance, 0.0, 0.1, 0, "")
                 )
-            row = NightRow(name, night, "{}", status, why="no <b>")
+            key = {"version": "1", "config": "c", "baseline": "b", "files": []}
+            row = NightRow(name, night, json.dumps(key), status, why="no <b>")
             history.record_night(row, verdicts, measures)
     alarm = AlarmRow(
         *(names[0], "pick", 3, NIGHTS[12], NIGHTS[9], None, None, "at fault, effect 0.41", "{}")
