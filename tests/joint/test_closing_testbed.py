@@ -85,11 +85,7 @@ def test_what_the_phases_cannot_show_is_said_to_be_untestable(effect, sensing):
 
 PAIRS = [
     (("load_friction", "warmup"), "position and current"),
-    pytest.param(
-        ("payload_change", "ripple"),
-        "phases",
-        marks=pytest.mark.xfail(reason="from phases alone the second of two effects is missed"),
-    ),
+    (("payload_change", "ripple"), "phases"),
 ]
 
 

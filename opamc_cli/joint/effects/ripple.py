@@ -76,9 +76,9 @@ class Ripple(Effect):
             return 0.0
         turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)
         for least, density in FILTERS_PER_OCTAVE.items():
-            # With fewer turns than coefficients in each direction a wave takes the form of any
-            # friction.
-            if power > least and turns > 4 * _filters(top_hz, density):
+            # With fewer turns than pairs of coefficients in each direction a wave takes the form
+            # of any friction.
+            if power > least and turns > 2 * _filters(top_hz, density):
                 return density
         return 0.0
 

@@ -117,18 +117,21 @@ def _asked_again(
 
 
 def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:
-    """Return the chain in which one function without a name does better than two names did.
+    """Return the chain in which one function without a name does better than several names did.
 
-    Two effects of one domain may each be the wrong form of a third, and asked for one by one each
-    is needed beside the other.
+    Effects may each be the wrong form of another one, and asked for one by one each is needed
+    beside the others: those of one domain, or all that are no lines.
     """
-    domains = [term.effect.domain for term in best.terms if not term.effect.unnamed]
-    for domain in dict.fromkeys(name for name in domains if domains.count(name) > 1):
+    named = [i for i, term in enumerate(best.terms) if not term.effect.unnamed]
+    domains = dict.fromkeys(best.terms[i].effect.domain for i in named)
+    groups = [[i for i in named if best.terms[i].effect.domain == name] for name in domains]
+    groups.append([i for i in named if not best.terms[i].effect.fast])
+    for group in groups:
+        if len(group) < 2:
+            continue
         parent = best
-        for place in reversed(range(best.added)):
-            effect = best.terms[place].effect
-            if effect.domain == domain and not effect.unnamed:
-                parent = without(parent, place)
+        for place in reversed(group):
+            parent = without(parent, place)
         for rival in trials(parent, _slow(unnamed)):
             if rival.why_not is None and rival.chain.score < best.score:
                 return rival.chain
