@@ -51,6 +51,7 @@ def test_no_session_is_favoured_for_being_the_target():
         np.testing.assert_array_equal(np.sort(ranks, axis=0), np.tile(np.arange(5), (2, 1)).T)
 
 
+@pytest.mark.long
 def test_ranks_and_p_values_of_healthy_joints_are_uniform():
     plan = Fleet(n_axes=3, between_sessions=0.3)
     judged = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in SEEDS]
@@ -75,6 +76,7 @@ def test_robots_of_any_make_stay_healthy(plan):
     assert len(states) - states.count("healthy") <= 1
 
 
+@pytest.mark.long
 def test_a_change_of_size_alone_is_found_by_the_spectrum():
     plan = Fleet(louder=0.6)
     found = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(10)]

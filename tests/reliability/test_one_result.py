@@ -8,6 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 
+@pytest.mark.long
 def test_a_verdict_is_seen_with_its_report_or_not_at_all(opamc, baseline, tonight, tmp_path):
     """A poller must not take a verdict that the rest of the diagnosis could still change."""
     out, over = tmp_path / "out", threading.Event()

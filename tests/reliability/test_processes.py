@@ -20,6 +20,12 @@ LONG = (
 )
 
 
+def heard() -> None:
+    """Hear signals also where the tests were started to survive their terminal."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def start(*arguments: object, **options: object) -> subprocess.Popen[str]:
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
@@ -29,6 +35,7 @@ def start(*arguments: object, **options: object) -> subprocess.Popen[str]:
         text=True,
         env=environment,
         start_new_session=True,
+        preexec_fn=heard,
         **options,  # type: ignore[call-overload]
     )
 
@@ -103,6 +110,7 @@ def come_in_a_destructor(_):
 )
 def test_a_signal_is_the_end_whatever_a_library_makes_of_it(opamc, monkeypatch, work, code):
     monkeypatch.setattr("opamc_cli.__main__._run", work)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     begun = time.monotonic()
     ended = opamc("--help")
     assert ended.code == code

@@ -134,6 +134,7 @@ def test_a_baseline_in_another_unit_does_not_make_all_healthy(opamc, tonight, tm
     assert "another unit" in ended.sentences[0]
 
 
+@pytest.mark.long
 def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path, monkeypatch):
     """Four joints, each current three times as large: no fault of one joint, but no health."""
     monkeypatch.setitem(recordings.MOTIONS, 3, ((48.0, 1.1, 1), (70.0, 1.2, -1)))
@@ -153,6 +154,7 @@ def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path
     assert all("so do the other joints" in " ".join(axis["reasons"]) for axis in axes)
 
 
+@pytest.mark.long
 def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, monkeypatch):
     """Whatever the search names: below a twentieth of the change it is not the cause."""
     from opamc_cli.stages import diagnose as stage

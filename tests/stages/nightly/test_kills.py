@@ -42,6 +42,7 @@ def test_starts_at_once(trial):
     assert {0, 1} & set(codes)
 
 
+@pytest.mark.long
 @pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler for what makes writes fail")
 def test_full_disks():
     done = subprocess.run(

@@ -283,6 +283,7 @@ def test_compute_is_loaded_by_workers_only():
     assert stage.COMPUTE == "opamc_cli.stages.nightly.workers.judge:compute"
 
 
+@pytest.mark.long
 def test_logs_in_a_store_are_fetched_once_and_baselines_kept(cell, opamc):
     """A store by the path that object stores take, `file://` in the place of `s3://`."""
     shutil.rmtree(cell.parent / "logs" / "r1" / NIGHTS[4])

@@ -81,6 +81,7 @@ def test_text_from_files_steers_no_terminal_and_is_no_markup() -> None:
     assert text.count("[/nonsense]") == 3
 
 
+@pytest.mark.long
 def test_report_command_prints_verdict_and_loop(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
