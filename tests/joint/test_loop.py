@@ -144,7 +144,6 @@ def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
         assert loop.explained_share < 0.9
 
 
-@pytest.mark.xfail(reason="where the ceiling is 0 whatever has a name counts as all of it")
 def test_half_of_a_known_error_is_not_called_closed():
     # The joint is slow for ten samples at a time, which its motion, smoothed, rounds off.
     loop = close(joint_of("hard reversals", SHAPES["stribeck"], strength=15.0))

@@ -274,6 +274,8 @@ def _headline(result: dict[str, Any]) -> str:
     ]
     error = f"error {before:.4g} → {after:.4g} {result['unit']}"
     reached = f"{result['explained_share']:.0%} of what can be explained"
+    if not result["ceiling"]["share"]:
+        reached = "how much can be explained is not known"
     if named:
         listed = "; ".join(words)
         return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"

@@ -351,7 +351,9 @@ def remains(entry: Mapping[str, Any]) -> str:
         parts.append(f"the sealed error is {number(after)} {unit}")
     if isinstance(floor, int | float):
         parts.append(f"functions without a name leave {number(floor)} {unit}")
-    if isinstance(share, int | float):
+    if (entry.get("ceiling") or {}).get("share") == 0 and entry.get("steps"):
+        parts.append("how much can be explained is not known")
+    elif isinstance(share, int | float):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
     domains = [
         str(item.get("domain", item)) if isinstance(item, Mapping) else str(item)
