@@ -7,8 +7,6 @@ from opamc_cli.joint.motion.track import Floats, Track
 
 GUESSES = 32
 NEAR = 4
-MOSTLY = 0.9
-"""Share of what is open on one side of the step: a few samples more tell nothing of a payload."""
 LEAST_SIDE = 0.03
 """Share of the open samples before or after the step."""
 

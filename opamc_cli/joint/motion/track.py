@@ -183,11 +183,6 @@ class Track:
         full = self.full or self
         return block_mean(self.static_columns, full.bounds, round(full.rate_hz / self.rate_hz))
 
-    def forget(self) -> None:
-        """Give back the static regressors; they are computed again where they are needed."""
-        for name in ("static_columns", "static_sums", "static_means"):
-            self.__dict__.pop(name, None)
-
     def with_model(
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":
