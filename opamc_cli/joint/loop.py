@@ -249,9 +249,9 @@ def _opened(
         # As a whole, or not at all: steps are never chosen among by the sealed data.
         refused = [_refused(step) for step in steps]
         steps, after, rmse_named, rmse_after = [], before, rmse_before, rmse_before
-    reach = rmse_before**2 * found.share
-    # Where functions without a name explain nothing, nobody knows which share names have reached.
-    reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 0.0
+    # Where functions without a name explain nothing, all of the error may be there to explain.
+    reach = rmse_before**2 * (found.share or 1.0)
+    reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
     has_name = any(step.named for step in steps)
     without_name = [step for step in steps if not step.named]
     if has_name:
