@@ -2,24 +2,16 @@
 
 import json
 import re
-import shutil
-import subprocess
 from pathlib import Path
 
 import cell_logs
 import pytest
+from browser import browse, needs_browser
 
 from opamc_cli.stages.nightly.publish.page import render
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history import AlarmRow, History, MeasureRow, NightRow, VerdictRow
 
-BROWSER = next(
-    (b for b in ("chromium", "chromium-browser", "google-chrome") if shutil.which(b)), ""
-)
-FLAGS = (
-    *("--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--hide-scrollbars"),
-    *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-)
 NIGHTS = [cell_logs.night(index) for index in range(30)]
 NASTY = '</script><b>"r&1'
 
@@ -85,7 +77,6 @@ def test_two_thousand_robots_are_less_than_two_megabytes(page):
 
 
 def in_browser(page: Path, folder: Path, width: int, dark: bool) -> tuple[str, bytes]:
-    scheme = "--blink-settings=preferredColorScheme=" + ("0" if dark else "1")
     # a window is never narrower than 500: a phone is a frame in it
     framed = folder / "framed.html"
     framed.write_text(
@@ -93,24 +84,13 @@ def in_browser(page: Path, folder: Path, width: int, dark: bool) -> tuple[str, b
         f"</style><iframe src='{page.as_uri()}'></iframe>"
     )
     shot = folder / f"{width}-{dark}.png"
-    common = [BROWSER, *FLAGS, f"--user-data-dir={folder / 'profile'}", scheme]
-    subprocess.run(
-        [*common, f"--window-size={max(width, 500)},900", f"--screenshot={shot}", framed.as_uri()],
-        capture_output=True,
-        check=True,
-        timeout=120,
-    )
-    dumped = subprocess.run(
-        [*common, f"--window-size={width},900", "--dump-dom", page.as_uri()],
-        capture_output=True,
-        check=True,
-        text=True,
-        timeout=120,
-    )
-    return dumped.stdout, shot.read_bytes()
+    window = f"--window-size={max(width, 500)},900"
+    browse(folder, framed, window, f"--screenshot={shot}", dark=dark)
+    dumped = browse(folder, page, f"--window-size={width},900", "--dump-dom", dark=dark)
+    return dumped, shot.read_bytes()
 
 
-@pytest.mark.skipif(not BROWSER, reason="no chromium on this machine")
+@needs_browser
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
 def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
     dom, shot = in_browser(page, tmp_path, width, dark)

@@ -8,12 +8,10 @@ import subprocess
 
 import output_folder
 import pytest
+from browser import browse, needs_browser
 
 from opamc_cli.stages import report
 
-BROWSER = next(
-    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), ""
-)
 WIDTHS = (1280, 390)
 LOOK = """
 function look(frame) {
@@ -42,7 +40,7 @@ addEventListener("load", () => {
 });
 """
 
-pytestmark = pytest.mark.skipif(not BROWSER, reason="no Chromium on this machine")
+pytestmark = needs_browser
 
 
 @pytest.fixture(scope="module")
@@ -68,14 +66,9 @@ def looks(request, page, tmp_path_factory) -> list[dict]:
     )
     wrapper = folder / "page.html"
     wrapper.write_text(f"<body>{frames}<script>{LOOK}</script></body>", encoding="utf-8")
-    options = "--headless --no-sandbox --disable-gpu --no-first-run --disable-sync "
-    options += "--disable-background-networking --disable-component-update --dump-dom "
-    options += f"--blink-settings=preferredColorScheme={int(request.param == 'light')} "
-    options += f"--user-data-dir={folder / 'profile'}"
-    command = [BROWSER, *options.split(), wrapper.as_uri()]
-    ended = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    found = re.search(r"FOUND(.*)DONE", html.unescape(ended.stdout))
-    assert found, ended.stderr[-500:]
+    printed = browse(folder, wrapper, "--dump-dom", dark=request.param == "dark")
+    found = re.search(r"FOUND(.*)DONE", html.unescape(printed))
+    assert found, printed[-500:]
     return [{**look, "scheme": request.param} for look in json.loads(found[1])]
 
 
@@ -121,20 +114,9 @@ def test_paper_has_no_half_empty_pages(page, tmp_path):
     if reader is None:
         pytest.skip("no pdftotext on this machine")
     (tmp_path / "page.html").write_text(page, encoding="utf-8")
-    options = "--headless --no-sandbox --disable-gpu --no-first-run --no-pdf-header-footer"
     target = tmp_path / "page.pdf"
-    subprocess.run(
-        [
-            BROWSER,
-            *options.split(),
-            f"--user-data-dir={tmp_path / 'profile'}",
-            f"--print-to-pdf={target}",
-            (tmp_path / "page.html").as_uri(),
-        ],
-        capture_output=True,
-        timeout=120,
-        check=True,
-    )
+    options = ("--no-pdf-header-footer", f"--print-to-pdf={target}")
+    browse(tmp_path, tmp_path / "page.html", *options)
     boxes = subprocess.run(
         [reader, "-bbox", str(target), "-"], capture_output=True, text=True, check=True
     ).stdout
