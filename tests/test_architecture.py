@@ -58,6 +58,7 @@ def python(folder: Path, *arguments: object) -> str:
     return ended.stdout
 
 
+@pytest.mark.long
 def test_an_effect_is_added(tmp_path):
     folder = followed("Add an effect", tmp_path)
     shown = python(folder, "-m", "opamc_cli", "model", "effects", "cubic_friction", "--json")
@@ -96,6 +97,7 @@ def test_a_witness_is_added(tmp_path):
     assert all("peaks" in axis for axis in witnesses)
 
 
+@pytest.mark.long
 def test_a_format_is_added(tmp_path):
     folder = followed("Add a format", tmp_path)
     log = [{"i": 0.001 * (k % 7), "q": 0.5} for k in range(500)]

@@ -6,6 +6,8 @@ import numpy as np
 import plain
 import pytest
 
+from tests.marks import long
+
 KINOVA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 
 
@@ -20,7 +22,7 @@ def joint(effect: float) -> plain.Signals:
     return plain.Signals(250.0, current + 0.02 * rng.normal(size=t.size), q)
 
 
-@pytest.mark.parametrize("search", ["stepwise", "beam"])
+@pytest.mark.parametrize("search", ["stepwise", long("beam")])
 def test_finds_a_planted_stribeck_curve(search):
     declared = ("inertia", "gravity", "coulomb", "viscous")
     result = plain.close([joint(0.2)], declared, search=search)
@@ -31,7 +33,7 @@ def test_finds_a_planted_stribeck_curve(search):
 
 @pytest.mark.measured
 @pytest.mark.skipif(not KINOVA.is_dir(), reason="measured data are not here")
-@pytest.mark.parametrize("search", ["stepwise", "beam"])
+@pytest.mark.parametrize("search", ["stepwise", long("beam")])
 def test_nearly_halves_the_error_of_a_measured_joint(search):
     table = np.genfromtxt(KINOVA / "joint_5_trapez.csv", delimiter=",", names=True)
     recording = plain.Signals(1000.0, table["Cur5"], np.unwrap(table["Position5"]))

@@ -64,9 +64,9 @@ def test_ranks_and_p_values_of_healthy_joints_are_uniform():
     "plan",
     [
         Fleet(n_axes=1, n_baseline=3),
-        Fleet(n_axes=12, n_motions=1),
+        long(Fleet(n_axes=12, n_motions=1)),
         Fleet(n_axes=2, n_baseline=4, n_target=3),
-        Fleet(n_axes=3, between_sessions=0.4, influences=1),
+        long(Fleet(n_axes=3, between_sessions=0.4, influences=1)),
     ],
     ids=["lone joint", "twelve joints", "three targets", "wild sessions"],
 )

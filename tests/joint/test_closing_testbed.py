@@ -32,9 +32,9 @@ UNSEEN = {"elasticity", "dead_time"}
 """No function without a name explains any of it: how much there is to explain is not known."""
 
 CASES = [
-    ("ripple", "position and current"),
+    long("ripple", "position and current"),
     ("stribeck", "phases"),
-    long("gravity", "position and current"),
+    ("gravity", "position and current"),
     long("asymmetric_friction", "position and current"),
     long("thermal_viscous", "position and current"),
     long("elasticity", "position and current"),

@@ -7,6 +7,8 @@ import time
 import pyarrow.parquet as pq
 import pytest
 
+from tests.marks import long
+
 
 @pytest.mark.long
 def test_a_verdict_is_seen_with_its_report_or_not_at_all(opamc, baseline, tonight, tmp_path):
@@ -33,7 +35,7 @@ def test_a_verdict_is_seen_with_its_report_or_not_at_all(opamc, baseline, tonigh
     assert all(seen)
 
 
-@pytest.mark.parametrize("name", ["scores.parquet", "target/patterns.parquet"])
+@pytest.mark.parametrize("name", ["scores.parquet", long("target/patterns.parquet")])
 def test_a_report_of_two_diagnoses_is_refused(opamc, diagnosed, tmp_path, name):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     assert opamc("report", "--out", out).code == 0

@@ -65,7 +65,7 @@ def wait_for(condition, seconds: float) -> bool:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are counted in /proc")
 @pytest.mark.parametrize(
-    "number", [signal.SIGKILL, signal.SIGTERM, long(signal.SIGINT), long(signal.SIGHUP)]
+    "number", [signal.SIGKILL, long(signal.SIGTERM), long(signal.SIGINT), long(signal.SIGHUP)]
 )
 def test_nothing_outlives_a_command(tmp_path, number):
     """Two workers at work, and the command is killed or interrupted."""

@@ -97,7 +97,7 @@ def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp
 
 
 @pytest.mark.parametrize(
-    "wrong", [milliampere, long(frozen), long(one_phase)], ids=lambda w: w.__name__
+    "wrong", [long(milliampere), frozen, long(one_phase)], ids=lambda w: w.__name__
 )
 def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     opamc, baseline, tonight, tmp_path, wrong

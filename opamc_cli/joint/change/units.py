@@ -10,7 +10,15 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, averaged, block_mean, coarsen
+from opamc_cli.joint.motion.track import (
+    Bools,
+    Floats,
+    Joint,
+    Track,
+    averaged_blocks,
+    block_mean,
+    coarsen,
+)
 
 COARSE_RATE_HZ = 100.0
 FEWEST_SAMPLES = 10
@@ -48,8 +56,9 @@ class Unit:
             return term.columns(self.fine)[self.fine_rows]
         if not term.effect.fast:
             return term.columns(self.coarse)[self.coarse_rows]
-        smooth = averaged(term.columns(self.fine), self.fine.bounds, self.fine.kernel)
-        return block_mean(smooth, self.fine.bounds, self.factor)[self.coarse_rows]
+        fine = self.fine
+        columns = term.columns(fine)
+        return averaged_blocks(columns, fine.bounds, fine.kernel, self.factor)[self.coarse_rows]
 
     def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
         """Regressors of several terms side by side."""

@@ -13,7 +13,7 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned, whole_group
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
-from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged, block_mean, coarsen
+from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged_blocks, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 20_000
@@ -137,8 +137,7 @@ class Session:
         if fine:
             return term.columns(track)
         if term.effect.fast:
-            smooth = averaged(term.columns(track), track.bounds, track.kernel)
-            return block_mean(smooth, track.bounds, self.factor)
+            return averaged_blocks(term.columns(track), track.bounds, track.kernel, self.factor)
         return term.columns(self.coarse.track)
 
     def sums(self, terms: "tuple[Term, ...]", fine: bool) -> Sums:

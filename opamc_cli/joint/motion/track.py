@@ -6,7 +6,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
+from scipy.signal import oaconvolve, upfirdn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -265,6 +265,38 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
         shape = (-1,) + (1,) * (part.ndim - 1)
         smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
     return smooth
+
+
+def averaged_blocks(
+    values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats, factor: int
+) -> Floats:
+    """Average blocks of what went through a moving average; one sum of products a block.
+
+    Parameters
+    ----------
+    values : array of shape (n, m)
+        Samples on the grid of a track.
+    bounds : tuple of (int, int)
+        Half-open recordings.
+    kernel : array of odd length
+        Weights of the moving average.
+    factor : int
+        Samples per block, at least 1.
+    """
+    weights = np.convolve(kernel, np.full(factor, 1.0 / factor))
+    half = kernel.size // 2
+    # a whole number of blocks before the first sample that all weights reach
+    ahead = -(weights.size - 1) % factor
+    parts = []
+    for start, stop in bounds:
+        blocks = (stop - start) // factor
+        wide = np.empty((values.shape[1], ahead + stop - start + 2 * half))
+        wide[:, ahead + half : wide.shape[1] - half] = values[start:stop].T
+        wide[:, : ahead + half] = values[start][:, None]
+        wide[:, wide.shape[1] - half :] = values[stop - 1][:, None]
+        first = (weights.size - 1 + ahead) // factor
+        parts.append(upfirdn(weights, wide, down=factor)[:, first : first + blocks])
+    return np.concatenate(parts, axis=1).T
 
 
 def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:

@@ -93,6 +93,7 @@ def test_every_figure_is_drawn(outcome: report.ReportOutcome, page: str) -> None
     assert outcome.omitted == ()
 
 
+@pytest.mark.long
 def test_the_same_inputs_give_the_same_page_under_any_matplotlibrc(made: Path, page: str) -> None:
     import matplotlib as mpl
 

@@ -44,6 +44,7 @@ def test_a_ground_flexspline_is_a_ripple_near_its_passage():
     assert "cannot tell it from" in said
 
 
+@pytest.mark.long
 def test_without_the_joint_s_constants_the_order_is_electrical_and_read_with_a_condition():
     found = cause.explain(3, sources("normal"), sources("fault"), JointConfig())
     assert found["effect"] == "ripple"
@@ -56,7 +57,8 @@ def test_joints_that_nothing_happened_to_have_no_cause(axis):
     assert cause.explain(axis, sources("normal"), sources("fault"), KNOWN) is None
 
 
-@pytest.mark.parametrize("axis", [long(1), long(2), 3])
+@pytest.mark.long
+@pytest.mark.parametrize("axis", [1, 2, 3])
 def test_healthy_sessions_against_healthy_ones_have_no_cause(axis):
     normal = sources("normal")
     assert cause.explain(axis, normal[::2], normal[1::2], KNOWN) is None
