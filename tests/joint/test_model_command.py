@@ -249,6 +249,23 @@ def test_a_users_effect_is_used_by_name(folder):
     assert loop["declared"][-1] == "knee"
 
 
+@pytest.mark.long
+def test_workers_do_not_change_the_bytes(folder, capsys):
+    made = simulate(4, ("offset",), 0.8, rate=250.0, cycles=6)
+    n = min(made.current.size, pq.read_table(folder / "run.parquet").num_rows)
+    run = pq.read_table(folder / "run.parquet").slice(0, n).to_pydict()
+    run["axis3_current"], run["axis3_position"] = made.current[:n].astype("f4"), made.position[:n]
+    write_run(folder / "run.parquet", 250.0, **run)
+    written = []
+    for jobs in ("1", "2"):
+        assert close(folder, "--jobs", jobs) == 4  # axis 2 does not move
+        assert "axis 2 does not move" in capsys.readouterr().err
+        files = sorted(path for path in (folder / "out").iterdir() if path.is_file())
+        written.append({path.name: path.read_bytes() for path in files})
+    assert {"model_axis1.yaml", "model_axis3.yaml"} < written[0].keys()
+    assert written[0] == written[1]
+
+
 def test_a_mistake_in_a_users_effect_is_told_with_file_and_line(folder, capsys):
     (folder / "mine.py").write_text(
         "from opamc_cli.joint.effects.base import Effect\n"

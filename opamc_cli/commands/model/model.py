@@ -8,14 +8,22 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from opamc_cli.commands.model.effects import effects
-from opamc_cli.commands.terminal.options import DEFAULT_OUT, Json, Out, Overrides, Quiet
+from opamc_cli.commands.terminal.options import (
+    ALL_CORES,
+    DEFAULT_OUT,
+    Jobs,
+    Json,
+    Out,
+    Overrides,
+    Quiet,
+)
 from opamc_cli.commands.terminal.output import Output
-from opamc_cli.errors import ConfigError, OpamcError
+from opamc_cli.errors import ConfigError
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
 
-    from opamc_cli.stages.model.model import Outcome
+    from opamc_cli.stages.model.axes import Outcome
 
 app = typer.Typer(
     help="Fit a joint's declared model to runs, trace what it lacks, close the loop.",
@@ -32,7 +40,6 @@ ModelFile = Annotated[
         help="What is declared; default: the shipped `model`, see configs/model.yaml.",
     ),
 ]
-PACKAGE = Path(__file__).parents[2]
 DECLARED = Path("model")
 """Inertia, gravity and friction, gear unknown."""
 
@@ -56,13 +63,14 @@ def fit(
     overrides: Overrides = None,
     axis: Axis = None,
     out: Out = DEFAULT_OUT,
+    jobs: Jobs = ALL_CORES,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit the declared effects jointly; writes fit.parquet."""
     from opamc_cli.stages.model import model as stage
 
-    given = (runs, model, overrides, axis, out)
+    given = (runs, model, overrides, axis, out, jobs)
     _on_axes("fit", stage.fit, _fit_tables, *given, Output(as_json, quiet))
 
 
@@ -73,13 +81,14 @@ def trace(
     overrides: Overrides = None,
     axis: Axis = None,
     out: Out = DEFAULT_OUT,
+    jobs: Jobs = ALL_CORES,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Trace the declared model's residual to its causes; writes candidates.parquet."""
     from opamc_cli.stages.model import model as stage
 
-    given = (runs, model, overrides, axis, out)
+    given = (runs, model, overrides, axis, out, jobs)
     _on_axes("trace", stage.trace, _trace_tables, *given, Output(as_json, quiet))
 
 
@@ -91,6 +100,7 @@ def close(
     axis: Axis = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
     out: Out = DEFAULT_OUT,
+    jobs: Jobs = ALL_CORES,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
@@ -111,7 +121,7 @@ def close(
         output.steps() as steps,
     ):
         outcome = stage.close(
-            declared, find_runs(runs), axis or (), staged, seed, watch=steps("close")
+            declared, find_runs(runs), axis or (), staged, seed, jobs=jobs, watch=steps("close")
         )
     output.result(
         {"axes": list(outcome.results)},
@@ -133,13 +143,14 @@ def evaluate(
     overrides: Overrides = None,
     axis: Axis = None,
     out: Out = DEFAULT_OUT,
+    jobs: Jobs = ALL_CORES,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Apply a closed model to other runs, coefficients frozen; writes evaluation.json."""
     from opamc_cli.stages.model.evaluate import evaluate as stage
 
-    given = (runs, model, overrides, axis, out)
+    given = (runs, model, overrides, axis, out, jobs)
     _on_axes("evaluate", stage, _evaluation, *given, Output(as_json, quiet))
 
 
@@ -152,6 +163,7 @@ def _on_axes(
     overrides: list[str] | None,
     axis: list[int] | None,
     out: Path,
+    jobs: int,
     output: Output,
 ) -> None:
     """Do one step on every axis that was asked for, print what came of it, and end."""
@@ -161,7 +173,7 @@ def _on_axes(
 
     declared = load_joint_model(model, overrides or ())
     with output_lock(out), _naming(model), output.steps() as steps:
-        outcome = work(declared, find_runs(runs), axis or (), out, watch=steps(step))
+        outcome = work(declared, find_runs(runs), axis or (), out, jobs=jobs, watch=steps(step))
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
         *(line for result in outcome.results for line in shown(result)),
@@ -174,37 +186,19 @@ def _on_axes(
 
 @contextmanager
 def _naming(model: Path) -> Iterator[None]:
-    """Name the model's file in what is wrong with it, and a line of a user's own effect."""
+    """Name the model's file in what is wrong with it."""
     from opamc_cli.config.joint_model import line_naming
     from opamc_cli.joint.effects.library import UnknownEffectError
+    from opamc_cli.stages.model.axes import UserEffectError
 
     try:
         yield
+    except UserEffectError:
+        raise
     except ConfigError as error:
         named = isinstance(error, UnknownEffectError) and line_naming(model, error.name)
         msg = f"{model}:{named}: {error}" if named else f"{model}: {error}"
         raise ConfigError(msg) from error
-    except OpamcError:
-        raise
-    except Exception as error:
-        where = _in_a_users_effect(error)
-        if where is None:
-            raise
-        what = f"{type(error).__name__}: {error}".rstrip(": ")
-        msg = f"{where}: this effect cannot be used ({what}); correct it"
-        raise ConfigError(msg) from error
-
-
-def _in_a_users_effect(error: BaseException) -> str | None:
-    """Return file and line where an error arose in a user's effect, None where in none."""
-    import traceback
-
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        own = frame.filename.endswith(".py") and Path(frame.filename).is_relative_to(PACKAGE)
-        installed = "site-packages" in frame.filename or "/lib/python" in frame.filename
-        if not own and not installed and Path(frame.filename).is_file():
-            return f"{frame.filename}:{frame.lineno}"
-    return None
 
 
 def _parameters(values: dict[str, float]) -> str:

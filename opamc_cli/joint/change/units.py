@@ -56,9 +56,9 @@ class Unit:
             return term.columns(self.fine)[self.fine_rows]
         if not term.effect.fast:
             return term.columns(self.coarse)[self.coarse_rows]
-        fine = self.fine
-        columns = term.columns(fine)
-        return averaged_blocks(columns, fine.bounds, fine.kernel, self.factor)[self.coarse_rows]
+        track = self.fine
+        columns = term.columns(track)
+        return averaged_blocks(columns, track.bounds, track.kernel, self.factor)[self.coarse_rows]
 
     def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
         """Regressors of several terms side by side."""

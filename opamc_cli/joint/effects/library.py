@@ -65,8 +65,13 @@ class UnknownEffectError(ConfigError):
     """A name that the library does not have."""
 
     def __init__(self, name: str, message: str) -> None:
-        super().__init__(message)
+        super().__init__(name, message)  # both, so that it can be sent to another process
         self.name = name
+        self._message = message
+
+    def __str__(self) -> str:
+        """Return the sentence."""
+        return self._message
 
 
 def built_in_library(without: tuple[str, ...] = ()) -> Library:

@@ -17,9 +17,9 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import build_track, smoothings
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Floats, Joint, Reference, Track
+from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
 from opamc_cli.stages.model.declared_terms import declared_term
-from opamc_cli.stages.model.model import Outcome, each_axis
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
 from opamc_cli.storage.runs import Run
@@ -28,10 +28,11 @@ from opamc_cli.storage.schemas import files
 
 def evaluate(
     model: JointModelConfig,
-    paths: Sequence[tuple[str, Path]],
+    paths: Runs,
     axes: Sequence[int],
     out: Path,
     *,
+    jobs: int = 1,
     watch: Watch = unwatched,
 ) -> Outcome:
     """Apply a closed model's frozen coefficients to each axis; writes evaluation.json.
@@ -46,6 +47,8 @@ def evaluate(
         Axes; empty for all.
     out : Path
         Output folder.
+    jobs : int
+        Worker processes; 0: one per core, where they are worth their start.
     watch : callable
         Called as axes get done.
 
@@ -57,12 +60,7 @@ def evaluate(
     if model.closed is None:
         msg = "the model has not been closed, it has no coefficients; run `opamc model close` first"
         raise ConfigError(msg)
-    closed = model.closed
-    results, errors, _ = each_axis(
-        paths, axes, lambda runs, axis: _on_axis(model, closed, runs, axis), watch
-    )
-    if not results:
-        return Outcome((), (), tuple(errors))
+    results, errors, _ = on_each_axis(_on_axis, model, paths, axes, jobs, watch)
     ensure_directory(out)
     with atomic_path(out / files.EVALUATION) as temporary:
         text = json.dumps({"axes": results}, indent=2, allow_nan=False, ensure_ascii=False)
@@ -70,9 +68,9 @@ def evaluate(
     return Outcome(tuple(results), (out / files.EVALUATION,), tuple(errors))
 
 
-def _on_axis(
-    model: JointModelConfig, closed: ClosedConfig, runs: Sequence[Run], axis: int
-) -> dict[str, Any]:
+def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[str, Any]:
+    closed = model.closed
+    assert closed is not None
     effects = declared_effects(model, library_of(model))
     recordings, unit = recordings_of(runs, axis)
     if unit != closed.unit:

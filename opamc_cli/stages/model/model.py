@@ -1,8 +1,9 @@
 """Stage `model`: runs and a declared model in; fit, candidates, loop and extended model out."""
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,13 +11,13 @@ import pyarrow as pa
 import yaml
 
 from opamc_cli.config.joint_model import JointModelConfig
-from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library
 from opamc_cli.joint.fit.intervals import certainty
 from opamc_cli.joint.loop import close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
-from opamc_cli.stages.model.axis_model import AxisModel, lay
+from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
+from opamc_cli.stages.model.axis_model import lay
 from opamc_cli.stages.model.tables import (
     candidate_row,
     explained_entry,
@@ -29,12 +30,13 @@ from opamc_cli.stages.model.tables import (
     spectrum_table,
 )
 from opamc_cli.stages.processes.parallel import Watch, unwatched
-from opamc_cli.stages.recordings.axis_recording import axes_of
 from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
 from opamc_cli.storage.tables import write_table
+
+Entry = dict[str, Any]
 
 CLOSE_FILES = (
     files.LOOP,
@@ -47,21 +49,13 @@ CLOSE_FILES = (
 """What closing the loop leaves, beside `model_axis1.yaml` and so on where there are many axes."""
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a model command did, and what could not be done."""
-
-    results: tuple[dict[str, Any], ...]
-    written: tuple[Path, ...]
-    errors: tuple[OpamcError, ...]
-
-
 def fit(
     model: JointModelConfig,
-    paths: Sequence[tuple[str, Path]],
+    paths: Runs,
     axes: Sequence[int],
     out: Path,
     *,
+    jobs: int = 1,
     watch: Watch = unwatched,
 ) -> Outcome:
     """Fit a declared model on each axis; writes fit.parquet.
@@ -76,76 +70,88 @@ def fit(
         Axes; empty for all.
     out : Path
         Output folder.
+    jobs : int
+        Worker processes; 0: one per core, where they are worth their start.
     watch : callable
         Called as axes get done.
     """
-    rows: list[dict[str, Any]] = []
+    done, errors, inputs = on_each_axis(_fitted, model, paths, axes, jobs, watch)
+    rows = [row for _, each in done for row in each]
+    written = _write(out / files.FIT, rows, FIT, model, inputs)
+    return Outcome(tuple(result for result, _ in done), (written,), tuple(errors))
 
-    def one(laid: AxisModel) -> dict[str, Any]:
-        result = laid.fit
-        known = certainty(result)
-        rows.extend(fit_rows(laid.axis, result, known, laid.unit))
-        return fit_summary(laid, result, known)
 
-    results, errors, inputs = each_axis(
-        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
-    )
-    written = [_write(out / files.FIT, rows, FIT, model, inputs)] if results else []
-    return Outcome(tuple(results), tuple(written), tuple(errors))
+def _fitted(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[Entry, list[Entry]]:
+    laid = lay(model, runs, axis)
+    known = certainty(laid.fit)
+    return fit_summary(laid, laid.fit, known), fit_rows(axis, laid.fit, known, laid.unit)
 
 
 def trace(
     model: JointModelConfig,
-    paths: Sequence[tuple[str, Path]],
+    paths: Runs,
     axes: Sequence[int],
     out: Path,
     *,
+    jobs: int = 1,
     watch: Watch = unwatched,
 ) -> Outcome:
     """Trace the residual of a declared model on each axis; writes candidates.parquet."""
-    rows: list[dict[str, Any]] = []
+    done, errors, inputs = on_each_axis(_traced, model, paths, axes, jobs, watch)
+    rows = [row for _, each in done for row in each]
+    written = _write(out / files.CANDIDATES, rows, CANDIDATES, model, inputs)
+    return Outcome(tuple(result for result, _ in done), (written,), tuple(errors))
 
-    def one(laid: AxisModel) -> dict[str, Any]:
-        base = laid.fit
-        start = chain_of(base, 0)
-        explained = saturated(start, Pool.of(base.session, unnamed_library()))
-        tried = trials(start, Pool.of(base.session, laid.library))
-        rows.extend(candidate_row(laid.axis, 0, trial, False) for trial in tried)
-        return {
-            "axis": laid.axis,
-            "unit": laid.unit,
-            "declared": [term.effect.name for term in base.terms],
-            "explained": explained_entry(start, explained),
-            "candidates": [
-                {
-                    "effect": trial.term.effect.name,
-                    "domain": trial.term.effect.domain,
-                    "parameters": shown_parameters(trial.term),
-                    "gain": trial.gain,
-                    "p_value": trial.p_value,
-                    "why_not": trial.why_not,
-                }
-                for trial in tried
-            ],
-            "untestable": [
-                {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
-            ],
-        }
 
-    results, errors, inputs = each_axis(
-        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
-    )
-    written = [_write(out / files.CANDIDATES, rows, CANDIDATES, model, inputs)] if results else []
-    return Outcome(tuple(results), tuple(written), tuple(errors))
+def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[Entry, list[Entry]]:
+    laid = lay(model, runs, axis)
+    base = laid.fit
+    start = chain_of(base, 0)
+    explained = saturated(start, Pool.of(base.session, unnamed_library()))
+    tried = trials(start, Pool.of(base.session, laid.library))
+    entry = {
+        "axis": axis,
+        "unit": laid.unit,
+        "declared": [term.effect.name for term in base.terms],
+        "explained": explained_entry(start, explained),
+        "candidates": [
+            {
+                "effect": trial.term.effect.name,
+                "domain": trial.term.effect.domain,
+                "parameters": shown_parameters(trial.term),
+                "gain": trial.gain,
+                "p_value": trial.p_value,
+                "why_not": trial.why_not,
+            }
+            for trial in tried
+        ],
+        "untestable": [
+            {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
+        ],
+    }
+    return entry, [candidate_row(axis, 0, trial, False) for trial in tried]
+
+
+@dataclass(frozen=True)
+class _Closed:
+    """What closing the loop leaves of one axis."""
+
+    entry: Entry
+    candidates: list[Entry]
+    fit: list[Entry]
+    residuals: pa.Table
+    spectrum: pa.Table
+    extended: Entry
 
 
 def close(
     model: JointModelConfig,
-    paths: Sequence[tuple[str, Path]],
+    paths: Runs,
     axes: Sequence[int],
     out: Path,
     seed: int = 0,
     *,
+    jobs: int = 1,
     watch: Watch = unwatched,
 ) -> Outcome:
     """Close the loop on each axis; writes loop.json, the extended model and the tables.
@@ -162,99 +168,51 @@ def close(
         Output folder.
     seed : int
         For the decoys.
+    jobs : int
+        Worker processes; 0: one per core, where they are worth their start.
     watch : callable
         Called as axes get done.
     """
-    candidates: list[dict[str, Any]] = []
-    fits: list[dict[str, Any]] = []
-    residuals: list[pa.Table] = []
-    spectra: list[pa.Table] = []
-    extended: dict[int, dict[str, Any]] = {}
-
-    def one(laid: AxisModel) -> dict[str, Any]:
-        loop = close_loop(laid.fit, laid.library, seed)
-        added = {id(step.term) for step in loop.steps}
-        candidates.extend(
-            candidate_row(laid.axis, number, trial, id(trial.term) in added)
-            for number, trial in loop.tried
-        )
-        fits.extend(fit_rows(laid.axis, loop.after, certainty(loop.after), laid.unit))
-        residuals.append(residual_table(laid.axis, loop))
-        spectra.append(spectrum_table(laid.axis, loop))
-        extended[laid.axis] = extended_model(model, laid, loop)
-        return loop_entry(laid, loop)
-
-    results, errors, inputs = each_axis(
-        paths, axes, lambda runs, axis: one(lay(model, runs, axis)), watch
-    )
-    if not results:
-        return Outcome((), (), tuple(errors))
+    work = partial(_closed, seed)
+    done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
     ensure_directory(out)
+    candidates = [row for each in done for row in each.candidates]
+    fits = [row for each in done for row in each.fit]
     written = [
         _write(out / files.CANDIDATES, candidates, CANDIDATES, model, inputs),
         _write(out / files.FIT, fits, FIT, model, inputs),
-        _write_tables(out / files.RESIDUALS, residuals, model, inputs),
-        _write_tables(out / files.ORDER_SPECTRUM, spectra, model, inputs),
+        _write_tables(out / files.RESIDUALS, [each.residuals for each in done], model, inputs),
+        _write_tables(out / files.ORDER_SPECTRUM, [each.spectrum for each in done], model, inputs),
     ]
-    for axis, values in extended.items():
-        name = files.MODEL if len(extended) == 1 else f"model_axis{axis}.yaml"
+    for each in done:
+        name = files.MODEL if len(done) == 1 else f"model_axis{each.entry['axis']}.yaml"
         with atomic_path(out / name) as temporary:
-            temporary.write_text(
-                yaml.safe_dump(values, sort_keys=False, default_flow_style=None), encoding="utf-8"
-            )
+            text = yaml.safe_dump(each.extended, sort_keys=False, default_flow_style=None)
+            temporary.write_text(text, encoding="utf-8")
         written.append(out / name)
+    entries = tuple(each.entry for each in done)
     with atomic_path(out / files.LOOP) as temporary:
-        text = json.dumps({"axes": results}, indent=2, allow_nan=False, ensure_ascii=False)
+        text = json.dumps({"axes": entries}, indent=2, allow_nan=False, ensure_ascii=False)
         temporary.write_text(text + "\n", encoding="utf-8")
     written.append(out / files.LOOP)
-    return Outcome(tuple(results), tuple(written), tuple(errors))
+    return Outcome(entries, tuple(written), tuple(errors))
 
 
-def each_axis(
-    paths: Sequence[tuple[str, Path]],
-    axes: Sequence[int],
-    one: Callable[[Sequence[Run], int], dict[str, Any]],
-    watch: Watch,
-) -> tuple[list[dict[str, Any]], list[OpamcError], list[tuple[Path, str]]]:
-    """Do something with each axis of some runs; return results, what failed, and the runs' hashes.
-
-    Raises
-    ------
-    OpamcError
-        If nothing can be done.
-    """
-    runs: list[Run] = []
-    results: list[dict[str, Any]] = []
-    errors: list[OpamcError] = []
-    for name, path in paths:
-        try:
-            runs.append(Run(path, name))
-        except OpamcError as error:
-            errors.append(error)
-    if not runs:
-        raise errors[0]
-    try:
-        wanted = list(axes) or axes_of(runs)
-        if not wanted:
-            msg = f"{runs[0].path}: the runs have no axis in common; name one with --axis"
-            raise InputError(msg)
-        for done, axis in enumerate(wanted):
-            watch(done, len(wanted))
-            try:
-                results.append(one(runs, axis))
-            except ConfigError:
-                raise
-            except OpamcError as error:
-                if len(wanted) == 1:
-                    raise
-                errors.append(error)
-        inputs = [(run.path, run.sha256) for run in runs]
-    finally:
-        for run in runs:
-            run.close()
-    if errors and not results:
-        raise errors[0]
-    return results, errors, inputs
+def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
+    laid = lay(model, runs, axis)
+    loop = close_loop(laid.fit, laid.library, seed)
+    added = {id(step.term) for step in loop.steps}
+    return _Closed(
+        entry=loop_entry(laid, loop),
+        candidates=[
+            candidate_row(axis, number, trial, id(trial.term) in added)
+            for number, trial in loop.tried
+        ],
+        fit=fit_rows(axis, loop.after, certainty(loop.after), laid.unit),
+        residuals=residual_table(axis, loop),
+        spectrum=spectrum_table(axis, loop),
+        extended=extended_model(model, laid, loop),
+    )
 
 
 def _write(

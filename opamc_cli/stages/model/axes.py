@@ -1,0 +1,125 @@
+"""One step of a model's work on every axis of some runs, the axes side by side."""
+
+import traceback
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from opamc_cli.config.joint_model import JointModelConfig
+from opamc_cli.errors import ConfigError, InputError, OpamcError
+from opamc_cli.stages.model.axis_model import declared_effects, library_of
+from opamc_cli.stages.processes.parallel import Watch, map_items
+from opamc_cli.stages.recordings.axis_recording import axes_of
+from opamc_cli.storage.runs import Run
+
+Result = TypeVar("Result")
+Runs = Sequence[tuple[str, Path]]
+OnAxis = Callable[[JointModelConfig, Sequence[Run], int], Result]
+
+PACKAGE = Path(__file__).parents[2]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a model command did, and what could not be done."""
+
+    results: tuple[dict[str, Any], ...]
+    written: tuple[Path, ...]
+    errors: tuple[OpamcError, ...]
+
+
+class UserEffectError(ConfigError):
+    """A mistake in a user's own effect, with its file and line."""
+
+
+def on_each_axis(
+    work: OnAxis[Result],
+    model: JointModelConfig,
+    paths: Runs,
+    axes: Sequence[int],
+    jobs: int,
+    watch: Watch,
+) -> tuple[list[Result], list[OpamcError], list[tuple[Path, str]]]:
+    """Do something with each axis of some runs; return results, what failed, and the runs' hashes.
+
+    Parameters
+    ----------
+    work : callable
+        Importable by name; model, runs and axis in, what can be pickled out.
+    model : JointModelConfig
+        Declared model.
+    paths : sequence of (str, Path)
+        Names and files of the runs.
+    axes : sequence of int
+        Axes; empty for all.
+    jobs : int
+        Worker processes; 0: one per core, where they are worth their start.
+    watch : callable
+        Called as axes get done.
+
+    Raises
+    ------
+    ConfigError
+        If the model cannot be used, on whatever axis.
+    OpamcError
+        If nothing can be done.
+    """
+    declared_effects(model, library_of(model))
+    errors: list[OpamcError] = []
+    usable: list[tuple[str, Path]] = []
+    with ExitStack() as stack:
+        runs: list[Run] = []
+        for name, path in paths:
+            try:
+                runs.append(stack.enter_context(Run(path, name)))
+            except OpamcError as error:
+                errors.append(error)
+            else:
+                usable.append((name, path))
+        if not runs:
+            raise errors[0]
+        wanted = list(axes) or axes_of(runs)
+        inputs = [(run.path, run.sha256) for run in runs]
+        if not wanted:
+            msg = f"{runs[0].path}: the runs have no axis in common; name one with --axis"
+            raise InputError(msg)
+    done = map_items(partial(_on_axis, work, model, usable), wanted, jobs, watch)
+    for failed in done.errors:
+        if isinstance(failed, ConfigError):
+            raise failed
+    errors += done.errors
+    if not done.results:
+        raise errors[0] if len(wanted) > 1 else errors[-1]
+    return list(done.results), errors, inputs
+
+
+def _on_axis(work: OnAxis[Result], model: JointModelConfig, paths: Runs, axis: int) -> Result:
+    # A worker has one thread: with more, the sums of products here would differ in the last digit.
+    with ExitStack() as stack, threadpool_limits(1):
+        runs = [stack.enter_context(Run(path, name)) for name, path in paths]
+        try:
+            return work(model, runs, axis)
+        except OpamcError:
+            raise
+        except Exception as error:
+            where = _in_a_users_effect(error)
+            if where is None:
+                raise
+            what = f"{type(error).__name__}: {error}".rstrip(": ")
+            msg = f"{where}: this effect cannot be used ({what}); correct it"
+            raise UserEffectError(msg) from error
+
+
+def _in_a_users_effect(error: BaseException) -> str | None:
+    """Return file and line where an error arose in a user's effect, None where in none."""
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        own = frame.filename.endswith(".py") and Path(frame.filename).is_relative_to(PACKAGE)
+        installed = "site-packages" in frame.filename or "/lib/python" in frame.filename
+        if not own and not installed and Path(frame.filename).is_file():
+            return f"{frame.filename}:{frame.lineno}"
+    return None
