@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint

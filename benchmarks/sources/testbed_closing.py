@@ -8,7 +8,7 @@ import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording

@@ -4,7 +4,7 @@ import numpy as np
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit
 from opamc_cli.joint.fit.model import Term, fit_terms, open_session
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording

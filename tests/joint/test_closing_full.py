@@ -13,7 +13,7 @@ import pytest
 
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording

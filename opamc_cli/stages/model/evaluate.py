@@ -11,7 +11,7 @@ import numpy as np
 from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.fit.declared import BETTER
+from opamc_cli.joint.explain.declared import BETTER
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import build_track, smoothings
