@@ -6,12 +6,9 @@ import numpy as np
 
 from opamc_cli.decision import judge as decision
 from opamc_cli.decision.judge import Bundle, Judgement, Policy
+from opamc_cli.decision.witnesses.deviation import variance_within_sessions
 from opamc_cli.decision.witnesses.patterns import Cell, inflation_within_sessions
-from opamc_cli.decision.witnesses.spectra import (
-    SpectrumCell,
-    SpectrumEvidence,
-    variance_within_sessions,
-)
+from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 
 
 @dataclass(frozen=True)

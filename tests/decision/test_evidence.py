@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
+from opamc_cli.decision.witnesses.deviation import deviation_from_rest
 from opamc_cli.decision.witnesses.evidence import session_distances, weigh_together
 from opamc_cli.decision.witnesses.patterns import PatternEvidence
-from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, deviation_from_rest, size_effect
+from opamc_cli.decision.witnesses.spectra import LEAST_VARIANCE, SpectrumEvidence, size_effect
 from tests.decision.fleet import Fleet, cells, judge, spectra
 from tests.marks import long
 
@@ -16,7 +17,7 @@ SEEDS = range(40)
 
 
 def squared_deviation(cell, units, rest):
-    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest)
+    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest, LEAST_VARIANCE)
 
 
 def turned(plan, seed, place):
@@ -112,11 +113,7 @@ def test_sessions_of_any_number_of_cycles_are_judged_alike(n_target_cycles):
     ratios = []
     for seed in range(60):
         cell = spectra(plan, seed, n_target_cycles)[1][0]
-        ratios.append(
-            deviation_from_rest(
-                cell.sessions, cell.cycles, cell.within, np.array([0, 6]), np.array([1, 2, 3, 4, 5])
-            )
-        )
+        ratios.append(squared_deviation(cell, np.array([0, 6]), np.array([1, 2, 3, 4, 5])))
     own, target = np.mean(ratios, axis=0)
     assert target == pytest.approx(own, rel=0.12)
 
@@ -145,6 +142,5 @@ def test_identical_spectra_are_no_evidence():
     cell = spectra(plan, 0)[1][0]
     cell.sessions[:] = cell.sessions[0]
     assert size_effect([cell], plan.n_baseline) == 0.0
-    assert deviation_from_rest(
-        cell.sessions, cell.cycles, cell.within, np.array([6]), np.arange(6)
-    )[0] == pytest.approx(0.0, abs=1e-9)
+    (ratio,) = squared_deviation(cell, np.array([6]), np.arange(6))
+    assert ratio == pytest.approx(0.0, abs=1e-9)

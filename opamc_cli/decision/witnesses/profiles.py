@@ -8,13 +8,15 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.witnesses.evidence import log_mean
-from opamc_cli.decision.witnesses.spectra import (
+from opamc_cli.decision.witnesses.deviation import (
     PRIOR_DOF,
+    change_between,
+    clearest_part,
     deviation_from_rest,
     mean_of_known,
     variance_within_sessions,
 )
+from opamc_cli.decision.witnesses.evidence import log_mean
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -190,15 +192,10 @@ def clearest_course(cells: Sequence[ProfileCell], n_baseline: int) -> CourseChan
     """
     best, found = 0.0, None
     for cell in cells:
-        change, variance = _change(cell, n_baseline)
-        known = np.isfinite(variance)
-        if not known.any():
-            continue
-        typical = float(variance[known].mean())
-        ratio = np.where(known, change**2 / (variance + typical + LEAST_SHARE**2), 0.0)
-        place = int(ratio.argmax())
-        if ratio[place] > best:
-            best = float(ratio[place])
+        change, variance = change_between(cell.course, n_baseline)
+        ratio, place = clearest_part(change, variance, LEAST_SHARE**2)
+        if ratio > best:
+            best = ratio
             scales = cell.scale[:, 0]
             found = CourseChange(
                 motion=cell.motion,
@@ -208,17 +205,6 @@ def clearest_course(cells: Sequence[ProfileCell], n_baseline: int) -> CourseChan
                 scale=float(np.nanmean(scales[n_baseline:]) / np.nanmean(scales[:n_baseline])),
             )
     return found
-
-
-def _change(cell: ProfileCell, n_baseline: int) -> tuple[FloatArray, FloatArray]:
-    """Change of each part's current, and its variance among healthy sessions; NaN if unknown."""
-    baseline = cell.course[:n_baseline]
-    target, n_target = mean_of_known(cell.course[n_baseline:])
-    mean, n = mean_of_known(baseline)
-    squares = np.nansum((baseline - mean) ** 2, axis=0)
-    enough = (n > 1) & (n_target > 0)
-    per_session = np.divide(squares, n - 1, out=np.full(n.shape, np.nan), where=enough)
-    return target - mean, per_session * (1 / np.maximum(n, 1) + 1 / np.maximum(n_target, 1))
 
 
 def between_groups(sessions: FloatArray, is_target: NDArray[np.bool_]) -> FloatArray:
@@ -278,7 +264,7 @@ def profile_effect(cells: Sequence[ProfileCell], n_baseline: int) -> float:
     """
     effects = []
     for cell in cells:
-        change, variance = _change(cell, n_baseline)
+        change, variance = change_between(cell.course, n_baseline)
         if np.isfinite(variance).all():
             effects.append(math.sqrt(max(float((change**2 - variance).mean()), 0.0)))
     return max(effects, default=math.nan)

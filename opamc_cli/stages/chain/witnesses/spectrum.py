@@ -8,11 +8,8 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
-from opamc_cli.decision.witnesses.spectra import (
-    SpectrumCell,
-    SpectrumEvidence,
-    variance_within_sessions,
-)
+from opamc_cli.decision.witnesses.deviation import variance_within_sessions
+from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.signal.transform.short_time import short_time_log_power
 from opamc_cli.stages.chain.witnesses.kept_rows import Names, rows_by_motion
 from opamc_cli.storage.schemas import files

@@ -1,0 +1,167 @@
+"""How far sessions lie from others, part by part, in units of what healthy ones differ by."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+PRIOR_DOF = 4.0
+"""Degrees of freedom that the motion's mean variance counts for in each bin's own."""
+
+
+def variance_within_sessions(
+    log_power: FloatArray, session_of_cycle: NDArray[np.int64]
+) -> FloatArray:
+    """Variance of single cycles about their session's mean, bin by bin.
+
+    Parameters
+    ----------
+    log_power : ndarray, shape (C, F)
+        One row per cycle; NaN entries are passed over.
+    session_of_cycle : ndarray, shape (C,)
+        Label of the session of each.
+
+    Returns
+    -------
+    ndarray, shape (F,)
+        NaN where no session has two cycles.
+    """
+    squares = np.zeros(log_power.shape[1])
+    dof = np.zeros(log_power.shape[1])
+    for session in np.unique(session_of_cycle):
+        own = log_power[session_of_cycle == session]
+        mean, n = mean_of_known(own)
+        squares += np.nansum((own - mean) ** 2, axis=0)
+        dof += np.maximum(n - 1, 0)
+    return np.asarray(np.divide(squares, dof, out=np.full(len(dof), np.nan), where=dof > 0))
+
+
+def deviation_from_rest(
+    sessions: FloatArray,
+    cycles: FloatArray,
+    within: FloatArray,
+    units: NDArray[np.int64],
+    rest: NDArray[np.int64],
+    least_variance: float,
+) -> FloatArray:
+    """Mean squared deviation of sessions from others, in units of what healthy ones deviate by.
+
+    Parameters
+    ----------
+    sessions : ndarray, shape (B + T, F)
+        Mean of each session's cycles; NaN where nothing is known.
+    cycles : ndarray, shape (B + T,)
+        Cycles that each mean is of.
+    within : ndarray, shape (F,)
+        Variance of a single cycle about its session's mean; NaN if unknown.
+    units : ndarray, shape (U,)
+        Indices of the sessions to be judged.
+    rest : ndarray, shape (R,)
+        Indices of the sessions they are compared with; none of `units` is among them.
+    least_variance : float
+        Sessions that agree within it agree.
+
+    Returns
+    -------
+    ndarray, shape (U,)
+        About 1 for a healthy session, whatever the number of its cycles; NaN where the rest has
+        neither two sessions nor a session of two cycles.
+
+    Notes
+    -----
+    The variance of a session's mean is that between sessions plus that of a cycle over the number
+    of cycles. The rest's own sessions show both together; what a unit of more or fewer cycles has
+    less or more is corrected for, and the rest's mean has an error of its own. Few sessions say
+    little of one bin, so that its variance is moderated by the motion's mean (Smyth 2004).
+    """
+    mean, n = mean_of_known(sessions[rest])
+    squares = np.nansum((sessions[rest] - mean) ** 2, axis=0)
+    within = moderated(within, 1.0)
+    share = np.mean(1 / cycles[rest][cycles[rest] > 0]) if (n > 0).any() else np.nan
+    dof = np.maximum(n - 1, 0)
+    if (dof > 0).any():
+        typical = squares.sum() / dof.sum()
+        variance = (PRIOR_DOF * typical + squares) / (PRIOR_DOF + dof)
+    else:
+        # A single session shows no variation between sessions; its cycles show what is least.
+        variance = within * share
+    result = np.full(len(units), np.nan)
+    for k, unit in enumerate(units):
+        if cycles[unit] == 0:
+            continue
+        own = 1 / cycles[unit]
+        expected = np.fmax(variance + np.nan_to_num(within) * (own - share), within * own)
+        expected = expected + variance / np.maximum(n, 1)
+        ratio = (sessions[unit] - mean) ** 2 / np.maximum(expected, least_variance)
+        known = np.isfinite(ratio)
+        if known.any():
+            result[k] = float(ratio[known].mean())
+    return result
+
+
+def change_between(sessions: FloatArray, n_baseline: int) -> tuple[FloatArray, FloatArray]:
+    """Change of each part's mean, and its variance among healthy sessions; NaN if unknown.
+
+    Parameters
+    ----------
+    sessions : ndarray, shape (B + T, F)
+        Baseline first; NaN where nothing is known.
+    n_baseline : int
+        B.
+
+    Returns
+    -------
+    change, variance : ndarray, shape (F,)
+    """
+    baseline = sessions[:n_baseline]
+    target, n_target = mean_of_known(sessions[n_baseline:])
+    mean, n = mean_of_known(baseline)
+    squares = np.nansum((baseline - mean) ** 2, axis=0)
+    enough = (n > 1) & (n_target > 0)
+    per_session = np.divide(squares, n - 1, out=np.full(n.shape, np.nan), where=enough)
+    return target - mean, per_session * (1 / np.maximum(n, 1) + 1 / np.maximum(n_target, 1))
+
+
+def clearest_part(
+    change: FloatArray, variance: FloatArray, least_variance: float
+) -> tuple[float, int]:
+    """How clearly the part whose change stands out most does so, and which one it is.
+
+    Parameters
+    ----------
+    change, variance : ndarray, shape (F,)
+        As `change_between` returns them.
+    least_variance : float
+        Sessions that agree within it agree.
+
+    Returns
+    -------
+    float
+        Squared change over its variance, moderated by the mean of all parts; 0 if nothing is known.
+    int
+        The part.
+    """
+    known = np.isfinite(variance)
+    if not known.any():
+        return 0.0, 0
+    typical = float(variance[known].mean())
+    ratio = np.where(known, change**2 / (variance + typical + least_variance), 0.0)
+    place = int(ratio.argmax())
+    return float(ratio[place]), place
+
+
+def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean of the known values of each column, NaN without any, and their number."""
+    known = np.isfinite(rows)
+    n = known.sum(axis=0).astype(np.float64)
+    total = np.where(known, rows, 0.0).sum(axis=0)
+    return np.divide(total, n, out=np.full(n.shape, np.nan), where=n > 0), n
+
+
+def moderated(variance: FloatArray, dof: float) -> FloatArray:
+    """Blend each bin's variance with the mean of all bins'; unknown ones take the mean."""
+    known = np.isfinite(variance)
+    if not known.any():
+        return variance
+    typical = float(variance[known].mean())
+    return (PRIOR_DOF * typical + dof * np.where(known, variance, typical)) / (PRIOR_DOF + dof)
