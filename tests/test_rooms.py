@@ -90,9 +90,6 @@ def test_no_module_knows_itself_by_way_of_others():
 def test_no_two_rooms_know_each_other(depth):
     graph: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
     for one, others in arrows().items():
-        if one[:2] == ("joint", "fit"):
-            # a declared effect's form is chosen as a missing one's is, by the search for a name
-            others = {other for other in others if other[:2] != ("joint", "name")}
         room = one[:depth]
         known = {other[:depth] for other in others}
         graph.setdefault(room, set()).update(known - {room} - ENTRIES)

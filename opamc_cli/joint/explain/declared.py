@@ -16,6 +16,9 @@ from opamc_cli.joint.name.search import Pool, candidates
 BETTER = 0.97
 """Of the held-out mean square error: another window than the noise asks for must be worth it."""
 
+JUDGED = ("moving", "clear", "channels", "period_samples")
+"""What tells which samples count. A longer window has fewer moving samples, none of them near a
+reversal: judged by its own, it is the best wherever friction is wrong."""
 
 Declared = tuple[tuple[Effect, Term | None], ...]
 
@@ -58,9 +61,8 @@ def best_fit(
     error, best = fitted(track)
     for smoothing in () if "windows" in without_rules else smoothings(recordings):
         other = build_track(recordings, joint, smoothing)
-        # All are judged where the first one takes nothing from the acceleration.
-        same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}
-        found, fit = fitted(replace(other, **same))
+        # All are judged by the same samples: where the first takes nothing from the acceleration.
+        found, fit = fitted(replace(other, **{name: getattr(track, name) for name in JUDGED}))
         if found < BETTER * error:
             error, best = found, fit
     return best

@@ -16,7 +16,7 @@ LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
 NARROW = 4
 """Regressors of a guess up to which products are summed one by one, for all guesses at once."""
-RIDGE = 1e-6
+RIDGE = 1e-7
 """Of a regressor's energy: one of which the model leaves less is the model's already."""
 
 

@@ -14,8 +14,8 @@ from opamc_cli.joint.effects.library import (
     effect_named,
     load_user_effects,
 )
-from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.explain.declared import Declared, best_fit
+from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Fit, Session
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving

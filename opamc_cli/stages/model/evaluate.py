@@ -11,7 +11,7 @@ import numpy as np
 from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.explain.declared import BETTER
+from opamc_cli.joint.explain.declared import BETTER, JUDGED
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import build_track, smoothings
@@ -88,7 +88,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     for smoothing in smoothings(recordings):
         other = build_track(recordings, joint, smoothing)
         # all are judged where the first one takes nothing from the acceleration
-        same = {name: getattr(track, name) for name in ("clear", "channels", "period_samples")}
+        same = {name: getattr(track, name) for name in JUDGED}
         found, _ = _apply(replace(other, **same), effects, closed)
         # the motion is differentiated in the way that predicts best, as when the model was closed
         if found.rmse() ** 2 < BETTER * applied.rmse() ** 2:

@@ -5,8 +5,8 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit import model, thinning
 from opamc_cli.joint.explain.declared import declared_fit
+from opamc_cli.joint.fit import model, thinning
 from opamc_cli.joint.fit.model import Term, fit_terms, open_session
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.loop import close_loop
