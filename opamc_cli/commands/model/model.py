@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from opamc_cli.commands.model.effects import effects
+from opamc_cli.commands.model.shown import fields_table, loop_tables, parameters, untestable
 from opamc_cli.commands.terminal.options import (
     ALL_CORES,
     DEFAULT_OUT,
@@ -51,7 +52,6 @@ Axis = Annotated[
 app.command()(effects)
 
 
-MOST_REJECTED = 3
 MOST_COEFFICIENTS = 4
 """Shown on a terminal; a drive's answer has dozens, all are in fit.parquet."""
 
@@ -125,7 +125,7 @@ def close(
         )
     output.result(
         {"axes": list(outcome.results)},
-        *(shown for result in outcome.results for shown in _loop_tables(result)),
+        *(shown for result in outcome.results for shown in loop_tables(result)),
         *(str(published(path)) for path in outcome.written),
     )
     raise typer.Exit(
@@ -201,22 +201,8 @@ def _naming(model: Path) -> Iterator[None]:
         raise ConfigError(msg) from error
 
 
-def _parameters(values: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.4g}" for name, value in values.items())
-
-
-def _table(title: str, *headings: str) -> Any:
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    table = Table(title=title, box=SIMPLE_HEAD, title_justify="left", title_style="bold")
-    for heading in headings:
-        table.add_column(heading)
-    return table
-
-
 def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
-    table = _table(
+    table = fields_table(
         f"Axis {result['axis']}: {result['rmse_a']:.4g} {result['unit']} rms left, condition "
         f"number {result['condition_number']:.3g}",
         "effect",
@@ -231,7 +217,7 @@ def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
         ]
         more = [f"{len(each) - MOST_COEFFICIENTS} more"] if len(each) > MOST_COEFFICIENTS else []
         shown = ", ".join(each[:MOST_COEFFICIENTS] + more)
-        table.add_row(term["effect"], shown, _parameters(term["parameters"]))
+        table.add_row(term["effect"], shown, parameters(term["parameters"]))
     apart = [f"the data cannot tell apart: {', '.join(names)}" for names in result["inseparable"]]
     return [table, *apart]
 
@@ -245,78 +231,16 @@ def _trace_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
         if domains
         else f"Axis {result['axis']}: nothing can be explained"
     )
-    table = _table("Candidates", "effect", "parameters", "held-out gain", "p", "why not")
+    table = fields_table("Candidates", "effect", "parameters", "held-out gain", "p", "why not")
     for entry in result["candidates"][:10]:
         table.add_row(
             entry["effect"],
-            _parameters(entry["parameters"]),
+            parameters(entry["parameters"]),
             f"{entry['gain']:.1%}",
             f"{entry['p_value']:.2g}",
             entry["why_not"] or "passes",
         )
-    return [first, *([table] if result["candidates"] else []), *_untestable(result)]
-
-
-def _headline(result: dict[str, Any]) -> str:
-    """Say in words what was missing."""
-    before, after = result["before"]["rmse_a"], result["after"]["rmse_a"]
-    named = [step for step in result["steps"] if not step["effect"].startswith("unnamed")]
-    words = [
-        step["interpretation"].split(":")[0].split(" (")[0]
-        + (f" ({step['effect']}, approximately)" if step["approximate"] else f" ({step['effect']})")
-        for step in named
-    ]
-    error = f"error {before:.4g} → {after:.4g} {result['unit']}"
-    reached = f"{result['explained_share']:.0%} of what can be explained"
-    if not result["ceiling"]["share"]:
-        reached = "how much can be explained is not known"
-    if named:
-        listed = "; ".join(words)
-        return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"
-    if result["verdict"] == "nothing-missing":
-        error = f"error {before:.4g} {result['unit']}"
-        return f"Axis {result['axis']} lacks nothing that the data can show: {error}"
-    curves = [step["interpretation"].split(";")[0] for step in result["steps"]]
-    what = "; ".join(curves) or f"something in the {result['domain']} domain"
-    return f"Axis {result['axis']} lacks {what}, which no effect of the library describes: {error}"
-
-
-def _loop_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
-    before, after, ceiling = result["before"], result["after"], result["ceiling"]
-    unit = result["unit"]
-    shown: list[RenderableType] = [
-        _headline(result),
-        f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; ceiling "
-        f"{ceiling['share']:.0%} ± {ceiling['standard_error']:.0%} of the mean square, floor "
-        f"{result['floor_a']:.4g} {unit}",
-    ]
-    if result["steps"]:
-        errors = (f"{unit} before", f"{unit} after")
-        table = _table("Steps", "effect", "parameters", "gain", "form", *errors)
-        for step in result["steps"]:
-            ties = f" (or {', '.join(step['ties'])})" if step["ties"] else ""
-            table.add_row(
-                step["effect"] + ties,
-                _parameters(step["parameters"]),
-                f"{step['gain']:.1%}",
-                f"{step['fit_of_name']:.0%}" if step["fit_of_name"] else "–",
-                f"{step['rmse_before_a']:.4g}",
-                f"{step['rmse_after_a']:.4g}",
-            )
-        shown.append(table)
-    shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
-    shown += [
-        f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"
-        for step in result["steps"]
-        if step["separating_experiment"]
-    ]
-    if result["domain"]:
-        shown.append(f"what remains is structured in the {result['domain']} domain")
-    shown += [
-        f"rejected {entry['effect']}: {entry['why']}"
-        for entry in result["rejected"][:MOST_REJECTED]
-    ]
-    return [*shown, *_untestable(result), f"sealed: {', '.join(result['sealed'])}"]
+    return [first, *([table] if result["candidates"] else []), *untestable(result)]
 
 
 def _evaluation(result: dict[str, Any]) -> Sequence["RenderableType"]:
@@ -326,13 +250,9 @@ def _evaluation(result: dict[str, Any]) -> Sequence["RenderableType"]:
         f"the sealed data of its own recordings {closed['rmse_a']:.4g} {unit}, {closed['r2']:.4f}"
     ]
     if len(result["runs"]) > 1:
-        table = _table("Runs", "run", f"error ({unit})", "r2")
+        table = fields_table("Runs", "run", f"error ({unit})", "r2")
         for run in result["runs"]:
             table.add_row(run["run"], f"{run['rmse_a']:.4g}", f"{run['r2']:.4f}")
         shown.append(table)
     shown += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
     return shown
-
-
-def _untestable(result: dict[str, Any]) -> list["RenderableType"]:
-    return [f"untestable {entry['effect']}: {entry['why']}" for entry in result["untestable"]]

@@ -131,56 +131,6 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
     return table
 
 
-def loop_table(loop: Mapping[str, Any]) -> "RenderableType":
-    """Return what the loop found on each axis.
-
-    Parameters
-    ----------
-    loop
-        Content of loop.json.
-    """
-    from rich.console import Group
-    from rich.text import Text
-
-    from opamc_cli.stages.report import wording
-
-    parts: list[RenderableType] = []
-    for entry in loop.get("axes", ()):
-        before = (entry.get("before") or {}).get("rmse_a")
-        after = (entry.get("after") or {}).get("rmse_a")
-        parts.append(
-            Text(
-                printable(
-                    f"Model of axis {entry.get('axis')}: {entry.get('verdict')}, sealed error "
-                    f"{wording.number(before)} {entry.get('unit', 'A')} before, "
-                    f"{wording.number(after)} {entry.get('unit', 'A')} after"
-                ),
-                style="bold",
-            )
-        )
-        steps = entry.get("steps", ())
-        if steps:
-            unit = entry.get("unit", "A")
-            table = FittedTable(
-                ("step", "effect", "meaning", "gain", "decoy", f"{unit} before", f"{unit} after"),
-                right=(0, 3, 4, 5, 6),
-                dropped=("decoy", "gain", "meaning"),
-                wraps=("effect", "meaning"),
-            )
-            for number, step in enumerate(steps, start=1):
-                table.add_row(
-                    str(number),
-                    Text(printable(wording.effect_phrase(step))),
-                    Text(printable(str(step.get("interpretation") or "–"))),
-                    *(
-                        wording.number(step.get(name))
-                        for name in ("gain", "decoy_gain", "rmse_before_a", "rmse_after_a")
-                    ),
-                )
-            parts.append(table)
-    return Group(*parts)
-
-
 def printable(text: str) -> str:
     """Return text from a file without the control characters that steer a terminal."""
     return "".join(c if c.isprintable() else "�" for c in text)

@@ -35,7 +35,8 @@ def report(
     """Write report.html from what a diagnosis, or score and model close, left in --out."""
     from rich.text import Text
 
-    from opamc_cli.commands.terminal.tables import feature_table, loop_table, verdict_table
+    from opamc_cli.commands.model.shown import headline
+    from opamc_cli.commands.terminal.tables import feature_table, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.errors import InputError
     from opamc_cli.stages import report as stage
@@ -53,7 +54,7 @@ def report(
     shown = [
         *([verdict_table(inputs.verdict)] if inputs.verdict is not None else []),
         *([feature_table(inputs)] if inputs.verdict is None and inputs.axes else []),
-        *([loop_table(inputs.loop)] if inputs.loop is not None else []),
+        *(Text(headline(entry)) for entry in (inputs.loop or {}).get("axes", ())),
     ]
     output = Output(as_json=as_json, quiet=quiet)
     for line in outcome.omitted:
