@@ -9,7 +9,7 @@ the clock, but the times at which a user acknowledged or declared something.
 import json
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any, NoReturn, Self, TypeVar, get_args, get_type_hints
@@ -256,6 +256,12 @@ def _columns() -> dict[str, tuple[type, ...]]:
 
 COLUMNS = _columns()
 
+WORDS = {
+    "state": ("healthy", "changed", "fault", "insufficient-data"),
+    "status": ("done", "partial", "baseline", "failed", "broken"),
+}
+"""All that may stand in a column."""
+
 
 class History:
     """An open history.
@@ -304,6 +310,15 @@ class History:
                 f"{SCHEMA_VERSION}; use the version that wrote it, or another `out`"
             )
             raise InputError(msg)
+        else:
+            with closing(sqlite3.connect(":memory:")) as new:
+                new.executescript(SCHEMA)
+                if _layout(new) != _layout(self._db):
+                    msg = (
+                        f"{self.path}: its tables are not as opamc makes them; move the file away, "
+                        "nights are judged again"
+                    )
+                    raise InputError(msg)
 
     def __enter__(self) -> Self:
         """Return the history itself."""
@@ -351,7 +366,8 @@ class History:
             found = [dict(zip(names, row, strict=True)) for row in cursor]
         for name in COLUMNS.keys() & set(names):
             for row in found:
-                if not isinstance(row[name], COLUMNS[name]):
+                known = row[name] in WORDS[name] if name in WORDS else True
+                if not (known and isinstance(row[name], COLUMNS[name])):
                     self._refuse(name, f"{row[name]!r:.60}")
         return found
 
@@ -552,6 +568,12 @@ class History:
             self._db.executemany(
                 f"INSERT OR REPLACE INTO {table} VALUES ({_marks(values[0])})", values
             )
+
+
+def _layout(db: sqlite3.Connection) -> set[tuple[str, str]]:
+    """Return how each table and index was made."""
+    query = "SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"
+    return {(str(name), " ".join(str(sql).split())) for name, sql in db.execute(query)}
 
 
 def arrow_schema(table: str) -> pa.Schema:

@@ -50,6 +50,7 @@ def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
         "UPDATE night SET key = '[]'",
         "UPDATE night SET key = 'rubbish'",
         "UPDATE night SET attempts = 'many'",
+        "UPDATE night SET status = 'fine'",
     ],
 )
 def test_a_history_that_was_edited(tmp_path, edit):
@@ -63,6 +64,17 @@ def test_a_history_that_was_edited(tmp_path, edit):
         base.commit()
     with History(path) as history, pytest.raises(InputError, match="did not write"):
         history.nights()
+
+
+def test_a_history_whose_tables_were_changed(tmp_path):
+    path = tmp_path / "history.sqlite"
+    with History(path):
+        pass
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("ALTER TABLE verdict RENAME COLUMN state TO State")
+        base.commit()
+    with pytest.raises(InputError, match="not as opamc makes them"):
+        History(path)
 
 
 def test_names_that_are_no_text(opamc, tmp_path, tonight):

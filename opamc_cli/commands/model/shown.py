@@ -39,27 +39,32 @@ def headline(result: Mapping[str, Any]) -> str:
 
 
 def _headline(result: Mapping[str, Any]) -> str:
-    before, after = result["before"]["rmse_a"], result["after"]["rmse_a"]
-    unit = result.get("unit", "A")
-    named = [step for step in result["steps"] if not step["effect"].startswith("unnamed")]
-    words = []
-    for step in named:
-        name = step["effect"] + (", approximately" if step.get("approximate") else "")
-        meaning = step["interpretation"].split(":")[0].split(" (")[0]
-        words.append(f"{meaning} ({name})")
-    error = f"error {before:.4g} → {after:.4g} {unit}"
+    # a file that another version wrote may lack fields
+    axis, unit, steps = result["axis"], result.get("unit", "A"), result.get("steps", ())
+    before, after = (
+        f"{value:.4g}" if (value := result.get(side, {}).get("rmse_a")) is not None else "?"
+        for side in ("before", "after")
+    )
+    words, curves = [], []
+    for step in steps:
+        effect, meaning = step.get("effect", "unnamed"), step.get("interpretation", "")
+        if effect.startswith("unnamed"):
+            curves.append(meaning.split(";")[0])
+        else:
+            name = effect + (", approximately" if step.get("approximate") else "")
+            words.append(f"{meaning.split(':')[0].split(' (')[0]} ({name})")
+    error = f"error {before} → {after} {unit}"
+    share = result.get("explained_share")
     reached = "how much can be explained is not known"
-    if result["explained_share"] is not None and result.get("ceiling", {}).get("share") != 0:
-        reached = f"{result['explained_share']:.0%} of what can be explained"
-    if named:
-        listed = "; ".join(words)
-        return f"Axis {result['axis']} lacks {listed}: {error}, {reached}"
-    if result["verdict"] == "nothing-missing":
-        error = f"error {before:.4g} {unit}"
-        return f"Axis {result['axis']} lacks nothing that the data can show: {error}"
-    curves = [step["interpretation"].split(";")[0] for step in result["steps"]]
-    what = "; ".join(curves) or f"something in the {result.get('domain')} domain"
-    return f"Axis {result['axis']} lacks {what}, which no effect of the library describes: {error}"
+    if share is not None and result.get("ceiling", {}).get("share") != 0:
+        reached = f"{share:.0%} of what can be explained"
+    if words:
+        return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
+    if result.get("verdict") == "nothing-missing":
+        return f"Axis {axis} lacks nothing that the data can show: error {before} {unit}"
+    domain = result.get("domain")
+    what = "; ".join(curves) or "something" + (f" in the {domain} domain" if domain else "")
+    return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}"
 
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:

@@ -9,6 +9,7 @@ import pytest
 from rich.console import Console, RenderableType
 
 from opamc_cli import __main__
+from opamc_cli.commands.model.shown import headline
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
 
 
@@ -75,6 +76,23 @@ def test_text_from_files_steers_no_terminal_and_is_no_markup() -> None:
     assert "\x1b" not in text
     assert "\x07" not in text
     assert text.count("[red]x[/red] [/nonsense]") == 2
+
+
+@pytest.mark.parametrize("gone", ["before", "steps", "unit", "ceiling", "domain", "verdict"])
+def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
+    entry = {
+        "axis": 2, "unit": "A", "before": {"rmse_a": 0.1}, "after": {"rmse_a": 0.05},
+        "steps": [{"effect": "ripple", "interpretation": "kinematic error (order 2): look"}],
+        "ceiling": {"share": 0.9}, "explained_share": 0.8, "verdict": "partial",
+        "domain": "motor-angle",
+    }  # fmt: skip
+    whole = (
+        "Axis 2 lacks kinematic error (ripple): error 0.1 → 0.05 A, 80% of what can be explained"
+    )
+    assert headline(entry) == whole
+    del entry[gone]
+    assert headline(entry).startswith("Axis 2 lacks ")
+    assert "None" not in headline(entry)
 
 
 @pytest.mark.long
