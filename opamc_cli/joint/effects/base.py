@@ -42,6 +42,8 @@ class Effect:
     """True for functions that claim nothing but their domain."""
     changes_in_time: bool = False
     """True where the effect is a change while the joint goes on as before: slow noise is, too."""
+    as_smoothing: bool = False
+    """True where it delays the motion or rounds it off: smoothing what was measured does, too."""
     searches: tuple[str, ...] = ()
     """Parameters that the data decide."""
     forms: tuple[str, ...] = ()

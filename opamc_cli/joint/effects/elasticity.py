@@ -22,6 +22,7 @@ class Elasticity(Effect):
     per = ("rad/s²",)
     searches = ("resonance_hz", "damping")
     meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
+    as_smoothing = True
     needs = ("position", "logged")
     from_motion = True
 

@@ -21,6 +21,7 @@ class TimeDelay(Effect):
     origin = "measurement"
     searches = ("delay_s",)
     meaning = "current and motion are logged with a delay: check the logger's clocks"
+    as_smoothing = True
     needs = ("position", "logged")
     static = False
     whole = True

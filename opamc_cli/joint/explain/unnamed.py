@@ -65,6 +65,7 @@ class Response(Effect):
     """What resonances of the joint and of the drive would make of the acceleration."""
 
     unnamed = True
+    as_smoothing = True
     name = "unnamed_response"
     domain = "acceleration"
     meaning = "a response to the acceleration; no effect of the library has its form"
@@ -100,6 +101,7 @@ class Shift(Effect):
 
     unnamed = True
     of_its_recordings = True
+    as_smoothing = True
     name = "unnamed_shift"
     domain = "time"
     meaning = "a response of the model's own current; no effect of the library has its form"

@@ -280,6 +280,16 @@ class Fit:
         error: Floats = session.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
         return error
 
+    @cached_property
+    def unsmoothed_error(self) -> Floats:
+        """Held-out error of each part, with the difference to other windows beside the terms."""
+        session = self.session
+        blocks = [session.columns(term, fine=True) for term in self.terms]
+        blur = session.fine.track.blur
+        beside = [] if blur is None else [blur]
+        error: Floats = session.sums_of([*blocks, *beside], True).held_out()
+        return error
+
     def fast_part(self, fine: bool) -> Floats:
         """Compute the current of the fast terms on one of the grids."""
         part = np.zeros(self.session.grid_of(fine).track.size)

@@ -87,6 +87,21 @@ class Chain:
         """Likewise, where the current may drift: every part has an offset of its own."""
         return _gain(other.fit.drift_free_error, self.fit.drift_free_error)
 
+    def no_more_than_drift(self, other: "Chain", least_share: float) -> bool:
+        """Whether an offset for every half unit explains what this chain does and the other not.
+
+        What still helps beside the offsets is more; so is what explains as much as all of them,
+        with fewer coefficients: they follow a slow noise better than any one step.
+        """
+        left = float(self.fit.sums.held_out().sum())
+        offsets = float(other.fit.drift_free_error.sum())
+        return self.gain_beside_drift(other)[0] < least_share and offsets < left
+
+    def gain_beside_smoothing(self, other: "Chain") -> float:
+        """Share of the other's error, where both may make up for the smoothing of the motion."""
+        before, after = other.fit.unsmoothed_error, self.fit.unsmoothed_error
+        return _gain(before, after)[0]
+
 
 def chain_of(fit: Fit, added: int) -> Chain:
     """Judge a fit by its held-out errors."""

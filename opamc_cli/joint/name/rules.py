@@ -1,11 +1,12 @@
 """The rules beside the search itself: what each prevents and costs stands in docs/loop.md."""
 
 RULES = {
-    "beam": "four chains instead of one",
+    "beam": "two chains instead of one",
     "share": "an effect takes 5 % of the held-out error",
     "certain": "a function without a name takes twice its standard error over parts of the data",
     "sign": "coefficients have the sign that physics gives them",
-    "drift": "a change in time must be seen beside a free offset in each part",
+    "drift": "a change in time is seen beside free offsets, or explains as much as they do",
+    "smoothing": "a wind-up or a delay is seen beside what other windows make of the motion",
     "exchange": "an effect gives way to one that explains the data better beside the others",
     "unnamed": "an effect gives way to an unnamed function that explains the data clearly better",
     "windows": "the motion is differentiated over the window that predicts best",

@@ -210,9 +210,13 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
         return "takes something off the held-out error here and there, not everywhere"
     if "sign" not in pool.without and not child.plausible:
         return "its sign, or its size, is not physical"
-    drifts = child.terms[-1].effect.changes_in_time and "drift" not in pool.without
-    if drifts and child.gain_beside_drift(parent)[0] < pool.least_share:
+    effect = child.terms[-1].effect
+    drifts = effect.changes_in_time and "drift" not in pool.without
+    if drifts and child.no_more_than_drift(parent, pool.least_share):
         return "slow noise explains it as well: within parts of the data nothing speaks for it"
+    smooths = effect.as_smoothing and "smoothing" not in pool.without
+    if smooths and child.gain_beside_smoothing(parent) < pool.least_share:
+        return "what the smoothing takes from the measured motion explains it as well"
     return None
 
 
