@@ -11,7 +11,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from opamc_cli.commands.terminal.streams import finish, open_streams, say
+from opamc_cli.commands.terminal.streams import complain, finish, open_streams, say
 from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
 from opamc_cli.stages.processes.interruption import interruptible
 
@@ -70,7 +70,7 @@ def _run(given: list[str]) -> None:
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:
     """Print an error on stderr, and as JSON on stdout where the result would have been JSON."""
-    say(f"opamc: {message}\n", sys.stderr)
+    complain(message)
     if "--json" in given:
         import json
 

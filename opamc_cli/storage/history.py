@@ -7,6 +7,7 @@ the clock, but the times at which a user acknowledged or declared something.
 """
 
 import json
+import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -262,6 +263,8 @@ WORDS = {
 }
 """All that may stand in a column."""
 
+NIGHT = re.compile(r"\d{4}-\d\d-\d\d|")
+
 
 class History:
     """An open history.
@@ -367,6 +370,8 @@ class History:
         for name in COLUMNS.keys() & set(names):
             for row in found:
                 known = row[name] in WORDS[name] if name in WORDS else True
+                if name == "night" and isinstance(row[name], str):
+                    known = NIGHT.fullmatch(row[name]) is not None
                 if not (known and isinstance(row[name], COLUMNS[name])):
                     self._refuse(name, f"{row[name]!r:.60}")
         return found

@@ -620,6 +620,15 @@ def test_unusable_models(opamc, tmp_path, text, part):
     assert part in ended.sentences[0]
 
 
+def test_a_value_of_thousands_of_characters_is_quoted_in_part(opamc, tmp_path):
+    file = bad_runs.moving_joint(tmp_path / "r.parquet")
+    (tmp_path / "model.yaml").write_text(f"effects: [coulomb, {'x' * 5000}]\n")
+    ended = opamc("model", "fit", file, "--model", tmp_path / "model.yaml", "--out", tmp_path)
+    assert ended.code == ExitCode.USAGE
+    assert "Unknown effect 'xxx" in ended.err
+    assert len(ended.err) < 1200
+
+
 def test_a_ripple_is_declared_by_its_order(opamc, tmp_path):
     file = bad_runs.moving_joint(tmp_path / "r.parquet")
     model = tmp_path / "model.yaml"

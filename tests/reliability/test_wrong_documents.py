@@ -51,6 +51,7 @@ def test_effect_files_that_define_nothing(opamc, tmp_path, tonight, code):
         "UPDATE night SET key = 'rubbish'",
         "UPDATE night SET attempts = 'many'",
         "UPDATE night SET status = 'fine'",
+        "UPDATE night SET night = 'x'",
     ],
 )
 def test_a_history_that_was_edited(tmp_path, edit):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
-from opamc_cli.commands.terminal.streams import say
+from opamc_cli.commands.terminal.streams import complain, say
 from opamc_cli.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class Output:
 
     def failure(self, text: str) -> None:
         """Print why one of several runs could not be used."""
-        say(f"opamc: {text}\n", sys.stderr)
+        complain(text)
 
     def steps(self) -> "AbstractContextManager[Steps]":
         """Show which step is how far, on a terminal only."""

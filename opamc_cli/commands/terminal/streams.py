@@ -43,6 +43,19 @@ def say(text: str, stream: "TextIO") -> None:
             say(f"opamc: standard output cannot be written ({reason})\n", sys.stderr)
 
 
+LONGEST_WORD = 300
+"""Characters of a word in an error; a path is seldom longer, a value in a damaged file may be."""
+
+
+def complain(text: str) -> None:
+    """Write an error, of whatever it quotes no more than a person would read."""
+    words = (
+        word if len(word) <= LONGEST_WORD else f"{word[:150]}…{word[-100:]}"
+        for word in text.split(" ")
+    )
+    say(f"opamc: {' '.join(words)}\n", sys.stderr)
+
+
 def finish() -> None:
     """Write what is left in the buffers, or drop it: the interpreter's end would exit with 120."""
     for stream in (sys.stdout, sys.stderr):

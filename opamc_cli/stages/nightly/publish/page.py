@@ -112,7 +112,8 @@ def _sparks(history: History, nights: Sequence[str]) -> Mapping[tuple[str, str, 
     for row in history.rows(query, (nights[0],)):
         key = (row["robot"], row["program"], row["axis"])
         line = found.setdefault(key, ["."] * len(nights))
-        if row["distance"] is not None:
+        # a measure that somebody moved to another night stands nowhere
+        if row["distance"] is not None and row["night"] in place:
             level = round((row["distance"] - LOWEST) * PER_UNIT)
             line[place[row["night"]]] = DIGITS[min(max(level, 0), len(DIGITS) - 1)]
     return {key: "".join(line) for key, line in found.items()}
