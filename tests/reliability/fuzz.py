@@ -24,6 +24,8 @@ import time
 import traceback
 import warnings
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -401,14 +403,24 @@ def wrong(code: int, out: str, err: str, seconds: float) -> str | None:
     return None
 
 
+@contextmanager
+def bounded_memory(most: int) -> Iterator[None]:
+    """Bound the address space for a while: what comes after, such as a browser, needs more."""
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (most, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_AS, before)
+
+
 def fuzz(count: int, minutes: float, seed: int, kept: Path | None = None) -> Counter[str]:
     """Try `count` inputs in at most so many minutes; return how each kind of them ended."""
     ends: Counter[str] = Counter()
     kinds, weights = zip(*KINDS.items(), strict=True)
     begun = time.monotonic()
-    with tempfile.TemporaryDirectory() as name:
+    with tempfile.TemporaryDirectory() as name, bounded_memory(3 * MOST_BYTES):
         inputs = Inputs(Path(name))
-        resource.setrlimit(resource.RLIMIT_AS, (3 * MOST_BYTES, resource.RLIM_INFINITY))
         for number in range(count):
             if time.monotonic() - begun > 60 * minutes:
                 break
