@@ -254,10 +254,13 @@ def _opened(
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
     has_name = any(step.named for step in steps)
     without_name = [step for step in steps if not step.named]
+    # A model that predicts no better than the mean lacks something, whatever was found.
+    predicts = _r2(after) > 0
     if has_name:
-        verdict = "closed" if reached >= CLOSED_SHARE else "partial"
+        verdict = "closed" if reached >= CLOSED_SHARE and predicts else "partial"
     else:
-        verdict = "not-in-library" if found.certain or steps else "nothing-missing"
+        unknown = found.certain or bool(steps) or not predicts
+        verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None
     if verdict in ("partial", "not-in-library"):

@@ -144,6 +144,14 @@ def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
         assert loop.explained_share < 0.9
 
 
+def test_a_model_that_predicts_nothing_is_not_said_to_lack_nothing():
+    recording = joint_of("cyclic", None)
+    noise = np.random.default_rng(5).normal(0, 1.0, recording.current_a.size)
+    loop = close(replace(recording, current_a=noise))
+    assert loop.r2_after <= 0
+    assert loop.verdict == "not-in-library"
+
+
 def test_half_of_a_known_error_is_not_called_closed():
     def both(q, v, a, t):
         shapes = [SHAPES[name](q, v, a, t) for name in ("stribeck", "mains_hum")]

@@ -62,8 +62,16 @@ def _headline(result: Mapping[str, Any]) -> str:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
     if result.get("verdict") == "nothing-missing":
         return f"Axis {axis} lacks nothing that the data can show: error {before} {unit}"
+    if "verdict" not in result or "steps" not in result:
+        return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")
     what = "; ".join(curves) or "something" + (f" in the {domain} domain" if domain else "")
+    r2 = result.get("after", {}).get("r2")
+    if r2 is not None and r2 <= 0:
+        error += (
+            f"; the model predicts sealed data no better than their mean (r2 {r2:.2g}): check "
+            "gear ratio, pole pairs, units and phases"
+        )
     return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}"
 
 

@@ -91,7 +91,8 @@ def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
     )
     assert headline(entry) == whole
     del entry[gone]
-    assert headline(entry).startswith("Axis 2 lacks ")
+    told = "Axis 2: loop.json does not say" if gone == "steps" else "Axis 2 lacks "
+    assert headline(entry).startswith(told)
     assert "None" not in headline(entry)
 
 
