@@ -105,6 +105,11 @@ def filled(match: re.Match[str], work: Path) -> str:
     return f"{head}```\n{text}\n```\n"
 
 
+def written_anew(work: Path) -> str:
+    """Return README.md with what its commands print in a folder that holds `make_logs`' logs."""
+    return BLOCK.sub(lambda match: filled(match, work), README.read_text(encoding="utf-8"))
+
+
 def differs(old: str, new: str) -> str | None:
     """Return the first line that is another one, numbers aside that are nearly equal."""
     for one, other in zip([*old.splitlines(), ""], [*new.splitlines(), ""], strict=False):
@@ -126,7 +131,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         make_logs(work)
-        new = BLOCK.sub(lambda match: filled(match, work), old)
+        new = written_anew(work)
     if not check:
         README.write_text(new, encoding="utf-8")
     elif (where := differs(old, new)) is not None:

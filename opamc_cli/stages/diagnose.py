@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from opamc_cli.config import Config
@@ -15,7 +16,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.parallel import Steps, unshown
-from opamc_cli.stages.verdict import cause, findings, verdict
+from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.common import far_together
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
@@ -131,9 +132,8 @@ def _diagnose(
     figures_of_healthy: bool,
 ) -> DiagnoseOutcome:
     _check_before(baseline, target)
-    cause.library_of(
-        config.joint
-    )  # a mistake in a user's effect is better told now than at the end
+    if config.joint.library:
+        _cause().library_of(config.joint)  # a mistake in it is better told now than at the end
     repeats, left_out = repeated(baseline, target)
     agreement = Agreement(config.identify)
     normal = run_chain(
@@ -167,7 +167,7 @@ def _diagnose(
     causes: dict[int, dict[str, Any]] = {}
     notes: list[str] = []
     if differing:
-        watch = progress("cause")
+        watch, cause = progress("cause"), _cause()
         starts = [cause.first_motions(side.patterns) for side in (sides.baseline, sides.target)]
         for done, axis in enumerate(differing):
             watch(done, len(differing))
@@ -205,6 +205,13 @@ def _diagnose(
         errors=(*normal.errors, *other.errors, *unjudged.errors),
         notes=every_note,
     )
+
+
+def _cause() -> ModuleType:
+    """Return what models a joint; to load it costs more than to judge a short recording."""
+    from opamc_cli.stages.verdict import cause
+
+    return cause
 
 
 def _check_before(baseline: Sequence[Path], target: Sequence[Path]) -> None:

@@ -22,6 +22,8 @@ from tests.conftest import Ended
 ROOT = Path(__file__).parents[2]
 MAP = "sampling_rate_hz: 10\nheader: false\ncolumns: {axis1_a: {source: 0, unit: A}}\n"
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def check_refusal(ended: Ended, code: ExitCode, *parts: str) -> None:
     """Check that one sentence says why, with all `parts`, and that nothing else was said."""

@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "itsc_phase_current"
 
 pytestmark = [
+    pytest.mark.usefixtures("undrawn"),
     pytest.mark.long,
     pytest.mark.measured,
     pytest.mark.skipif(not DATA.is_dir(), reason=f"no measured recordings at {DATA}"),

@@ -25,10 +25,10 @@ RIGID = ("inertia", "gravity", "coulomb", "viscous")
 
 
 @cache
-def recording():
+def recording(cycles=5):
     config = load_testbed(Path(__file__).parents[2] / "configs" / "testbed.yaml")
     program = replace(
-        config.program, axes=(AXIS,), cycles=5, dwell_jitter_s=0.0, speed_percent=30.0
+        config.program, axes=(AXIS,), cycles=cycles, dwell_jitter_s=0.0, speed_percent=30.0
     )
     made = simulate(config.robot, program, seed=SEED, sampling_rate_hz=RATE_HZ, axes=[AXIS]).axes[
         AXIS
@@ -44,8 +44,8 @@ def recording():
     )
 
 
-def close(names, orders=()):
-    known, session = recording()
+def close(names, orders=(), cycles=5):
+    known, session = recording(cycles)
     library = built_in_library()
     forms = {"speed": 1.0, "direction": 1.0, "load": 1.0}
     ripple = library["ripple"]
@@ -76,7 +76,7 @@ def test_what_is_found_beside_declared_parts_is_there():
 
 @pytest.mark.long
 def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
-    loop = close(RIGID)
+    loop = close(RIGID, cycles=3)
     assert "time_delay" not in {step.term.effect.name for step in loop.steps}
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
 

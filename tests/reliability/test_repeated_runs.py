@@ -9,6 +9,8 @@ import pytest
 from opamc_cli.errors import ExitCode
 from tests.marks import long
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def copied(source, to):
     shutil.copyfile(source, to)

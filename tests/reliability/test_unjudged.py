@@ -10,6 +10,8 @@ from recordings import RATE_HZ, record
 from opamc_cli.errors import ExitCode
 from tests.marks import long
 
+pytestmark = pytest.mark.usefixtures("undrawn")
+
 
 def gone(columns):
     for name in "abc":
@@ -157,7 +159,7 @@ def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path
 @pytest.mark.long
 def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, monkeypatch):
     """Whatever the search names: below a twentieth of the change it is not the cause."""
-    from opamc_cli.stages import diagnose as stage
+    from opamc_cli.stages.verdict import cause
 
     def louder(columns):
         for name in "abc":
@@ -172,7 +174,7 @@ def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, mo
     target = record(tmp_path / "tonight.parquet", 9, louder)
     for share in (0.0, 0.04, 0.9):
         found = {**named, "share": share, "explained": share}
-        monkeypatch.setattr(stage.cause, "explain", lambda *_, found=found: found)
+        monkeypatch.setattr(cause, "explain", lambda *_, found=found: found)
         arguments = ("--baseline", baseline, "--target", target, "--out", tmp_path / "out")
         ended = opamc("diagnose", *arguments)
         assert ended.code == ExitCode.UNHEALTHY

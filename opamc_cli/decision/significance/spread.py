@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import digamma
-from scipy.stats import t as student_t
+from scipy.special import digamma, stdtr
 
 FloatArray = NDArray[np.float64]
 
@@ -123,7 +122,7 @@ def upper_tail(distance: float, spread: Spread) -> float:
     float
         One-sided Student t probability, 0..1.
     """
-    return float(student_t.sf(distance / spread.scale, spread.dof))
+    return float(stdtr(spread.dof, -distance / spread.scale))
 
 
 def spliced_p_value(

@@ -6,11 +6,8 @@ import re
 import shutil
 import subprocess
 
-import output_folder
 import pytest
 from browser import browse, needs_browser
-
-from opamc_cli.stages import report
 
 WIDTHS = (1280, 390)
 LOOK = """
@@ -41,18 +38,6 @@ addEventListener("load", () => {
 """
 
 pytestmark = needs_browser
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory) -> str:
-    out = tmp_path_factory.mktemp("cell") / "out"
-    out.mkdir()
-    output_folder.make(out)
-    output_folder.add_loop(out)
-    verdict = json.loads((out / "verdict.json").read_text())
-    verdict["notes"] = ["payload_kg differs: normal-0 has 0.0, fault-0 2.0"]
-    (out / "verdict.json").write_text(json.dumps(verdict))
-    return report.run(out).path.read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module", params=["light", "dark"])

@@ -4,7 +4,6 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-import output_folder
 import pytest
 from rich.console import Console, RenderableType
 
@@ -96,14 +95,11 @@ def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
     assert "None" not in headline(entry)
 
 
-@pytest.mark.long
+@pytest.mark.usefixtures("undrawn")
 def test_report_command_prints_verdict_and_loop(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    out = tmp_path / "out"
-    out.mkdir()
-    output_folder.make(out)
-    output_folder.add_loop(out)
+    out = folder
     with pytest.raises(SystemExit) as ended:
         __main__.main(["report", "--out", str(out)])
     captured = capsys.readouterr()

@@ -106,6 +106,7 @@ def to_svg(drawing: Canvas, name: str) -> str:
     """
     buffer = io.StringIO()
     FigureCanvasSVG(drawing)
+    _lay_out(drawing)
     with mpl.rc_context({"svg.hashsalt": name}):
         drawing.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
@@ -122,6 +123,14 @@ def to_svg(drawing: Canvas, name: str) -> str:
     for role, (light, _) in PALETTE.items():
         text = text.replace(light, f"var(--{role})")
     return re.sub(r"\n\s*", "\n", text).strip()
+
+
+def _lay_out(drawing: Canvas) -> None:
+    """Lay a drawing out once: left to be saved it is drawn twice, the first time for this alone."""
+    engine = drawing.get_layout_engine()
+    if engine is not None:
+        engine.execute(drawing)
+        drawing.set_layout_engine(None)
 
 
 def to_png(drawing: Canvas, dots_per_inch: int = 120) -> bytes:
