@@ -43,7 +43,7 @@ def resonant(wave, rate_hz, resonance_hz=12.0, damping=0.2):
 
 @pytest.mark.parametrize("seed", [long(8)])
 def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
-    made = simulate(seed, (), 0.0, rate=1000.0, kind="quintic")
+    made = simulate(seed, (), 0.0, rate=500.0, kind="quintic")
     wave = np.cos(2 * made.gear_ratio * made.position + 0.4)
     current = made.current + 8 * made.noise_rms * resonant(wave, made.rate_hz)
     _, loop = close_recording(made, current, seed=seed)
@@ -56,7 +56,7 @@ def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [long(4), 8])
 def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
-    made = simulate(seed, (), 0.0, rate=1000.0)
+    made = simulate(seed, (), 0.0, rate=500.0)
     made = replace(made, gear_ratio=None, pole_pairs=None)
     current = made.current * (1 + 0.2 * np.cos(160 * made.position + 0.4))
     _, loop = close_recording(made, current, seed=seed)

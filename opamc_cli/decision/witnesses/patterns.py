@@ -114,18 +114,19 @@ def divergence_from_rest(
     level = np.full(len(units), np.nan)
     if n_pool == 0:
         return np.full(len(units), np.nan), level
-    divergence = np.asarray(jensen_shannon(units, pool))
     counted = n_unit > 0
-    if not counted.any():
-        return divergence, level
-    chance = chance_divergence(pool, n_unit[counted] / inflation, n_pool / inflation)
+    own = rest[rest.sum(axis=1) > 0]
+    own = own if len(own) >= 3 else own[:0]
+    # the units and the rest's own sessions in one go: of few patterns the calls are what costs
+    rows = np.concatenate([units, own])
+    others = pool - np.concatenate([np.zeros_like(units), own])
+    sizes = np.concatenate([n_unit[counted], own.sum(axis=1)]) / inflation
+    of_others = others.sum(axis=1)[np.concatenate([counted, np.ones(len(own), bool)])] / inflation
+    divergence, of_own = np.split(jensen_shannon(rows, others), [len(units)])
+    chance, usual = np.split(chance_divergence(pool, sizes, of_others), [counted.sum()])
     level[counted] = chance
-    present = rest[rest.sum(axis=1) > 0]
-    if len(present) >= 3:
-        n = present.sum(axis=1)
-        own = float(np.mean(jensen_shannon(present, pool - present)))
-        usual = chance_divergence(pool, n / inflation, (n_pool - n) / inflation)
-        level[counted] = np.maximum(chance, own + chance - float(np.mean(usual)))
+    if len(own):
+        level[counted] = np.maximum(chance, of_own.mean() + chance - usual.mean())
     return divergence, np.maximum(level, 1e-12)
 
 

@@ -94,14 +94,14 @@ def test_counts_are_those_of_the_envelope_itself(chain):
 
 
 @pytest.mark.long
-def test_each_stage_alone_gives_the_same_bytes(chain, tmp_path):
-    out, outcome = chain
-    config = load_config()
-    segment.run([NORMAL], config, out, jobs=2)
-    before = {p.name: p.read_bytes() for p in out.glob("*.parquet")}
-    identify.run(outcome.segments, config, out)
-    patterns.run(outcome.motions, config, out, jobs=2)
-    assert {p.name: p.read_bytes() for p in out.glob("*.parquet")} == before
+def test_each_stage_alone_gives_the_same_bytes(tmp_path):
+    config, runs = load_config(), [ONE, NORMAL / "session-001.parquet"]
+    outcome = run_chain(runs, config, tmp_path)
+    before = {p.name: p.read_bytes() for p in tmp_path.glob("*.parquet")}
+    segment.run(runs, config, tmp_path, jobs=2)
+    identify.run(outcome.segments, config, tmp_path)
+    patterns.run(outcome.motions, config, tmp_path, jobs=2)
+    assert {p.name: p.read_bytes() for p in tmp_path.glob("*.parquet")} == before
 
 
 @pytest.mark.parametrize(

@@ -31,6 +31,7 @@ def states(robots: dict) -> dict[str, str]:
     return {name: entry["state"] for name, entry in robots.items()}
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     ended = opamc("nightly", cell, "--json")
     assert ended.code == ExitCode.UNHEALTHY, ended
