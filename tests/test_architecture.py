@@ -104,6 +104,28 @@ def test_a_witness_is_added(tmp_path):
 
 
 @pytest.mark.long
+def test_a_channel_is_added(tmp_path):
+    folder = followed("Add a channel", tmp_path)
+    rows = [f"{k / 100},{0.5 * k},{0.001 * (k % 7)},{k / 1000}" for k in range(500)]
+    (folder / "log.csv").write_text("\n".join(["time,q_1,current_1,gear_vib_1", *rows]))
+    code = (
+        "from pathlib import Path\n"
+        "import opamc_cli\n"
+        "from opamc_cli.stages.recordings.axis_recording import read_recording\n"
+        "from opamc_cli.stages.recordings.ingest import run\n"
+        "from opamc_cli.storage.ingest.guess.write import guess_map\n"
+        "from opamc_cli.storage.ingest.map.load import load_map\n"
+        "guessed = guess_map([Path('log.csv')])\n"
+        "assert 'axis1_vibration: {source: gear_vib_1, unit: m/s2}' in guessed, guessed\n"
+        "Path('map.yaml').write_text(guessed.replace('unit: m/s2}', 'unit: gn}'))\n"
+        "assert run([Path('log.csv')], load_map(Path('map.yaml')), Path('runs')).errors == ()\n"
+        "with opamc_cli.storage.runs.Run(Path('runs/log.parquet')) as found:\n"
+        "    print(read_recording(found, 1).vibration_m_s2[[0, -1]].tolist())\n"
+    )
+    assert json.loads(python(folder, "-c", code)) == pytest.approx([0.0, 0.499 * 9.80665])
+
+
+@pytest.mark.long
 def test_a_format_is_added(tmp_path):
     folder = followed("Add a format", tmp_path)
     log = [{"i": 0.001 * (k % 7), "q": 0.5} for k in range(500)]

@@ -6,7 +6,6 @@ row group as they are asked for.
 
 import hashlib
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
@@ -26,6 +25,7 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
+from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, PHASES
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
@@ -46,8 +46,6 @@ MOST_GROUP_SAMPLES = 1 << 24
 """Rows of a row group, which is decoded at once: two hours at 2048 Hz."""
 
 MOST_AXES = 999
-
-_AXIS_COLUMN = re.compile(r"axis([1-9][0-9]*)_(a|b|c|current|position|velocity|temperature)")
 
 Array = npt.NDArray[Any]
 
@@ -95,14 +93,38 @@ class RunInfo:
 
 @dataclass(frozen=True)
 class AxisChannels:
-    """Names of the columns that a run holds for one axis; None or empty where absent."""
+    """Names of the columns that a run holds for one axis.
+
+    Attributes
+    ----------
+    axis
+        Counted from 1.
+    columns
+        By channel, see `schemas.channels`.
+    """
 
     axis: int
-    phases: tuple[str, ...]
-    current: str | None
-    position: str | None
-    velocity: str | None
-    temperature: str | None
+    columns: Mapping[str, str]
+
+    @property
+    def phases(self) -> tuple[str, ...]:
+        """Those of its phase currents."""
+        return tuple(self.columns[name] for name in PHASES if name in self.columns)
+
+    @property
+    def current(self) -> str | None:
+        """That of the reported current."""
+        return self.columns.get("current")
+
+    @property
+    def position(self) -> str | None:
+        """That of the angle."""
+        return self.columns.get("position")
+
+    @property
+    def velocity(self) -> str | None:
+        """That of the speed."""
+        return self.columns.get("velocity")
 
 
 class Run:
@@ -484,7 +506,7 @@ class RunMetadata(Document):
 def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     by_axis: dict[int, set[str]] = {}
     for field in schema:
-        match = _AXIS_COLUMN.fullmatch(field.name)
+        match = COLUMN.fullmatch(field.name)
         if match is None and field.name != "time_s":
             continue
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
@@ -498,21 +520,8 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     channels = {}
     for axis in sorted(by_axis):
         have = by_axis[axis]
-        phases = tuple(f"axis{axis}_{p}" for p in "abc" if p in have)
-        if not phases and "current" not in have:
-            continue
-
-        def column(kind: str, axis: int = axis, have: set[str] = have) -> str | None:
-            return f"axis{axis}_{kind}" if kind in have else None
-
-        channels[axis] = AxisChannels(
-            axis=axis,
-            phases=phases,
-            current=column("current"),
-            position=column("position"),
-            velocity=column("velocity"),
-            temperature=column("temperature"),
-        )
+        if have.intersection(CURRENTS):
+            channels[axis] = AxisChannels(axis, {name: f"axis{axis}_{name}" for name in have})
     if not channels:
         names = ", ".join(map(shown_line, schema.names[:8]))
         msg = (

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
+from typing import Any
 
 import numpy as np
 
@@ -11,10 +12,14 @@ from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
 from opamc_cli.signal.motion.reported import lacks_sign, signed_by_speed, velocity_from_position
 from opamc_cli.storage.runs import Array, Run
+from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
 
 UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
 """Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
 SAME_RATIO = 0.03
+
+FIELDS = {"current": "current_a"} | {name: channel.field for name, channel in LOGGED.items()}
+"""What `Recording` calls a channel."""
 
 
 def axes_of(runs: Sequence[Run]) -> list[int]:
@@ -49,17 +54,12 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
         )
         raise InputError(msg)
     named = {
-        "current": None if three else channels.current,
-        "position": channels.position,
-        "velocity": channels.velocity,
-        "temperature": channels.temperature,
+        field: channels.columns[name]
+        for name, field in FIELDS.items()
+        if name in channels.columns and not (three and name == "current")
     }
-    wanted = [name for name in named.values() if name] + list(channels.phases if three else ())
-    samples = run.read(wanted, 0, stop)
-    arrays = {
-        key: None if name is None else np.asarray(samples[name], dtype=np.float64)
-        for key, name in named.items()
-    }
+    samples = run.read([*named.values(), *(channels.phases if three else ())], 0, stop)
+    arrays = {key: np.asarray(samples[name], dtype=np.float64) for key, name in named.items()}
     phases = None
     if three:
         phases = np.stack(
@@ -67,19 +67,15 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
         )
     for channel, values in samples.items():
         _check_channel(run, channel, values)
-    _check_units(run, axis, arrays["position"], arrays["velocity"])
-    if arrays["current"] is not None:
-        arrays["current"] = _with_sign(arrays, run.sampling_rate_hz)
-    return Recording(
+    _check_units(run, axis, arrays.get("position_rad"), arrays.get("velocity_rad_s"))
+    recording = Recording(
         name=run.name,
         rate_hz=run.sampling_rate_hz,
-        current_a=arrays["current"],
         phases_a=phases,
-        position_rad=arrays["position"],
-        velocity_rad_s=arrays["velocity"],
-        temperature_c=arrays["temperature"],
         started_s=_seconds(run),
+        **arrays,
     )
+    return replace(recording, current_a=_with_sign(recording))
 
 
 def interpolated(recording: Recording, least_hz: float) -> Recording:
@@ -97,22 +93,18 @@ def interpolated(recording: Recording, least_hz: float) -> Recording:
     def between(values: Array | None) -> Array | None:
         return None if values is None else np.interp(fine, place, values)
 
-    return replace(
-        recording,
-        rate_hz=recording.rate_hz * factor,
-        current_a=between(recording.current_a),
-        position_rad=between(recording.position_rad),
-        velocity_rad_s=between(recording.velocity_rad_s),
-        temperature_c=between(recording.temperature_c),
-    )
+    finer: dict[str, Any] = {field: between(getattr(recording, field)) for field in FIELDS.values()}
+    return replace(recording, rate_hz=recording.rate_hz * factor, **finer)
 
 
-def _with_sign(arrays: dict[str, Array | None], rate_hz: float) -> Array | None:
+def _with_sign(recording: Recording) -> Array | None:
     """Return the reported current, with the speed's sign where it was logged without one."""
-    current, velocity = arrays["current"], arrays["velocity"]
-    if velocity is None and arrays["position"] is not None:
-        velocity = velocity_from_position(arrays["position"], rate_hz)
-    if current is None or velocity is None or not lacks_sign(current, velocity):
+    current, velocity = recording.current_a, recording.velocity_rad_s
+    if current is None:
+        return None
+    if velocity is None and recording.position_rad is not None:
+        velocity = velocity_from_position(recording.position_rad, recording.rate_hz)
+    if velocity is None or not lacks_sign(current, velocity):
         return current
     return signed_by_speed(current, velocity)
 
@@ -122,8 +114,7 @@ def _check_channel(run: Run, name: str, values: Array) -> None:
     if not known.any():
         msg = f"{run.path}: column {name} holds no number; check the sensor or leave the column out"
         raise InputError(msg)
-    is_current = not name.endswith(("position", "velocity", "temperature"))
-    if is_current and np.ptp(values[known]) == 0:
+    if quantity_of(name) == "current" and np.ptp(values[known]) == 0:
         level = f"{float(values[known][0]):g} {run.info.current_unit}"
         msg = (
             f"{run.path}: column {name} is constant at {level} in all {len(values)} samples; "

@@ -20,7 +20,6 @@ from opamc_cli.storage.ingest.map.map_file import (
     RateMap,
     ValueMap,
     for_axes,
-    quantity_of,
     rate_hz,
 )
 from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque
@@ -31,6 +30,7 @@ from opamc_cli.storage.ingest.time.dates import utc_text
 from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, file_sha256, write_run
+from opamc_cli.storage.schemas.channels import quantity_of
 
 _TIME = "time"
 

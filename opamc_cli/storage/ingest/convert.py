@@ -6,9 +6,10 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap, quantity_of
+from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
 from opamc_cli.storage.ingest.map.units import conversion
 from opamc_cli.storage.ingest.source import Block
+from opamc_cli.storage.schemas.channels import quantity_of
 
 Float = npt.NDArray[np.float64]
 

@@ -118,11 +118,12 @@ def _touches_edge(run: Run, segment: Segment) -> bool:
 
 
 def _mean_temperature(run: Run, channels: AxisChannels, segment: Segment) -> float | None:
-    if channels.temperature is None:
+    name = channels.columns.get("temperature")
+    if name is None:
         return None
     total, n = 0.0, 0
-    for block in read_in_pieces(run, [channels.temperature], segment.start, segment.stop):
-        known = block[channels.temperature]
+    for block in read_in_pieces(run, [name], segment.start, segment.stop):
+        known = block[name]
         known = known[np.isfinite(known)].astype(np.float64)
         total, n = total + float(known.sum()), n + known.size
     return total / n if n else None

@@ -3,9 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from opamc_cli.storage.ingest.guess.names import PHASES, Meant
+from opamc_cli.storage.ingest.guess.names import Meant
+from opamc_cli.storage.schemas.channels import LOGGED, PHASES
 
-KINDS = ("current", "a", "b", "c", "position", "velocity", "temperature")
+KINDS = ("current", *PHASES, *LOGGED)
 """Kinds of a run's columns, in the order in which a map lists them."""
 
 
@@ -35,7 +36,7 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
         families[kind] = sorted(groups.values(), key=_worth, reverse=True)
     for stands, kind in (("torque", "current"),):
         measured = [group for group in families[kind] if group[0].measured]
-        if not measured and not any(families[phase] for phase in "abc"):
+        if not measured and not any(families[phase] for phase in PHASES):
             families[kind] = families[stands]
     lowest = _lowest(families)
     choices = {}
@@ -54,10 +55,7 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
         others = tuple(g[0].pattern for g in groups_of_kind if g[0].pattern not in taken)
         choices[kind] = Choice(kind, dict(sorted(by_axis.items())), others)
     axes = {
-        axis
-        for kind in ("current", *sorted(set(PHASES.values())))
-        if kind in choices
-        for axis in choices[kind].by_axis
+        axis for kind in ("current", *PHASES) if kind in choices for axis in choices[kind].by_axis
     }
     return {kind: _within(choice, axes) for kind, choice in choices.items()}
 

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 
 from opamc_cli.storage.ingest.map.axes import has_placeholder
 from opamc_cli.storage.ingest.source import Listed, Name
+from opamc_cli.storage.schemas.channels import LOGGED
 
 WORDS = {
-    "temperature": ("temp", "temps", "temperature", "temperatures"),
-    "velocity": ("vel", "velocity", "velocities", "speed", "speeds", "qd", "dq", "omega", "qdot"),
+    **{name: channel.words for name, channel in reversed(LOGGED.items()) if not channel.vague},
     "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
     "current": ("cur", "curr", "current", "currents", "iq", "amp", "amps", "ampere"),
-    "position": ("pos", "position", "positions", "angle", "angles", "q", "phi", "theta", "enc"),
+    **{name: channel.words for name, channel in LOGGED.items() if channel.vague},
     "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit"),
 }
 """Words of a name by quantity, in the order in which they decide."""

@@ -29,6 +29,7 @@ from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torqu
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.source import Array, Name, Selection, Source
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
+from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED
 
 LOOKED_AT_ROWS = 1 << 16
 """Rows whose values are looked at: minutes of a robot's log."""
@@ -269,8 +270,8 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = position
             case "velocity":
                 guess = speed
-            case "temperature":
-                guess = Guess("degC", f"largest {largest:.3g}")
+            case _ if kind in LOGGED:
+                guess = Guess(next(iter(LOGGED[kind].units)), f"largest {largest:.3g}")
             case _ if next(iter(channels.values())).quantity == "torque":
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
@@ -287,7 +288,7 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
 
 
 def _fits(unit: str, kind: str) -> bool:
-    quantity = {"a": "current", "b": "current", "c": "current"}.get(kind, kind)
+    quantity = "current" if kind in CURRENTS else kind
     return conversion(unit, quantity) is not None and not (kind in "abc" and is_torque(unit))
 
 

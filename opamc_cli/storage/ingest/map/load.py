@@ -1,7 +1,6 @@
 """Read a map file, and refuse what cannot be in it although every key and value is allowed."""
 
 import codecs
-import re
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,14 +12,12 @@ from opamc_cli.storage.ingest.map.map_file import (
     IngestMap,
     RateMap,
     for_axes,
-    quantity_of,
     rate_kind,
 )
 from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque, known_units
+from opamc_cli.storage.schemas.channels import CHANNELS, COLUMN, quantity_of
 
 CSV_KEYS = frozenset({"separator", "decimal", "header", "encoding", "skip_rows", "units_rows"})
-
-_COLUMN = re.compile(r"axis[1-9][0-9]*_(a|b|c|current|position|velocity|temperature)")
 
 
 def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
@@ -67,11 +64,11 @@ def _check_placeholders(path: Path, channels: IngestMap) -> None:
 
 def _check_columns(path: Path, channels: IngestMap) -> None:
     for name, column in channels.columns.items():
-        if not _COLUMN.fullmatch(name):
+        if not COLUMN.fullmatch(name):
+            known = ", ".join(f"axisN_{channel}" for channel in CHANNELS)
             msg = (
-                f"{path}: columns.{name} is not a column of a run; known: axisN_a, axisN_b, "
-                "axisN_c, axisN_current, axisN_position, axisN_velocity, axisN_temperature "
-                "with N from 1, or {n} for all axes"
+                f"{path}: columns.{name} is not a column of a run; known: {known} with N from 1, "
+                "or {n} for all axes"
             )
             raise ConfigError(msg)
         quantity = quantity_of(name)

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
 from opamc_cli.storage.ingest.map.axes import expand, has_placeholder
-from opamc_cli.storage.ingest.map.units import QUANTITY_OF_KIND, conversion
+from opamc_cli.storage.ingest.map.units import conversion
 from opamc_cli.storage.ingest.source import Listed, Name
 
 Positive = Annotated[float, Field(gt=0, le=1e9, allow_inf_nan=False)]
@@ -177,17 +177,6 @@ def format_of(path: Path, channels: IngestMap) -> str:
         )
         raise InputError(msg)
     return found
-
-
-def quantity_of(column: str) -> str:
-    """Return the quantity of a run's column.
-
-    Examples
-    --------
-    >>> quantity_of("axis2_b")
-    'current'
-    """
-    return QUANTITY_OF_KIND[column.partition("_")[2]]
 
 
 def rate_kind(rate: RateMap) -> str | None:

@@ -3,33 +3,11 @@
 A unit belongs to one quantity: a current declared in degrees is refused, not scaled by chance.
 """
 
-import math
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Mapping
 
-QUANTITY_OF_KIND = MappingProxyType(
-    {
-        "a": "current",
-        "b": "current",
-        "c": "current",
-        "current": "current",
-        "position": "position",
-        "velocity": "velocity",
-        "temperature": "temperature",
-    }
-)
-"""Quantity of a run's column by the part of its name after `axisN_`."""
+from opamc_cli.storage.schemas.channels import LOGGED, Conversion
 
-
-@dataclass(frozen=True)
-class Conversion:
-    """A linear conversion to the unit of the run format: value · factor + offset."""
-
-    factor: float
-    offset: float = 0.0
-
-
-CONVERSIONS: dict[str, dict[str, Conversion]] = {
+CONVERSIONS: dict[str, Mapping[str, Conversion]] = {
     "current": {
         "A": Conversion(1.0),
         "mA": Conversion(1e-3),
@@ -38,23 +16,7 @@ CONVERSIONS: dict[str, dict[str, Conversion]] = {
         "Nm": Conversion(1.0),
         "mNm": Conversion(1e-3),
     },
-    "position": {
-        "rad": Conversion(1.0),
-        "mrad": Conversion(1e-3),
-        "deg": Conversion(math.pi / 180),
-        "rev": Conversion(2 * math.pi),
-    },
-    "velocity": {
-        "rad/s": Conversion(1.0),
-        "deg/s": Conversion(math.pi / 180),
-        "rpm": Conversion(2 * math.pi / 60),
-        "rev/s": Conversion(2 * math.pi),
-    },
-    "temperature": {
-        "degC": Conversion(1.0),
-        "K": Conversion(1.0, -273.15),
-        "degF": Conversion(5 / 9, -160 / 9),
-    },
+    **{name: channel.units for name, channel in LOGGED.items()},
     "time": {
         "s": Conversion(1.0),
         "ms": Conversion(1e-3),
@@ -65,7 +27,7 @@ CONVERSIONS: dict[str, dict[str, Conversion]] = {
     },
     "rate": {"Hz": Conversion(1.0), "kHz": Conversion(1e3)},
 }
-"""Conversions to A (a torque: Nm), rad, rad/s, °C, s and Hz, by quantity and unit."""
+"""Conversions to A (a torque: Nm), a logged channel's first unit, s and Hz, by quantity."""
 
 TORQUES = frozenset({"Nm", "mNm"})
 """Units in which a joint's torque stands for its motor's current; it stays a torque."""

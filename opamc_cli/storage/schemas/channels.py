@@ -1,0 +1,94 @@
+"""Every channel of a run: what stands after `axisN_`, its units, and what foreign logs call it.
+
+A channel that is logged beside the currents is a row of `LOGGED` and a field of `Recording`, which
+hands it to the science; ingest, its maps, `--guess` and the run format know it by the row alone.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """A linear conversion to the unit of the run format: value · factor + offset."""
+
+    factor: float
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of an axis beside its currents.
+
+    Attributes
+    ----------
+    field
+        What `Recording` calls it.
+    units
+        How it is declared in foreign recordings; the run format's own unit first.
+    words
+        Of names of channels that mean it.
+    vague
+        Other names hold its words, too: it is thought of last.
+    """
+
+    field: str
+    units: Mapping[str, Conversion]
+    words: tuple[str, ...]
+    vague: bool = False
+
+
+PHASES = ("a", "b", "c")
+CURRENTS = (*PHASES, "current")
+
+LOGGED = {
+    "position": Channel(
+        "position_rad",
+        {
+            "rad": Conversion(1.0),
+            "mrad": Conversion(1e-3),
+            "deg": Conversion(math.pi / 180),
+            "rev": Conversion(2 * math.pi),
+        },
+        ("pos", "position", "positions", "angle", "angles", "q", "phi", "theta", "enc"),
+        vague=True,
+    ),
+    "velocity": Channel(
+        "velocity_rad_s",
+        {
+            "rad/s": Conversion(1.0),
+            "deg/s": Conversion(math.pi / 180),
+            "rpm": Conversion(2 * math.pi / 60),
+            "rev/s": Conversion(2 * math.pi),
+        },
+        ("vel", "velocity", "velocities", "speed", "speeds", "qd", "dq", "omega", "qdot"),
+    ),
+    "temperature": Channel(
+        "temperature_c",
+        {
+            "degC": Conversion(1.0),
+            "K": Conversion(1.0, -273.15),
+            "degF": Conversion(5 / 9, -160 / 9),
+        },
+        ("temp", "temps", "temperature", "temperatures"),
+    ),
+}
+"""By name and quantity, in the order in which a map lists them."""
+
+CHANNELS = (*CURRENTS, *LOGGED)
+COLUMN = re.compile(rf"axis([1-9][0-9]*)_({'|'.join(CHANNELS)})")
+"""Name of a run's column."""
+
+
+def quantity_of(column: str) -> str:
+    """Return the quantity of a run's column.
+
+    Examples
+    --------
+    >>> quantity_of("axis2_b")
+    'current'
+    """
+    channel = column.partition("_")[2]
+    return "current" if channel in CURRENTS else channel
