@@ -36,9 +36,9 @@ from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.signal.transform.analytic import clarke
 from opamc_cli.stages.chain import patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides
-from opamc_cli.stages.chain.patterns import aligned_span
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import WITNESSES
+from opamc_cli.stages.recordings.identified import aligned_span
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import Run, RunInfo, save_run
 from opamc_cli.storage.schemas import files

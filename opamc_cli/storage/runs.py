@@ -25,7 +25,7 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
-from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, PHASES
+from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, MOST_HZ, PHASES
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
@@ -36,11 +36,6 @@ RECENT_GROUPS = 2
 
 RATE_TOLERANCE = 1e-3
 """Largest relative disagreement of `time_s` with the declared sampling rate."""
-
-"""A torque in Nm may stand for a current; nothing of it is called a current then."""
-
-MOST_HZ = 1e8
-"""No converter of a motor current is faster; a time in nanoseconds that was taken for a rate is."""
 
 MOST_GROUP_SAMPLES = 1 << 24
 """Rows of a row group, which is decoded at once: two hours at 2048 Hz."""

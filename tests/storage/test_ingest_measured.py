@@ -74,7 +74,7 @@ def test_kinova_joints(tmp_path, name, n_samples):
             (channels.current, "Cur"),
             (channels.position, "Position"),
             (channels.velocity, "Velocity"),
-            (channels.temperature, "Temp"),
+            (channels.columns["temperature"], "Temp"),
         ):
             assert kind is not None
             values = run.read([kind])[kind]

@@ -1,5 +1,7 @@
 """How far sessions lie from others, part by part, in units of what healthy ones differ by."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -148,6 +150,34 @@ def clearest_part(
     ratio = np.where(known, change**2 / (variance + typical + least_variance), 0.0)
     place = int(ratio.argmax())
     return float(ratio[place]), place
+
+
+def clearest_of(
+    sessions: Sequence[FloatArray], n_baseline: int, least_variance: float
+) -> tuple[int, int, float, int] | None:
+    """Find the motion and the part of it whose change stands out most.
+
+    Parameters
+    ----------
+    sessions : sequence of ndarray, shape (B + T, F)
+        Of each motion, as for `change_between`.
+    n_baseline : int
+        B.
+    least_variance : float
+        Sessions that agree within it agree.
+
+    Returns
+    -------
+    tuple of (int, int, float, int) or None
+        Which of `sessions`, which part, its change, and F; None if nothing stands out.
+    """
+    best, found = 0.0, None
+    for number, own in enumerate(sessions):
+        change, variance = change_between(own, n_baseline)
+        ratio, place = clearest_part(change, variance, least_variance)
+        if ratio > best:
+            best, found = ratio, (number, place, float(change[place]), change.size)
+    return found
 
 
 def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:

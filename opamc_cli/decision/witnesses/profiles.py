@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from opamc_cli.decision.witnesses.deviation import (
     PRIOR_DOF,
     change_between,
-    clearest_part,
+    clearest_of,
     deviation_from_rest,
     mean_of_known,
     variance_within_sessions,
@@ -190,21 +190,19 @@ def clearest_course(cells: Sequence[ProfileCell], n_baseline: int) -> CourseChan
     CourseChange or None
         None for fewer than two baseline sessions.
     """
-    best, found = 0.0, None
-    for cell in cells:
-        change, variance = change_between(cell.course, n_baseline)
-        ratio, place = clearest_part(change, variance, LEAST_SHARE**2)
-        if ratio > best:
-            best = ratio
-            scales = cell.scale[:, 0]
-            found = CourseChange(
-                motion=cell.motion,
-                start=place / change.size,
-                stop=(place + 1) / change.size,
-                change_a=float(change[place]) * cell.rms_a,
-                scale=float(np.nanmean(scales[n_baseline:]) / np.nanmean(scales[:n_baseline])),
-            )
-    return found
+    found = clearest_of([cell.course for cell in cells], n_baseline, LEAST_SHARE**2)
+    if found is None:
+        return None
+    number, place, change, n_parts = found
+    cell = cells[number]
+    scales = cell.scale[:, 0]
+    return CourseChange(
+        motion=cell.motion,
+        start=place / n_parts,
+        stop=(place + 1) / n_parts,
+        change_a=change * cell.rms_a,
+        scale=float(np.nanmean(scales[n_baseline:]) / np.nanmean(scales[:n_baseline])),
+    )
 
 
 def between_groups(sessions: FloatArray, is_target: NDArray[np.bool_]) -> FloatArray:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.decision.witnesses.deviation import (
     change_between,
-    clearest_part,
+    clearest_of,
     deviation_from_rest,
     moderated,
 )
@@ -151,23 +151,21 @@ def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChang
     BandChange or None
         None for fewer than two baseline sessions.
     """
-    best, found = 0.0, None
-    for cell in cells:
-        change, variance = change_between(cell.sessions, n_baseline)
-        ratio, place = clearest_part(change, variance, LEAST_VARIANCE)
-        if ratio > best:
-            best = ratio
-            frame, number = divmod(place, cell.bins)
-            length = 2 / (cell.frames + 1)
-            start = frame / max(cell.frames - 1, 1) * (1 - length)
-            found = BandChange(
-                motion=cell.motion,
-                start=start,
-                stop=start + length,
-                frequency_hz=(number + 1) * cell.bin_hz,
-                size_ratio=math.exp(0.5 * float(change[place])),
-            )
-    return found
+    found = clearest_of([cell.sessions for cell in cells], n_baseline, LEAST_VARIANCE)
+    if found is None:
+        return None
+    number, place, change, _ = found
+    cell = cells[number]
+    frame, bin_number = divmod(place, cell.bins)
+    length = 2 / (cell.frames + 1)
+    start = frame / max(cell.frames - 1, 1) * (1 - length)
+    return BandChange(
+        motion=cell.motion,
+        start=start,
+        stop=start + length,
+        frequency_hz=(bin_number + 1) * cell.bin_hz,
+        size_ratio=math.exp(0.5 * change),
+    )
 
 
 def pooled_deviation(cells: Sequence[SpectrumCell], is_target: NDArray[np.bool_]) -> FloatArray:

@@ -19,10 +19,10 @@ from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_de
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.stages.recordings.envelope import current_offset, read_course
+from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, PLACE
-from opamc_cli.storage.sources import RunSource, read_sources, sources_record
+from opamc_cli.storage.sources import read_sources, sources_record
 from opamc_cli.storage.tables import read_table, table_input, write_table
 
 FILES = (files.PATTERNS, *(witness.FILE_NAME for witness in WITNESSES))
@@ -62,11 +62,7 @@ class PatternsOutcome:
 
 @dataclass(frozen=True)
 class _Job:
-    """The identified segments of one axis of one run."""
-
-    source: RunSource
-    axis: int
-    rows: tuple[dict[str, Any], ...]
+    part: IdentifiedPart
     config: PatternsConfig
 
 
@@ -106,10 +102,7 @@ def run(
     """
     table = read_table(motions, "identify", MOTIONS)
     sources = read_sources(motions, moved_to)
-    work = [
-        _Job(part.source, part.axis, part.rows, config.patterns)
-        for part in identified_parts(table, sources)
-    ]
+    work = [_Job(part, config.patterns) for part in identified_parts(table, sources)]
     outcome = map_items(remembered(_analyse, kept), work, jobs, watch)
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
@@ -173,57 +166,6 @@ def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> l
     return notes
 
 
-@dataclass(frozen=True)
-class IdentifiedPart:
-    """The identified segments of one axis of one run.
-
-    Attributes
-    ----------
-    source
-        Where their samples are.
-    axis
-        Counted from 1.
-    rows
-        Rows of the motion table, in its order.
-    """
-
-    source: RunSource
-    axis: int
-    rows: tuple[dict[str, Any], ...]
-
-
-def identified_parts(motions: pa.Table, sources: Sequence[RunSource]) -> list[IdentifiedPart]:
-    """Group the identified segments of a motion table by run and axis.
-
-    Raises
-    ------
-    InputError
-        If a run that is needed is gone or has changed.
-    """
-    by_name = {source.name: source for source in sources}
-    rows_of: dict[tuple[str, int], list[dict[str, Any]]] = {}
-    for row in motions.to_pylist():
-        if row["motion"] >= 0:
-            rows_of.setdefault((row["run"], row["axis"]), []).append(row)
-    for name in dict.fromkeys(name for name, _ in rows_of):
-        by_name[name].verify()
-    return [
-        IdentifiedPart(by_name[name], axis, tuple(rows)) for (name, axis), rows in rows_of.items()
-    ]
-
-
-def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
-    """Return the samples of a segment that correspond to its reference segment's.
-
-    The segment's own ends are where a threshold was crossed; synchronised with the reference
-    and of its length, every cycle is cut at the same places of the motion (thesis 4.1.1).
-    """
-    if row["kind"] == "window":
-        return row["start"], row["stop"]
-    start = max(row["start"] + row["lag"], 0)
-    return start, start + row["reference_samples"]
-
-
 LARGEST_SHARE = 0.5
 """Of a motion that a pattern's window may span: longer ones leave hardly any to count."""
 
@@ -260,24 +202,13 @@ def _analyse(job: _Job) -> dict[str, pa.Table]:
     config = job.config
     patterns: list[dict[str, Any]] = []
     kept: dict[str, list[dict[str, Any]]] = {witness.FILE_NAME: [] for witness in WITNESSES}
-    with job.source.open() as run:
-        offset = 0j
-        if config.remove_offset:
-            spans = [aligned_span(row) for row in job.rows]
-            offset = current_offset(run, job.axis, spans, config.envelope)
-        for row in job.rows:
-            start, stop = aligned_span(row)
-            whole = stop <= run.n_samples
-            stop = min(stop, run.n_samples)
-            current = _finite(read_course(run, job.axis, start, stop, config.envelope, offset))
-            place = {**row, "start": start, "stop": stop}
-            patterns += _pattern_rows(place, np.abs(current), run.sampling_rate_hz, config)
-            # cut short, a segment's parts would not be those of the others
-            if whole:
-                for witness in WITNESSES:
-                    kept[witness.FILE_NAME] += witness.rows(
-                        place, current, run.sampling_rate_hz, config
-                    )
+    for row, current, whole in job.part.courses(config):
+        fs_hz = row["sampling_rate_hz"]
+        patterns += _pattern_rows(row, np.abs(current), fs_hz, config)
+        # cut short, a segment's parts would not be those of the others
+        if whole:
+            for witness in WITNESSES:
+                kept[witness.FILE_NAME] += witness.rows(row, current, fs_hz, config)
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
     return {
         files.PATTERNS: pa.Table.from_pylist(patterns, schema=PATTERNS),
@@ -318,8 +249,3 @@ def _pattern_rows(
                 }
             )
     return rows
-
-
-def _finite(envelope: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:
-    """Turn infinities into NaN: a current without bound is a fault of the logger, not a rank."""
-    return np.where(np.isinf(envelope), np.nan, envelope)

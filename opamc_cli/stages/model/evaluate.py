@@ -1,6 +1,5 @@
 """Stage `evaluate`: runs and a closed model in, evaluation.json out; nothing is estimated."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,7 +20,7 @@ from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.processes.parallel import Watch, unwatched
-from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
+from opamc_cli.storage.files.atomic import ensure_directory, write_json
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
 
@@ -62,9 +61,7 @@ def evaluate(
         raise ConfigError(msg)
     results, errors, _ = on_each_axis(_on_axis, model, paths, axes, jobs, watch)
     ensure_directory(out)
-    with atomic_path(out / files.EVALUATION) as temporary:
-        text = json.dumps({"axes": results}, indent=2, allow_nan=False, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_json(out / files.EVALUATION, {"axes": results})
     return Outcome(tuple(results), (out / files.EVALUATION,), tuple(errors))
 
 

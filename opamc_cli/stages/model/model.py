@@ -1,6 +1,5 @@
 """Stage `model`: runs and a declared model in; fit, candidates, loop and extended model out."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -30,7 +29,7 @@ from opamc_cli.stages.model.tables import (
     spectrum_table,
 )
 from opamc_cli.stages.processes.parallel import Watch, unwatched
-from opamc_cli.storage.files.atomic import atomic_path, ensure_directory
+from opamc_cli.storage.files.atomic import ensure_directory, write_json, write_text
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
@@ -186,14 +185,11 @@ def close(
     ]
     for each in done:
         name = files.MODEL if len(done) == 1 else f"model_axis{each.entry['axis']}.yaml"
-        with atomic_path(out / name) as temporary:
-            text = yaml.safe_dump(each.extended, sort_keys=False, default_flow_style=None)
-            temporary.write_text(text, encoding="utf-8")
+        text = yaml.safe_dump(each.extended, sort_keys=False, default_flow_style=None)
+        write_text(out / name, text)
         written.append(out / name)
     entries = tuple(each.entry for each in done)
-    with atomic_path(out / files.LOOP) as temporary:
-        text = json.dumps({"axes": entries}, indent=2, allow_nan=False, ensure_ascii=False)
-        temporary.write_text(text + "\n", encoding="utf-8")
+    write_json(out / files.LOOP, {"axes": entries})
     written.append(out / files.LOOP)
     return Outcome(entries, tuple(written), tuple(errors))
 

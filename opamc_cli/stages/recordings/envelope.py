@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
+from opamc_cli.signal.offset import mean_over_turns
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, envelope
 from opamc_cli.storage.runs import AxisChannels, Run
 
@@ -45,9 +46,6 @@ def envelope_kind(path: object, channels: AxisChannels, wanted: EnvelopeKind) ->
 OFFSET_SPANS = 64
 """Most segments that the sensors' offset is estimated from."""
 
-OFFSET_TURNS = 50.0
-"""Fewest turns of the current vector: fewer leave more of the vector than of the offset."""
-
 
 def current_offset(
     run: Run, axis: int, spans: Sequence[tuple[int, int]], wanted: EnvelopeKind = "auto"
@@ -72,24 +70,13 @@ def current_offset(
     Returns
     -------
     complex
-        In ampere; 0 for a reported current, whose mean is torque, and where the vector turns
-        fewer than `OFFSET_TURNS` times in all.
+        In ampere; 0 for a reported current, whose mean is torque, and where the vector turns too
+        little, see `signal.offset.mean_over_turns`.
     """
     if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
         return 0j
-    total, count, turns = 0j, 0, 0.0
-    for start, stop in spans[:: -(-len(spans) // OFFSET_SPANS) or 1]:
-        vector = read_current(run, axis, start, stop, wanted).astype(np.complex128)
-        vector = vector[np.isfinite(vector)]
-        if vector.size < 2:
-            continue
-        # the square's angle does not jump where torque changes its sign
-        squared = vector * vector
-        advance = np.angle(squared[1:] * squared[:-1].conj()).sum()
-        turns += abs(float(advance)) / (4 * np.pi)
-        total += complex(vector.sum())
-        count += vector.size
-    return total / count if turns >= OFFSET_TURNS else 0j
+    some = spans[:: -(-len(spans) // OFFSET_SPANS) or 1]
+    return mean_over_turns(read_current(run, axis, *span, wanted) for span in some)
 
 
 def read_envelope(

@@ -2,6 +2,8 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,11 @@ from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.divergence.selection import self_consistency
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
-from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
+from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, SELECTION
-from opamc_cli.storage.sources import RunSource, read_sources
+from opamc_cli.storage.sources import read_sources
 from opamc_cli.storage.tables import read_table, table_input, write_table
 
 
@@ -48,16 +49,6 @@ class SelectionOutcome:
     gamma: float
     warnings: tuple[str, ...]
     errors: tuple[OpamcError, ...]
-
-
-@dataclass(frozen=True)
-class _Job:
-    source: RunSource
-    axis: int
-    rows: tuple[dict[str, Any], ...]
-    orders: tuple[int, ...]
-    gammas: tuple[float, ...]
-    config: PatternsConfig
 
 
 Counts = npt.NDArray[np.int64]
@@ -99,11 +90,9 @@ def run(
         If no axis has two motions and two cycles.
     """
     table = read_table(motions, "identify", MOTIONS)
-    work = [
-        _Job(part.source, part.axis, part.rows, tuple(orders), tuple(gammas), config.patterns)
-        for part in identified_parts(table, read_sources(motions, moved_to))
-    ]
-    outcome = map_items(_count, work, jobs, watch)
+    count = partial(_count, settings=[*product(orders, gammas)], config=config.patterns)
+    work = identified_parts(table, read_sources(motions, moved_to))
+    outcome = map_items(count, work, jobs, watch)
     rated = _rate([part for parts in outcome.results for part in parts])
     known = [row for row in rated if row["self_consistency"] is not None]
     if not known:
@@ -146,24 +135,18 @@ class _Counted:
     counts: Counts
 
 
-def _count(job: _Job) -> list[_Counted]:
-    found: dict[tuple[int, float], list[Counts]] = {}
-    with job.source.open() as run:
-        offset = 0j
-        spans = [aligned_span(row) for row in job.rows]
-        if job.config.remove_offset:
-            offset = current_offset(run, job.axis, spans, job.config.envelope)
-        for row, span in zip(job.rows, spans, strict=True):
-            envelope = read_envelope(run, job.axis, *span, job.config.envelope, offset)
-            for order in job.orders:
-                for gamma in job.gammas:
-                    tau = time_delay(run.sampling_rate_hz, row["reference_f_max_hz"], order, gamma)
-                    counts = ordinal_counts(envelope, [order], tau)[order]
-                    found.setdefault((order, gamma), []).append(counts)
-    names = tuple(f"{row['run']}\n{row['cycle']}" for row in job.rows)
-    motions = tuple(int(row["motion"]) for row in job.rows)
+def _count(
+    part: IdentifiedPart, settings: Sequence[tuple[int, float]], config: PatternsConfig
+) -> list[_Counted]:
+    found: dict[tuple[int, float], list[Counts]] = {setting: [] for setting in settings}
+    for row, current, _ in part.courses(config):
+        for order, gamma in settings:
+            tau = time_delay(row["sampling_rate_hz"], row["reference_f_max_hz"], order, gamma)
+            found[order, gamma].append(ordinal_counts(np.abs(current), [order], tau)[order])
+    names = tuple(f"{row['run']}\n{row['cycle']}" for row in part.rows)
+    motions = tuple(int(row["motion"]) for row in part.rows)
     return [
-        _Counted(job.axis, order, gamma, motions, names, np.array(counts))
+        _Counted(part.axis, order, gamma, motions, names, np.array(counts))
         for (order, gamma), counts in found.items()
     ]
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config import Config
+from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.divergence.features import ks_statistic
 from opamc_cli.decision.divergence.jensen_shannon import (
     divergences_from_pool,
@@ -18,16 +20,17 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 )
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
-from opamc_cli.stages.chain.patterns import aligned_span, identified_parts
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.stages.recordings.envelope import EnvelopeKind, current_offset, read_envelope
+from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.stages.recordings.sessions import Sessions, lie_in_folders, sessions_of
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, SWEEP
-from opamc_cli.storage.sources import RunSource, check_comparable, read_sources
+from opamc_cli.storage.sources import check_comparable, read_sources
 from opamc_cli.storage.tables import read_table, table_input, write_table
 
 Counts = npt.NDArray[np.int64]
+Settings = Sequence[tuple[int, int]]
+"""Order and delay of each."""
 
 
 @dataclass(frozen=True)
@@ -89,17 +92,6 @@ class SweepOutcome:
 
 
 @dataclass(frozen=True)
-class _Job:
-    source: RunSource
-    axis: int
-    rows: tuple[dict[str, Any], ...]
-    taus: tuple[int, ...]
-    orders: tuple[int, ...]
-    envelope: EnvelopeKind
-    remove_offset: bool
-
-
-@dataclass(frozen=True)
 class _Counted:
     """Counts of every segment of one axis of one run, by (order, tau)."""
 
@@ -146,8 +138,11 @@ def run(
     check_comparable(sources["baseline"], sources.get("target", ()))
     counted: dict[str, list[_Counted]] = {}
     errors: list[OpamcError] = []
+    settings = [(order, tau) for order in orders for tau in taus]
+    count = partial(_count, settings=settings, config=config.patterns)
     for role, path in tables.items():
-        outcome = map_items(_count, _work(path, sources[role], config, taus, orders), jobs, watch)
+        parts = identified_parts(read_table(path, "identify", MOTIONS), sources[role])
+        outcome = map_items(count, parts, jobs, watch)
         counted[role] = list(outcome.results)
         errors += outcome.errors
     own = sources["baseline"]
@@ -171,42 +166,14 @@ def run(
     return SweepOutcome(path, table, tuple(errors))
 
 
-def _work(
-    path: Path,
-    sources: Sequence[RunSource],
-    config: Config,
-    taus: Sequence[int],
-    orders: Sequence[int],
-) -> list[_Job]:
-    return [
-        _Job(
-            part.source,
-            part.axis,
-            part.rows,
-            tuple(taus),
-            tuple(orders),
-            config.patterns.envelope,
-            config.patterns.remove_offset,
-        )
-        for part in identified_parts(read_table(path, "identify", MOTIONS), sources)
-    ]
-
-
-def _count(job: _Job) -> _Counted:
-    counts: dict[tuple[int, int], list[Counts]] = {
-        (order, tau): [] for order in job.orders for tau in job.taus
-    }
-    with job.source.open() as run:
-        offset = 0j
-        if job.remove_offset:
-            spans = [aligned_span(row) for row in job.rows]
-            offset = current_offset(run, job.axis, spans, job.envelope)
-        for row in job.rows:
-            envelope = read_envelope(run, job.axis, *aligned_span(row), job.envelope, offset)
-            for tau in job.taus:
-                for order, values in ordinal_counts(envelope, job.orders, tau).items():
-                    counts[order, tau].append(values)
-    return _Counted(job.rows, counts)
+def _count(part: IdentifiedPart, settings: Settings, config: PatternsConfig) -> _Counted:
+    counts: dict[tuple[int, int], list[Counts]] = {setting: [] for setting in settings}
+    for _, current, _ in part.courses(config):
+        for tau in dict.fromkeys(tau for _, tau in settings):
+            orders = [order for order, other in settings if other == tau]
+            for order, values in ordinal_counts(np.abs(current), orders, tau).items():
+                counts[order, tau].append(values)
+    return _Counted(part.rows, counts)
 
 
 def _rows(

@@ -1,5 +1,6 @@
 """Files that are either whole or not there."""
 
+import json
 import os
 import re
 import tempfile
@@ -82,6 +83,11 @@ def write_text(path: Path, text: str) -> None:
     """Write a text file atomically (UTF-8)."""
     with atomic_path(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def write_json(path: Path, value: object) -> None:
+    """Write a JSON document atomically, other alphabets as they are."""
+    write_text(path, json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
 
 
 def _umask() -> int:

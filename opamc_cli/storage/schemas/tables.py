@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import pyarrow as pa
 
-from opamc_cli.storage.runs import MOST_HZ
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.channels import MOST_HZ
 
 PLACE = ("run", "axis", "cycle", "motion", "segment", "start", "stop")
 """Columns that say what a row is of."""

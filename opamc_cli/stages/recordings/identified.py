@@ -1,0 +1,90 @@
+"""The identified segments of runs, and the course of the current over each."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+from opamc_cli.config.models import PatternsConfig
+from opamc_cli.stages.recordings.envelope import current_offset, read_course
+from opamc_cli.storage.sources import RunSource
+
+
+@dataclass(frozen=True)
+class IdentifiedPart:
+    """The identified segments of one axis of one run.
+
+    Attributes
+    ----------
+    source
+        Where their samples are.
+    axis
+        Counted from 1.
+    rows
+        Rows of the motion table, in its order.
+    """
+
+    source: RunSource
+    axis: int
+    rows: tuple[dict[str, Any], ...]
+
+    def courses(
+        self, config: PatternsConfig
+    ) -> Iterator[tuple[dict[str, Any], npt.NDArray[np.floating], bool]]:
+        """Yield what is counted, segment by segment.
+
+        Yields
+        ------
+        row
+            Of the motion table, with the ends of the aligned segment.
+        current
+            Its course, A, see `read_course`; the sensors' offset is taken off if that is wanted.
+        whole
+            Whether the recording holds all of it.
+        """
+        spans = [aligned_span(row) for row in self.rows]
+        with self.source.open() as run:
+            offset = 0j
+            if config.remove_offset:
+                offset = current_offset(run, self.axis, spans, config.envelope)
+            for row, (start, stop) in zip(self.rows, spans, strict=True):
+                current = read_course(run, self.axis, start, stop, config.envelope, offset)
+                # a current without bound is a fault of the logger, not a rank
+                current = np.where(np.isinf(current), np.nan, current)
+                place = {**row, "start": start, "stop": min(stop, run.n_samples)}
+                yield place, current, stop <= run.n_samples
+
+
+def identified_parts(motions: pa.Table, sources: Sequence[RunSource]) -> list[IdentifiedPart]:
+    """Group the identified segments of a motion table by run and axis.
+
+    Raises
+    ------
+    InputError
+        If a run that is needed is gone or has changed.
+    """
+    by_name = {source.name: source for source in sources}
+    rows_of: dict[tuple[str, int], list[dict[str, Any]]] = {}
+    for row in motions.to_pylist():
+        if row["motion"] >= 0:
+            rows_of.setdefault((row["run"], row["axis"]), []).append(row)
+    for name in dict.fromkeys(name for name, _ in rows_of):
+        by_name[name].verify()
+    return [
+        IdentifiedPart(by_name[name], axis, tuple(rows)) for (name, axis), rows in rows_of.items()
+    ]
+
+
+def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
+    """Return the samples of a segment that correspond to its reference segment's.
+
+    The segment's own ends are where a threshold was crossed; synchronised with the reference
+    and of its length, every cycle is cut at the same places of the motion (thesis 4.1.1).
+    """
+    if row["kind"] == "window":
+        return row["start"], row["stop"]
+    start = max(row["start"] + row["lag"], 0)
+    return start, start + row["reference_samples"]
