@@ -99,7 +99,7 @@ def test_each_stage_alone_gives_the_same_bytes(tmp_path):
     config, runs = load_config(), [ONE, NORMAL / "session-001.parquet"]
     outcome = run_chain(runs, config, tmp_path)
     before = {p.name: p.read_bytes() for p in tmp_path.glob("*.parquet")}
-    segment.run(runs, config, tmp_path, jobs=2)
+    segment.run(runs, config, tmp_path)
     identify.run(outcome.segments, config, tmp_path)
     patterns.run(outcome.motions, config, tmp_path, jobs=2)
     assert {p.name: p.read_bytes() for p in tmp_path.glob("*.parquet")} == before
