@@ -129,6 +129,19 @@ def test_science_opens_no_files():
             assert not {other[:1] for other in others} & banned, ".".join(one)
 
 
+@pytest.mark.parametrize("room", ["signal", "decision"])
+def test_every_module_has_a_test_of_its_name(room):
+    """Or of its room's name and its own, where another module has the same."""
+    names = {path.stem for path in (ROOT / "tests" / room).glob("test_*.py")}
+    lacking = [
+        ".".join(module)
+        for module, path in modules().items()
+        if module[0] == room and path.stem != "__init__"
+        if not names & {f"test_{path.stem}", f"test_{path.parent.name}_{path.stem}"}
+    ]
+    assert lacking == []
+
+
 def test_test_modules_have_names_of_their_own():
     names = [path.name for path in (ROOT / "tests").rglob("test_*.py")]
     assert [a for a, b in combinations(sorted(names), 2) if a == b] == []

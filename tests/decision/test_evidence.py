@@ -6,18 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
-from opamc_cli.decision.witnesses.deviation import deviation_from_rest
 from opamc_cli.decision.witnesses.evidence import session_distances, weigh_together
 from opamc_cli.decision.witnesses.patterns import PatternEvidence
-from opamc_cli.decision.witnesses.spectra import LEAST_VARIANCE, SpectrumEvidence, size_effect
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, judge, spectra
 from tests.marks import long
 
 SEEDS = range(40)
-
-
-def squared_deviation(cell, units, rest):
-    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest, LEAST_VARIANCE)
 
 
 def turned(plan, seed, place):
@@ -77,17 +72,6 @@ def test_robots_of_any_make_stay_healthy(plan):
     assert len(states) - states.count("healthy") <= 1
 
 
-@pytest.mark.long
-def test_a_change_of_size_alone_is_found_by_the_spectrum():
-    plan = Fleet(louder=0.6)
-    found = [judge(cells(plan, s), spectra_by_axis=spectra(plan, s)) for s in range(10)]
-    assert sum(j[plan.faulty].state != "healthy" for j in found) >= 7
-    assert np.mean([judge(cells(plan, s))[plan.faulty].state == "healthy" for s in range(10)]) > 0.8
-    assert np.median([j[plan.faulty].effects["spectrum"] for j in found]) == pytest.approx(
-        0.6, rel=0.2
-    )
-
-
 @pytest.mark.parametrize("n_target_cycles", [long(1), 8])
 def test_targets_of_fewer_or_more_cycles_keep_the_level(n_target_cycles):
     p = []
@@ -107,17 +91,6 @@ def test_targets_of_fewer_or_more_cycles_keep_the_level(n_target_cycles):
     assert 0.3 < np.median(p) < 0.7
 
 
-@pytest.mark.parametrize("n_target_cycles", [1, long(2), long(8)])
-def test_sessions_of_any_number_of_cycles_are_judged_alike(n_target_cycles):
-    plan = Fleet(n_axes=1, n_motions=1)
-    ratios = []
-    for seed in range(60):
-        cell = spectra(plan, seed, n_target_cycles)[1][0]
-        ratios.append(squared_deviation(cell, np.array([0, 6]), np.array([1, 2, 3, 4, 5])))
-    own, target = np.mean(ratios, axis=0)
-    assert target == pytest.approx(own, rel=0.12)
-
-
 def test_a_session_without_spectrum_leaves_the_patterns_to_decide():
     plan = Fleet(severity=1.0)
     powers = spectra(plan, 0)
@@ -135,12 +108,3 @@ def test_two_sessions_are_judged_by_patterns_alone():
     plan = Fleet(n_baseline=2, n_axes=3, severity=1.0)
     judged, alone = judge(cells(plan, 0), spectra_by_axis=spectra(plan, 0)), judge(cells(plan, 0))
     assert [j.p_value for j in judged.values()] == [j.p_value for j in alone.values()]
-
-
-def test_identical_spectra_are_no_evidence():
-    plan = Fleet(n_axes=1, n_motions=1)
-    cell = spectra(plan, 0)[1][0]
-    cell.sessions[:] = cell.sessions[0]
-    assert size_effect([cell], plan.n_baseline) == 0.0
-    (ratio,) = squared_deviation(cell, np.array([6]), np.arange(6))
-    assert ratio == pytest.approx(0.0, abs=1e-9)

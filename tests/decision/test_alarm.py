@@ -1,0 +1,25 @@
+"""When nights make an alarm, by hand."""
+
+import pytest
+
+from opamc_cli.decision.trend.alarm import Episode, Night, episodes
+
+S, N, U = Night(True), Night(False), Night(False, judged=False)
+
+
+@pytest.mark.parametrize(
+    ("nights", "expected"),
+    [
+        ([], []),
+        ([S, N, N, S, N], []),
+        ([N, S, S], [Episode(2, None)]),
+        ([S, N, S, N, N, N], [Episode(2, 5)]),
+        ([S, U, U, S], [Episode(3, None)]),
+        ([N, Night(True, gross=True), N, N], [Episode(1, None)]),
+        ([N, Night(True, gross=True), N, N, N], [Episode(1, 4)]),
+        ([S, S, U, U, U], [Episode(1, None)]),
+        ([S, S, N, N, N, S, S], [Episode(1, 4), Episode(6, None)]),
+    ],
+)
+def test_two_of_three_nights_make_an_alarm(nights, expected):
+    assert episodes(nights, 2, 3) == expected

@@ -1,0 +1,45 @@
+"""Slope and forecast against another library and the truth."""
+
+import numpy as np
+import pytest
+from scipy.stats import theilslopes
+
+from opamc_cli.decision.trend.slope import LEAST_NIGHTS, nights_until, robust_slope
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_slope_is_that_of_theil_and_sen(seed):
+    rng = np.random.default_rng(seed)
+    nights = np.sort(rng.choice(60, 25, replace=False)).astype(float)
+    values = 0.01 * nights + rng.normal(0, 0.05, 25)
+    values[3] += 4
+    found = robust_slope(nights, values)
+    other = theilslopes(values, nights, 0.90)
+    assert found is not None
+    assert found.per_night == pytest.approx(other.slope)
+    # which of two neighbouring slopes ends the interval is a matter of rounding
+    pairs = np.triu_indices(25, 1)
+    slopes = np.sort((values[pairs[1]] - values[pairs[0]]) / (nights[pairs[1]] - nights[pairs[0]]))
+    for own, its in ((found.low, other.low_slope), (found.high, other.high_slope)):
+        assert abs(np.searchsorted(slopes, own) - np.searchsorted(slopes, its)) <= 1
+
+
+def test_the_forecast_holds_the_truth_in_nine_of_ten():
+    inside = 0
+    for seed in range(400):
+        rng = np.random.default_rng([7, seed])
+        nights = np.arange(20.0)
+        found = robust_slope(nights, 0.1 + 0.01 * nights + rng.normal(0, 0.02, 20))
+        assert found is not None
+        low, high = nights_until(found, 0.5) or (np.inf, np.inf)
+        inside += low <= (0.5 - (0.1 + 0.01 * 19)) / 0.01 <= high
+    assert 0.8 <= inside / 400 <= 0.97
+
+
+def test_what_does_not_grow_has_no_forecast():
+    nights = np.arange(20.0)
+    flat = robust_slope(nights, np.random.default_rng(3).normal(0.1, 0.02, 20))
+    assert flat is not None
+    assert nights_until(flat, 0.5) is None
+    assert nights_until(flat, 0.01) == (0.0, 0.0)
+    assert robust_slope(nights[: LEAST_NIGHTS - 1], nights[: LEAST_NIGHTS - 1]) is None

@@ -1,0 +1,96 @@
+"""Spread, tail and splice, each against what it should be by definition."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.special import digamma
+from scipy.stats import t as student_t
+
+from opamc_cli.decision.significance.spread import (
+    EXPECTED,
+    SIBLING_SHARE,
+    Spread,
+    moderated_spread,
+    spliced_p_value,
+    spread_among_siblings,
+    upper_tail,
+)
+
+
+@settings(deadline=None, max_examples=100)
+@given(st.lists(st.floats(-3, 3), min_size=1, max_size=9), st.floats(-5, 5))
+def test_a_spliced_p_value_lies_in_its_rank_step(reference, observed):
+    p = spliced_p_value(reference, observed, Spread(1.0, 4.0))
+    above = sum(value >= observed for value in reference)
+    assert above / (len(reference) + 1) <= p <= (above + 1) / (len(reference) + 1)
+
+
+def test_a_moderated_spread_lies_between_sample_and_prior():
+    blended = moderated_spread(4.0, 6.0, Spread(1.0, 3.0))
+    assert 1.0 < blended.scale < 2.5
+    assert blended.dof == 9.0
+    assert moderated_spread(float("nan"), 0.0, Spread(1.0, 3.0)) == Spread(1.0, 3.0)
+
+
+def test_a_moderated_spread_is_right_in_the_middle_over_many_samples():
+    variances = np.random.default_rng(0).normal(0.0, 0.1, size=(4000, 6)).var(axis=1, ddof=1)
+    logs = [np.log(moderated_spread(v, 5.0, Spread(1.0, 1e-9)).scale) for v in variances]
+    assert np.exp(np.mean(logs)) == pytest.approx(0.1, rel=0.02)
+
+
+def test_one_odd_sibling_does_not_move_the_spread():
+    usual = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 0.01], 5)
+    odd = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 100.0], 5)
+    assert odd.scale == pytest.approx(usual.scale, rel=0.1)
+    assert spread_among_siblings(0.01, [], 5).dof < usual.dof
+
+
+def test_more_siblings_draw_a_joint_nearer_to_their_spread():
+    own = [spread_among_siblings(0.01, [4.0] * count, 5) for count in (0, 1, 5, 500)]
+    scales = [spread.scale for spread in own]
+    assert scales == sorted(scales)
+    assert [spread.dof for spread in own] == sorted(spread.dof for spread in own)
+    # so many siblings leave nothing to what is usual elsewhere, and next to nothing to its own
+    assert scales[-1] == pytest.approx(2.0, rel=0.1)
+
+
+def test_the_tail_widens_with_fewer_degrees_of_freedom():
+    assert upper_tail(3.0, Spread(1.0, 3.0)) > 4 * upper_tail(3.0, Spread(1.0, 100.0))
+    assert upper_tail(0.0, Spread(1.0, 3.0)) == 0.5
+
+
+def test_a_spread_among_siblings_is_the_mean_of_log_variances_by_their_freedom():
+    """Its own, a tenth of what the siblings' median says, and what is usual elsewhere."""
+
+    def unbiased(variance):
+        return np.log(variance) - (digamma(2.5) - np.log(2.5))
+
+    usual = 2 * np.log(EXPECTED.scale)
+    freedom = np.array([5.0, SIBLING_SHARE * 5 * 3, EXPECTED.dof])
+    logs = np.array([unbiased(0.02), unbiased(0.03), usual])
+    found = spread_among_siblings(0.02, [0.01, 0.04, np.nan, 0.03], 5)
+    assert found.dof == pytest.approx(freedom.sum())
+    assert found.scale == pytest.approx(np.exp((freedom @ logs) / freedom.sum() / 2))
+
+
+def test_the_tail_is_student_s():
+    for distance, scale, dof in ((0.3, 1.0, 3.0), (2.0, 0.5, 7.5), (-1.0, 2.0, 40.0)):
+        expected = student_t.sf(distance / scale, dof)
+        assert upper_tail(distance, Spread(scale, dof)) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_splice_shares_its_step_as_the_tail_does():
+    spread = Spread(0.8, 5.0)
+    reference = [-1.0, 0.2, 1.5, 0.9]
+    tails = {value: student_t.sf(value / 0.8, 5.0) for value in (*reference, 0.5, 3.0, -2.0)}
+    # two of four are larger; the step between them and the next is shared out
+    share = (tails[0.5] - tails[0.9]) / (tails[0.2] - tails[0.9])
+    assert spliced_p_value(reference, 0.5, spread) == pytest.approx((2 + share) / 5)
+    assert spliced_p_value(reference, 3.0, spread) == pytest.approx(tails[3.0] / tails[1.5] / 5)
+    share = (tails[-2.0] - tails[-1.0]) / (1 - tails[-1.0])
+    assert spliced_p_value(reference, -2.0, spread) == pytest.approx((4 + share) / 5)
+    # a rank that is known beforehand, at a value that no reference has
+    assert spliced_p_value(reference, 0.5, spread, n_above=0) == pytest.approx(
+        min(tails[0.5] / tails[1.5], 1) / 5
+    )

@@ -1,0 +1,75 @@
+"""Where a motion begins and ends, on vectors whose first and last turn are known."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.signal.motion.boundaries import refine_boundaries
+
+FS_HZ = 2000.0
+BEGIN, END, N = 1000, 3000, 4000
+
+
+def vector(torque=2.0, hold=1.0, noise=0.0, seed=0):
+    """A vector that stands, speeds up at constant acceleration, slows down, and stands again."""
+    t = np.arange(N)
+    moving = (t >= BEGIN) & (t < END)
+    speed = np.where(moving, np.minimum(t - BEGIN, END - t) / 1000 * 60.0, 0.0)
+    size = np.where(moving, torque, hold)
+    angle = 0.7 + 2 * np.pi * np.cumsum(speed) / FS_HZ
+    rng = np.random.default_rng(seed)
+    return size * np.exp(1j * angle) + noise * (
+        rng.standard_normal(N) + 1j * rng.standard_normal(N)
+    )
+
+
+@pytest.mark.parametrize("hold", [1.0, -1.0, 0.5])
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+def test_both_ends_are_found_within_milliseconds(hold, noise):
+    """A torque that changes its sign turns the vector about, which is no turn of the motor."""
+    start, stop = refine_boundaries(vector(hold=hold, noise=noise), 1200, 2800, FS_HZ, noise)
+    assert abs(start - BEGIN) <= 0.02 * FS_HZ
+    assert abs(stop - END) <= 0.02 * FS_HZ
+
+
+def test_what_is_true_forwards_is_true_backwards():
+    z = vector(noise=0.02)
+    start, stop = refine_boundaries(z, 1200, 2800, FS_HZ, 0.02)
+    assert refine_boundaries(z[::-1], N - 2800, N - 1200, FS_HZ, 0.02) == (N - stop, N - start)
+
+
+def test_without_current_at_rest_the_motion_begins_where_the_current_does():
+    start, stop = refine_boundaries(vector(hold=0.0), 1200, 2800, FS_HZ, 1e-3)
+    assert abs(start - BEGIN) <= 0.005 * FS_HZ
+    assert abs(stop - END) <= 0.005 * FS_HZ
+
+
+def test_boundaries_move_outwards_only_and_stay_without_rest_to_compare_with():
+    z = vector(noise=0.02)
+    for coarse in ((1010, 2990), (1100, 2900), (1400, 2600)):
+        start, stop = refine_boundaries(z, *coarse, FS_HZ, 0.02)
+        assert start <= coarse[0]
+        assert stop >= coarse[1]
+    # ten samples of standstill are less than what the mean of a hundred of them needs
+    assert refine_boundaries(z[990:3010], 30, 1990, FS_HZ, 0.02) == (30, 1990)
+
+
+def test_a_carrier_that_is_lost_at_speed_brakes_as_it_accelerated():
+    """No torque holds the joint, and friction alone slows it down: the current is gone before."""
+    z = vector(hold=0.0)
+    lost = 2500
+    z[lost:] = 0.0
+    start, stop = refine_boundaries(z, 1200, lost, FS_HZ, 1e-3, n_to_f_last=300)
+    assert stop == lost + (1200 + 300 - start)
+    held = vector(hold=1.0)
+    assert (
+        refine_boundaries(held, 1200, 2800, FS_HZ, 0.0, n_to_f_last=300)[1]
+        == (refine_boundaries(held, 1200, 2800, FS_HZ, 0.0)[1])
+    )
+
+
+def test_a_single_phase_leaves_its_standstill_value():
+    rng = np.random.default_rng(3)
+    current = vector(noise=0.0).real + 0.01 * rng.standard_normal(N)
+    start, stop = refine_boundaries(current, 1200, 2800, FS_HZ, 0.01)
+    assert abs(start - BEGIN) <= 0.06 * FS_HZ
+    assert abs(stop - END) <= 0.06 * FS_HZ
