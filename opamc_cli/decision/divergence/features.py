@@ -30,42 +30,6 @@ def _finite(values: ArrayLike) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return flat[np.isfinite(flat)]
 
 
-def delta_mu(baseline: ArrayLike, target: ArrayLike) -> float:
-    """Difference of the means, target minus baseline (thesis 2021, 4.3.2).
-
-    Parameters
-    ----------
-    baseline, target : array_like
-        Divergences; entries that are not finite are passed over.
-
-    Returns
-    -------
-    float
-        NaN if either group is empty.
-    """
-    b, t = _finite(baseline), _finite(target)
-    return float(t.mean() - b.mean()) if b.size and t.size else float("nan")
-
-
-def delta_var(baseline: ArrayLike, target: ArrayLike) -> float:
-    """Difference of the sample variances (divisor n-1), target minus baseline.
-
-    Parameters
-    ----------
-    baseline, target : array_like
-        Divergences; entries that are not finite are passed over.
-
-    Returns
-    -------
-    float
-        NaN if either group has fewer than two entries.
-    """
-    b, t = _finite(baseline), _finite(target)
-    if b.size < 2 or t.size < 2:
-        return float("nan")
-    return float(t.var(ddof=1) - b.var(ddof=1))
-
-
 def ks_statistic(baseline: ArrayLike, target: ArrayLike) -> float:
     """Two-sample Kolmogorov-Smirnov statistic (thesis 2021, equation 2-10).
 
@@ -90,19 +54,22 @@ def ks_statistic(baseline: ArrayLike, target: ArrayLike) -> float:
 
 
 def compare(baseline: ArrayLike, target: ArrayLike) -> Features:
-    """All three features of one axis and order.
+    """All three features of one axis and order (thesis 2021, 4.3.2).
 
     Parameters
     ----------
     baseline, target : array_like
-        Divergences of the two groups.
+        Divergences of the two groups; entries that are not finite are passed over.
 
     Returns
     -------
     Features
+        NaN where a group is empty; the variances (divisor n-1) need two entries.
     """
+    b, t = _finite(baseline), _finite(target)
+    least, unknown = min(b.size, t.size), float("nan")
     return Features(
-        delta_mu=delta_mu(baseline, target),
-        delta_var=delta_var(baseline, target),
-        ks=ks_statistic(baseline, target),
+        delta_mu=float(t.mean() - b.mean()) if least else unknown,
+        delta_var=float(t.var(ddof=1) - b.var(ddof=1)) if least > 1 else unknown,
+        ks=ks_statistic(b, t),
     )

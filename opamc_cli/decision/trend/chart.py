@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.decision.significance.spread import MAD_TO_SIGMA
+
 FloatArray = NDArray[np.float64]
 
 WEIGHT = 0.2
@@ -27,8 +29,6 @@ nights that it counts for: with few nights, their own spread is chance."""
 
 LEAST_SPREAD = 0.05
 """Half the usual: nights that agree better have not yet seen what nights differ by."""
-
-MAD_TO_SIGMA = 1.4826
 
 
 @dataclass(frozen=True)

@@ -138,12 +138,8 @@ def run(
         Folders of the runs, if they were moved.
     without
         Run and axis of segments that are left out.
-    jobs
-        Worker processes.
-    watch
-        Called as the work gets done.
-    kept
-        Where results of the same work may lie.
+    jobs, watch, kept
+        As of `segment.run`.
 
     Raises
     ------

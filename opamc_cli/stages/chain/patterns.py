@@ -88,12 +88,8 @@ def run(
         Folder of the tables.
     moved_to
         Folders of the runs, if they were moved.
-    jobs
-        Worker processes.
-    watch
-        Called as the work gets done.
-    kept
-        Where results of the same work may lie.
+    jobs, watch, kept
+        As of `segment.run`.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """One step of a model's work on every axis of some runs, the axes side by side."""
 
 import traceback
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -51,16 +51,8 @@ def on_each_axis(
     ----------
     work : callable
         Importable by name; model, runs and axis in, what can be pickled out.
-    model : JointModelConfig
-        Declared model.
-    paths : sequence of (str, Path)
-        Names and files of the runs.
-    axes : sequence of int
-        Axes; empty for all.
-    jobs : int
-        Worker processes; 0: one per core, where they are worth their start.
-    watch : callable
-        Called as axes get done.
+    model, paths, axes, jobs, watch
+        As of `model.fit`.
 
     Raises
     ------
@@ -100,19 +92,25 @@ def on_each_axis(
 
 def _on_axis(work: OnAxis[Result], model: JointModelConfig, paths: Runs, axis: int) -> Result:
     # A worker has one thread: with more, the sums of products here would differ in the last digit.
-    with ExitStack() as stack, threadpool_limits(1):
+    with ExitStack() as stack, threadpool_limits(1), users_effects_named():
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]
-        try:
-            return work(model, runs, axis)
-        except OpamcError:
+        return work(model, runs, axis)
+
+
+@contextmanager
+def users_effects_named() -> Iterator[None]:
+    """Make a sentence, with file and line, of an error that arises in a user's own effect."""
+    try:
+        yield
+    except OpamcError:
+        raise
+    except Exception as error:
+        where = _in_a_users_effect(error)
+        if where is None:
             raise
-        except Exception as error:
-            where = _in_a_users_effect(error)
-            if where is None:
-                raise
-            what = f"{type(error).__name__}: {error}".rstrip(": ")
-            msg = f"{where}: this effect cannot be used ({what}); correct it"
-            raise UserEffectError(msg) from error
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        msg = f"{where}: this effect cannot be used ({what}); correct it"
+        raise UserEffectError(msg) from error
 
 
 def _in_a_users_effect(error: BaseException) -> str | None:

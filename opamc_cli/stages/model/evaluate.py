@@ -40,16 +40,8 @@ def evaluate(
     ----------
     model : JointModelConfig
         As `opamc model close` wrote it.
-    paths : sequence of (str, Path)
-        Names and files of the runs.
-    axes : sequence of int
-        Axes; empty for all.
-    out : Path
-        Output folder.
-    jobs : int
-        Worker processes; 0: one per core, where they are worth their start.
-    watch : callable
-        Called as axes get done.
+    paths, axes, out, jobs, watch
+        As of `model.fit`.
 
     Raises
     ------

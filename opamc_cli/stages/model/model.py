@@ -157,20 +157,10 @@ def close(
 
     Parameters
     ----------
-    model : JointModelConfig
-        Declared model.
-    paths : sequence of (str, Path)
-        Names and files of the runs.
-    axes : sequence of int
-        Axes; empty for all.
-    out : Path
-        Output folder.
+    model, paths, axes, out, jobs, watch
+        As of `fit`.
     seed : int
         For the decoys.
-    jobs : int
-        Worker processes; 0: one per core, where they are worth their start.
-    watch : callable
-        Called as axes get done.
     """
     work = partial(_closed, seed)
     done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)

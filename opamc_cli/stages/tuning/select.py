@@ -77,12 +77,8 @@ def run(
         Folder of the table.
     orders, gammas
         What to rate.
-    moved_to
-        Folders of the runs, if they were moved.
-    jobs
-        Worker processes.
-    watch
-        Called as the work gets done.
+    moved_to, jobs, watch
+        As of `patterns.run`.
 
     Raises
     ------

@@ -123,10 +123,8 @@ def run(
         Folder of the sweep table.
     taus, orders
         What is swept: samples >= 1, orders 3..7.
-    jobs
-        Worker processes.
-    watch
-        Called as the work gets done.
+    jobs, watch
+        As of `segment.run`.
 
     Raises
     ------

@@ -1,6 +1,5 @@
 """Why a joint has changed: the effect that target runs have and baseline runs lack."""
 
-import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
@@ -8,11 +7,12 @@ from typing import Any
 import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
-from opamc_cli.errors import ConfigError, OpamcError
+from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Cause, Change, explain_change
 from opamc_cli.joint.effects.library import Library, built_in_library, load_user_effects
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.stages.model.axes import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.storage.sources import RunSource
 
@@ -70,15 +70,8 @@ def explain(
         sides.append(recordings)
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
     library = library_of(config)
-    try:
+    with users_effects_named():
         return _entry(explain_change(sides[0], sides[1], joint, library=library))
-    except Exception as error:
-        where = _in_an_own_effect(error, config)
-        if where is None:
-            raise
-        what = f"{type(error).__name__}: {error}".rstrip(": ")
-        msg = f"{where}: this effect cannot be used ({what}); correct it"
-        raise ConfigError(msg) from error
 
 
 def library_of(config: JointConfig) -> Library:
@@ -91,13 +84,6 @@ def library_of(config: JointConfig) -> Library:
     """
     own = [effect for path in config.library for effect in load_user_effects(path)]
     return built_in_library() | {effect.name: effect for effect in own}
-
-
-def _in_an_own_effect(error: Exception, config: JointConfig) -> str | None:
-    """Return file and line where an error arose in a user's effect, None where in none."""
-    files = {str(path) for path in config.library}
-    frames = reversed(traceback.extract_tb(error.__traceback__))
-    return next((f"{one.filename}:{one.lineno}" for one in frames if one.filename in files), None)
 
 
 def first_motions(patterns: pa.Table) -> dict[int, dict[str, int]]:
