@@ -5,7 +5,7 @@ in `out`, and raises `opamc_cli.errors.OpamcError` where the command ends with a
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -184,10 +184,16 @@ def segment(
     jobs
         Worker processes.
     """
+    return _stage(motions.run, _paths(runs), out, settings, jobs)
+
+
+def _stage(
+    run: Callable[..., Any], source: object, out: AnyPath, settings: Settings | None, jobs: int
+) -> Rows:
     folder = Path(out)
     with output_lock(folder):
-        done = motions.run(_paths(runs), _config(settings), folder, jobs=jobs)
-    return Rows(done.table, done.path, done.notes, done.errors)
+        done = run(source, _config(settings), folder, jobs=jobs)
+    return Rows(done.table, done.path, getattr(done, "notes", ()), done.errors)
 
 
 def identify(
@@ -206,11 +212,7 @@ def identify(
     out, settings, jobs
         As of `segment`.
     """
-    folder = Path(out)
-    source = Path(segments) if segments is not None else folder / files.SEGMENTS
-    with output_lock(folder):
-        done = cycles.run(source, _config(settings), folder, jobs=jobs)
-    return Rows(done.table, done.path, errors=done.errors)
+    return _stage(cycles.run, Path(segments or Path(out) / files.SEGMENTS), out, settings, jobs)
 
 
 def patterns(
@@ -229,11 +231,7 @@ def patterns(
     out, settings, jobs
         As of `segment`.
     """
-    folder = Path(out)
-    source = Path(motions) if motions is not None else folder / files.MOTIONS
-    with output_lock(folder):
-        done = counts.run(source, _config(settings), folder, jobs=jobs)
-    return Rows(done.table, done.path, done.notes, done.errors)
+    return _stage(counts.run, Path(motions or Path(out) / files.MOTIONS), out, settings, jobs)
 
 
 def score(
