@@ -5,7 +5,14 @@ import pytest
 
 from opamc_cli.decision import judge as decision
 from opamc_cli.decision.judge import Bundle
-from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
+from opamc_cli.decision.significance.permutation import relabellings
+from opamc_cli.decision.witnesses.deviation import PRIOR_DOF
+from opamc_cli.decision.witnesses.profiles import (
+    LEAST_SHARE,
+    ProfileEvidence,
+    between_groups,
+    profile_cell,
+)
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, spectra
 
@@ -64,3 +71,35 @@ def test_a_course_that_moved_on_all_joints_is_the_fault_of_none():
     found = [judged(seed, 0.8, everyone=True) for seed in range(5)]
     states = [one.state for joints in found for one in joints.values()]
     assert states.count("healthy") >= len(states) - 1
+
+
+def slow_between(sessions, is_target):
+    """The definition, labelling by labelling and part by part."""
+    known = np.isfinite(sessions).all(axis=1)
+    found = []
+    for row in is_target:
+        a, b = sessions[known & row], sessions[known & ~row]
+        dof = len(a) + len(b) - 2
+        if not (len(a) and len(b)) or dof < 1:
+            found.append(np.nan)
+            continue
+        squares = ((a - a.mean(axis=0)) ** 2).sum(axis=0) + ((b - b.mean(axis=0)) ** 2).sum(axis=0)
+        own = squares / dof
+        variance = (PRIOR_DOF * own.mean() + dof * own) / (PRIOR_DOF + dof)
+        variance = np.maximum(variance, LEAST_SHARE**2) * (1 / len(a) + 1 / len(b))
+        found.append(((a.mean(axis=0) - b.mean(axis=0)) ** 2 / variance).mean())
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    ("n_baseline", "n_target", "scatter"), [(5, 2, 0.3), (3, 1, 1.0), (4, 3, 0)]
+)
+def test_groups_differ_by_their_definition(n_baseline, n_target, scatter):
+    rng = np.random.default_rng(n_baseline)
+    sessions = 2.0 + scatter * rng.normal(size=(n_baseline + n_target, 6)) * np.arange(1, 7)
+    sessions[1] = np.nan
+    labels = relabellings(n_baseline, n_target)
+    expected = slow_between(sessions, labels)
+    np.testing.assert_allclose(between_groups(sessions, labels), expected, rtol=1e-9, atol=1e-12)
+    # two groups of one session each have no scatter to be judged by
+    assert np.isnan(between_groups(sessions[[0, 2]], np.array([[False, True]]))).all()
