@@ -91,6 +91,7 @@ def test_result_does_not_depend_on_the_pieces(piece):
     stream = MotionStream(MotionBand(), FS_HZ, STEP)
     parts = [stream.push(tfs[i : i + piece]) for i in range(0, tfs.size, piece)]
     frames = join_frames([*parts, stream.finish()])
+    assert join_frames([frames]).step == frames.step == STEP
     assert np.array_equal(frames.strength, whole.strength)
     assert np.array_equal(frames.ridge_hz, whole.ridge_hz)
 
