@@ -141,7 +141,7 @@ def _diagnose(
         config,
         out / "baseline",
         without=repeats,
-        check=partial(agreement.check, "baseline"),
+        check=partial(agreement.check, "baseline", kept=kept),
         jobs=jobs,
         kept=kept,
         progress=lambda stage: progress(f"baseline: {stage}"),

@@ -40,8 +40,8 @@ def preload() -> None:
     for module in pkgutil.walk_packages(opamc_cli.__path__, "opamc_cli."):
         if not module.name.endswith("__main__"):
             importlib.import_module(module.name)
-    assemble = importlib.import_module("opamc_cli.stages.report.assemble")
-    assemble.EVIDENCE = assemble.EVIDENCE[:1]  # type: ignore[attr-defined]
+    shown = importlib.import_module("opamc_cli.stages.report.figures.shown")
+    shown.EVIDENCE = shown.EVIDENCE[:1]  # type: ignore[attr-defined]
 
 
 class Fork:

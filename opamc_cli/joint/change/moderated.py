@@ -1,8 +1,7 @@
 """Means of two small samples compared, with a variance that borrows from elsewhere."""
 
 import numpy as np
-from scipy.stats import f as fisher
-from scipy.stats import t as student
+from scipy.special import fdtrc, stdtr  # scipy.stats takes a second to load
 
 from opamc_cli.joint.motion.track import Floats
 
@@ -38,7 +37,7 @@ def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Fl
     t_values: Floats = (after.mean(axis=0) - before.mean(axis=0)) / np.sqrt(
         np.maximum(variance, 1e-300) * (1 / n + 1 / m) + 2 * between
     )
-    p_values: Floats = student.sf(t_values, weight)
+    p_values: Floats = stdtr(weight, -t_values)
     return t_values, p_values
 
 
@@ -74,4 +73,4 @@ def shift_p(shift: Floats, covariance: Floats, units: int) -> float:
     square = float(shift @ np.linalg.pinv(covariance, hermitian=True) @ shift)
     freedom = max(units - 1 + PRIOR_WEIGHT - size + 1, 1.0)
     scale = freedom / (units - 1 + PRIOR_WEIGHT)
-    return float(fisher.sf(square * scale / size, size, freedom))
+    return float(fdtrc(size, freedom, square * scale / size))

@@ -1,6 +1,6 @@
 """What is compared as a whole: a recording session, or a cycle where there are too few of those."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -49,16 +49,22 @@ class Unit:
     fine_rows: Bools
     coarse_rows: Bools
     after: bool
+    # a search asks for most of them again at every step: half of its time
+    _coarse_columns: dict[object, Floats] = field(init=False, repr=False, default_factory=dict)
 
     def columns(self, term: Term, fine: bool = False) -> Floats:
         """Regressors of a term on the unit's own samples; fast ones are averaged, not resampled."""
         if fine:
             return term.columns(self.fine)[self.fine_rows]
+        if term.key not in self._coarse_columns:
+            self._coarse_columns[term.key] = self._on_coarse(term)[self.coarse_rows]
+        return self._coarse_columns[term.key]
+
+    def _on_coarse(self, term: Term) -> Floats:
         if not term.effect.fast:
-            return term.columns(self.coarse)[self.coarse_rows]
+            return term.columns(self.coarse)
         track = self.fine
-        columns = term.columns(track)
-        return averaged_blocks(columns, track.bounds, track.kernel, self.factor)[self.coarse_rows]
+        return averaged_blocks(term.columns(track), track.bounds, track.kernel, self.factor)
 
     def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
         """Regressors of several terms side by side."""

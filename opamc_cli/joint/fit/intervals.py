@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.least_squares import SINGULAR_BELOW, eigenvectors
@@ -68,7 +68,7 @@ def certainty(fit: Fit) -> Certainty:
     condition = float(np.sqrt(values[-1] / max(values[0], 1e-16 * values[-1])))
     return Certainty(
         tuple(np.split(errors, np.cumsum(widths)[:-1])) if widths else (),
-        float(student.ppf(0.975, max(units - 1, 1))),
+        float(stdtrit(max(units - 1, 1), 0.975)),
         condition,
         _inseparable(scaled, fit, widths),
     )

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtr
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
@@ -98,7 +98,7 @@ class Trial:
     @property
     def p_value(self) -> float:
         """Probability of such a t where the effect does nothing."""
-        return float(student.sf(self.t_value, max(self.chain.error.size - 1, 1)))
+        return float(stdtr(max(self.chain.error.size - 1, 1), -self.t_value))
 
 
 def guessed(effect: Effect, session: Session) -> list[Term]:

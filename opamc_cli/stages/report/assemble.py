@@ -1,29 +1,16 @@
 """The report: figures and tables put on one page that needs nothing else."""
 
+import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 
 from opamc_cli.stages.report import wording
-from opamc_cli.stages.report.figures import (
-    envelopes,
-    feature_space,
-    jsd_histogram,
-    jsd_scatter,
-    latent_axis,
-    motion_signal,
-    order_spectrum,
-    ordinal_distribution,
-    partial_residuals,
-    residual,
-    similarity,
-)
-from opamc_cli.stages.report.figures.figure import Figure
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.focus import by_severity, choose_focus
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs, read_inputs
@@ -32,30 +19,15 @@ from opamc_cli.stages.report.views import axis_view, compared, heading, headline
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 
-EVIDENCE = (
-    ("divergence of every segment", jsd_scatter.figure),
-    ("distribution of the divergences", jsd_histogram.figure),
-    ("ordinal patterns", ordinal_distribution.figure),
-    ("envelope", envelopes.figure),
-    ("feature space", feature_space.figure),
-    ("latent axis", latent_axis.figure),
-    ("motion signal", motion_signal.figure),
-    ("identification", similarity.figure),
-)
-"""The thesis's figures: first what the verdict rests on, then how the segments were found."""
-
-LOOP = (
-    ("partial residuals", partial_residuals.figure),
-    ("residual", residual.figure),
-    ("order spectrum", order_spectrum.figure),
-)
+if TYPE_CHECKING:
+    from opamc_cli.stages.report.figures.figure import Figure
 
 
 @dataclass(frozen=True)
 class Section:
     """Figures under one heading, and one line for each that could not be drawn."""
 
-    figures: tuple[Figure, ...]
+    figures: "tuple[Figure, ...]"
     omitted: tuple[str, ...]
 
 
@@ -120,9 +92,11 @@ def render(inputs: ReportInputs, title: str, figures: bool = True) -> tuple[str,
     """Return the page, and one line for each part that could not be drawn."""
     if inputs.axes:
         focus = choose_focus(inputs)
-        evidence = _draw(EVIDENCE if figures else (), lambda draw: draw(inputs, focus))
-        if not figures:
-            evidence = Section((), ("figures: not drawn of a healthy night",))
+        evidence = Section((), ("figures: not drawn of a healthy night",))
+        if figures:
+            from opamc_cli.stages.report.figures.shown import EVIDENCE
+
+            evidence = _draw(EVIDENCE, lambda draw: draw(inputs, focus))
         views = {axis: axis_view(inputs, axis, focus) for axis in by_severity(inputs)}
     else:
         evidence, views = Section((), ()), {}
@@ -164,20 +138,20 @@ def _notes(inputs: ReportInputs) -> list[str]:
 
 
 def _loop_part(inputs: ReportInputs, entry: Mapping[str, Any]) -> dict[str, Any]:
+    from opamc_cli.stages.report.figures.shown import LOOP
+
     view = loop_view(entry)
     return {**view, "section": _draw(LOOP, lambda draw: draw(inputs, view["axis"]))}
 
 
 def _draw(
-    parts: Sequence[tuple[str, Callable[..., Figure]]],
-    call: Callable[[Callable[..., Figure]], Figure],
+    parts: "Sequence[tuple[str, Callable[..., Figure]]]",
+    call: "Callable[[Callable[..., Figure]], Figure]",
 ) -> Section:
     figures, omitted = [], []
     with warnings.catch_warnings():
         # a sign that the font lacks is drawn by the browser, which has more fonts
         warnings.filterwarnings("ignore", message="Glyph .* missing from font")
-        # names that are longer than the figure is wide
-        warnings.filterwarnings("ignore", message="constrained_layout not applied")
         for name, draw in parts:
             try:
                 figures.append(call(draw))
@@ -186,7 +160,9 @@ def _draw(
     return Section(tuple(figures), tuple(omitted))
 
 
+@functools.cache
 def _environment() -> jinja2.Environment:
+    """Return where templates are found; each is compiled once, not in every night of a worker."""
     environment = jinja2.Environment(
         loader=jinja2.FunctionLoader(_resource),
         autoescape=True,  # whatever the template is called: names of runs are not ours

@@ -4,6 +4,8 @@ import json
 import os
 import shutil
 import sqlite3
+import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -25,6 +27,25 @@ COLUMNS = (
 def rows(cell: Path, query: str) -> list[tuple]:
     with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
         return db.execute(query).fetchall()
+
+
+def test_a_healthy_robot_loads_nothing_that_only_a_sick_one_needs(tmp_path):
+    cell = cell_logs.record_cell(tmp_path, 1, 3, {})
+    code = (
+        "import sys\nfrom opamc_cli.stages import diagnose\nfrom opamc_cli.config import Config\n"
+        "from pathlib import Path\nlogs = sorted(Path(sys.argv[1]).iterdir())\n"
+        "done = diagnose.run(logs[:2], logs[2:], Config(), Path(sys.argv[2]), "
+        "figures_of_healthy=False)\n"
+        "heavy = ('scipy.stats', 'scipy.signal', 'scipy.optimize', 'matplotlib.figure')\n"
+        "print(int(done.exit_code), [name for name in heavy if name in sys.modules])"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code, cell.parent / "logs" / "r1", tmp_path / "out"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stdout.split("\n")[0] == "0 []"
 
 
 def states(robots: dict) -> dict[str, str]:

@@ -1,3 +1,4 @@
+import itertools
 import math
 
 import numpy as np
@@ -140,6 +141,26 @@ def test_figures_take_their_colours_from_the_page() -> None:
     assert not any(light in svg for light, _ in PALETTE.values())
     assert "3.14159 $x$ &lt;b&gt;" in svg  # text keeps its digits, coordinates do not
     assert "http" not in svg
+
+
+@pytest.mark.parametrize(("rows", "columns", "scale"), [(1, 1, 1.0), (2, 3, 1e-3), (3, 2, -1e7)])
+def test_reckoned_margins_hold_what_matplotlib_measures(rows, columns, scale) -> None:
+    with style():
+        drawing = canvas(0.6 + 1.7 * rows)
+        panels = list(drawing.subplots(rows, columns, squeeze=False).flat)
+        for number, panel in enumerate(panels):
+            panel.plot(scale * np.linspace(0, 1, 9), scale * np.arange(9.0), label="baseline")
+            panel.set_title(f"Axis {number}")
+            panel.set_xlabel("JSD")
+            panel.set_ylabel("share")
+        legend = drawing.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right")
+        drawing.draw_without_rendering()
+        boxes = [legend.get_window_extent(), *(panel.get_tightbbox() for panel in panels)]
+    for box in boxes:
+        assert 0 <= box.x0 < box.x1 <= drawing.bbox.width
+        assert 0 <= box.y0 < box.y1 <= drawing.bbox.height
+    for one, other in itertools.combinations(boxes, 2):
+        assert not one.overlaps(other)
 
 
 def test_colours_differ_and_are_read_on_their_page() -> None:

@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure as Canvas
 
+from opamc_cli.stages.report.figures.margins import TextMargins
 from opamc_cli.stages.report.figures.palette import PALETTE, colour
 
 WIDTH_IN = 9.6
@@ -28,6 +29,7 @@ STYLE: dict[str, Any] = {
     "axes.titlesize": 9.5,
     "axes.titlelocation": "left",
     "axes.titleweight": "bold",
+    "axes.titley": 1.0,  # else every text around the panel is measured to find the title's height
     "axes.labelsize": 9.0,
     "axes.labelcolor": colour("muted"),
     "axes.edgecolor": colour("grid"),
@@ -89,7 +91,7 @@ def style() -> AbstractContextManager[None]:
 
 def canvas(height_in: float, width_in: float = WIDTH_IN) -> Canvas:
     """Return an empty drawing of the report's width; draw within `style`."""
-    return Canvas(figsize=(width_in, height_in), layout="constrained")
+    return Canvas(figsize=(width_in, height_in), layout=TextMargins())
 
 
 def finish(drawing: Canvas, name: str, title: str, caption: str, alt: str) -> Figure:
@@ -105,10 +107,10 @@ def to_svg(drawing: Canvas, name: str) -> str:
     a file of its own needs (prolog, name spaces, date) is left out.
     """
     buffer = io.StringIO()
-    FigureCanvasSVG(drawing)
-    _lay_out(drawing)
     with mpl.rc_context({"svg.hashsalt": name}):
-        drawing.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+        # not `savefig`, which draws it once more beforehand
+        untyped: Any = FigureCanvasSVG(drawing)
+        untyped.print_svg(buffer, metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
     text = text[text.index("<svg") :]
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
@@ -123,14 +125,6 @@ def to_svg(drawing: Canvas, name: str) -> str:
     for role, (light, _) in PALETTE.items():
         text = text.replace(light, f"var(--{role})")
     return re.sub(r"\n\s*", "\n", text).strip()
-
-
-def _lay_out(drawing: Canvas) -> None:
-    """Lay a drawing out once: left to be saved it is drawn twice, the first time for this alone."""
-    engine = drawing.get_layout_engine()
-    if engine is not None:
-        engine.execute(drawing)
-        drawing.set_layout_engine(None)
 
 
 def to_png(drawing: Canvas, dots_per_inch: int = 120) -> bytes:

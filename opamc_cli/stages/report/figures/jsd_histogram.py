@@ -44,7 +44,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             panel.set_xlabel("JSD")
             panel.set_xlim(left=0.0)
         for panel in panels[::columns]:
-            panel.set_ylabel("share of segments")
+            panel.set_ylabel("share")
         hide_surplus(panels, len(axes))
         handles, labels = panels[0].get_legend_handles_labels()
         drawing.legend(handles, labels, loc="outside upper right", ncols=2)

@@ -45,7 +45,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
             )
         line.set_yticks(range(len(values)), [f"axis {axis}" for axis in values])
         line.set_ylim(len(values) - 0.4, -0.6)
-        line.margins(x=0.18)
+        line.margins(x=0.25)
         line.grid(visible=False, axis="y")
         unit = "within-class standard deviations" if trained else "the baseline's own spread"
         line.set_xlabel(f"{'discriminant' if trained else 'health index'} (unit: {unit})")

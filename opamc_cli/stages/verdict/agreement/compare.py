@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
+from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.segment import SegmentOutcome
 from opamc_cli.stages.verdict.agreement.exchanged import exchanged
 from opamc_cli.stages.verdict.agreement.findings import Finding, Reference, findings, reference_of
@@ -39,7 +40,11 @@ class Agreement:
     _reference: Reference | None = None
 
     def check(
-        self, role: str, segmented: SegmentOutcome, motions: Path | None = None
+        self,
+        role: str,
+        segmented: SegmentOutcome,
+        motions: Path | None = None,
+        kept: KeptResults | None = None,
     ) -> set[tuple[str, int]]:
         """Return run and axis of the segments that cannot be compared with the baseline.
 
@@ -51,13 +56,15 @@ class Agreement:
             Segments of its runs.
         motions
             Motion table with the reference cycles, once there is one.
+        kept
+            Where results of the same work may lie.
 
         Raises
         ------
         NotEnoughDataError
             If nothing is left.
         """
-        own = measure(read_sources(segmented.path), segmented.table)
+        own = measure(read_sources(segmented.path), segmented.table, kept)
         if self._reference is None:
             self._reference = reference_of(own)
         self.measured[role] = own

@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.signal.quality import clipped_share
+from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.storage.runs import AxisChannels, Run
 from opamc_cli.storage.sources import RunSource
 
@@ -61,25 +63,52 @@ class Measured:
     frozen: tuple[str, float] | None
 
 
-def measure(sources: Sequence[RunSource], segments: pa.Table) -> list[Measured]:
+@dataclass(frozen=True)
+class _Job:
+    """A run, and the motions that were found on each of its axes."""
+
+    source: RunSource
+    spans: Mapping[int, Sequence[tuple[int, int]]]
+
+
+def measure(
+    sources: Sequence[RunSource], segments: pa.Table, kept: KeptResults | None = None
+) -> list[Measured]:
     """Measure every axis of every run, from a few of its motions.
+
+    Parameters
+    ----------
+    sources
+        The runs.
+    segments
+        Their motions.
+    kept
+        Where results of the same work may lie.
 
     Raises
     ------
     InputError
         If samples of a run cannot be read.
     """
-    spans: dict[tuple[str, int], list[tuple[int, int]]] = {}
+    spans: dict[str, dict[int, list[tuple[int, int]]]] = {}
     for row in segments.select(["run", "axis", "start", "stop"]).to_pylist():
-        spans.setdefault((row["run"], row["axis"]), []).append((row["start"], row["stop"]))
-    found = []
-    for source in sources:
-        with source.open() as run:
-            found += [_measure(run, axis, spans.get((run.name, axis), [])) for axis in run.axes]
-    return found
+        of_run = spans.setdefault(row["run"], {})
+        of_run.setdefault(row["axis"], []).append((row["start"], row["stop"]))
+    measured = remembered(_measure_run, kept)
+    return [
+        Measured(source.name, source.path, **values)
+        for source in sources
+        for values in measured(_Job(source, spans.get(source.name, {})))
+    ]
 
 
-def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> Measured:
+def _measure_run(job: _Job) -> tuple[dict[str, Any], ...]:
+    with job.source.open() as run:
+        return tuple(_measure(run, axis, job.spans.get(axis, [])) for axis in run.axes)
+
+
+def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """Return what a `Measured` says of an axis, but for which run it is."""
     channels = run.channels(axis)
     signal = _signal(channels)
     motion = [name for name in (channels.position, channels.velocity) if name]
@@ -97,21 +126,21 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> Measured:
     ]
     currents = [name for name in signal if name not in motion]
     kinds = {"current": currents, "position": channels.position, "velocity": channels.velocity}
-    return Measured(
-        run.name,
-        run.path,
-        axis,
-        signal,
-        bool(spans),
-        {
+    return {
+        "axis": axis,
+        "signal": signal,
+        "moves": bool(spans),
+        "size": {
             kind: _rms([_centred(look[name]) for look in looks for name in named])
             for kind, own in kinds.items()
             if (named := [own] if isinstance(own, str) else own)
         },
-        _imbalance(looks, currents) if len(currents) == 3 else None,
-        {name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents},
-        _frozen(run, currents),
-    )
+        "imbalance": _imbalance(looks, currents) if len(currents) == 3 else None,
+        "clipped": {
+            name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents
+        },
+        "frozen": _frozen(run, currents),
+    }
 
 
 def _signal(channels: AxisChannels) -> tuple[str, ...]:
