@@ -36,7 +36,7 @@ from opamc_cli.storage.history import DERIVED, History
 
 STAND_IN = "night_stand_in:stand_in"
 OURS = (".work", ".kept", ".copies", ".opamc.lock")
-SECONDS = 60.0
+SECONDS = 300.0
 VERDICT_HASH = re.compile(rb'(<td>verdict.json</td><td>[^<]*</td><td class="hash">)[0-9a-f]{64}')
 
 SHIM = r"""

@@ -5,10 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from opamc_cli.commands.nightly.nightly import DEFAULT_CELL, Cell
+from opamc_cli.commands.nightly.nightly import DEFAULT_CELL, Cell, as_night
 from opamc_cli.commands.terminal.options import Json, Quiet
 from opamc_cli.commands.terminal.output import Output
-from opamc_cli.errors import UsageError
+from opamc_cli.errors import InputError, UsageError
 
 SHOWN = ("robot", "axis", "night", "state", "health_index", "p_value", "cause", "alarm", "n_runs")
 
@@ -34,23 +34,30 @@ def history(
 ) -> None:
     """Show or export the history of a cell; the whole table is history.sqlite below its `out`."""
     from opamc_cli.config.cell import load_cell
+    from opamc_cli.stages.nightly.recordings import some
     from opamc_cli.stages.nightly.run import open_history
 
     if out is not None and out.suffix not in (".csv", ".parquet", ".json"):
         msg = f"--out {out}: the ending tells the format: .csv, .parquet or .json"
         raise UsageError(msg)
     output = Output(as_json, quiet)
+    first = as_night(since)
     table = "event" if events else "verdict"
     column = "time" if events else "night"
     where, values = ["1"], []
     if robot:
         where.append(f"robot IN ({', '.join('?' * len(robot))})")
         values += list(robot)
-    for condition, value in (("axis = ?", axis), (f"{column} >= ?", since)):
+    for condition, value in (("axis = ?", axis), (f"{column} >= ?", first)):
         if value is not None:
             where.append(condition)
             values.append(str(value))
     with open_history(load_cell(cell), read_only=True) as opened:
+        known = {name for name, _ in opened.nights()}
+        for name in robot or ():
+            if name not in known:
+                msg = f"--robot {name}: no night of it is known; there are {some(sorted(known))}"
+                raise InputError(msg)
         rows = opened.rows(
             f"SELECT * FROM {table} WHERE {' AND '.join(where)} ORDER BY robot, {column}, axis",
             values,

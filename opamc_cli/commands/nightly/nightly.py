@@ -41,7 +41,7 @@ Cell = Annotated[Path, typer.Option("--cell", metavar="FILE", help="The cell's f
 Why = Annotated[str, typer.Option("--why", metavar="TEXT", help="Kept in the history.")]
 
 
-def _night(text: str | None) -> str | None:
+def as_night(text: str | None) -> str | None:
     """Check that a night is a date."""
     if text is None:
         return None
@@ -86,7 +86,7 @@ def run(
 
     output = Output(as_json, quiet)
     loaded = load_cell(cell)
-    wanted = stage.Wanted(_night(night), _night(since), tuple(robot) if robot else None)
+    wanted = stage.Wanted(as_night(night), as_night(since), tuple(robot) if robot else None)
     with output_lock(loaded.out), stage.open_history(loaded) as history:
         if dry_run:
             _print_plan(output, stage.plan(loaded, str(cell), history, wanted))
@@ -129,7 +129,9 @@ def _print_plan(output: Output, outcome: Any) -> None:
                 for night in todo
             ],
             "done": len(outcome.planned) - len(todo),
+            "absent": outcome.absent,
         },
+        *outcome.absent,
         *(
             f"{night.robot} {night.night}: {night.why}"
             + (", part of the baseline" if night.in_baseline else "")
@@ -181,7 +183,7 @@ def rebaseline(
     """Begin a new baseline for a robot, such as after maintenance."""
     from opamc_cli.storage.history import Declared
 
-    night = _night(begin)
+    night = as_night(begin)
     assert night is not None
 
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:

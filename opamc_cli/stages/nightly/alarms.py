@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date, timedelta
 from itertools import groupby
 from typing import Any
@@ -87,7 +87,14 @@ def settle_robot(
         events += _not_judged(joint, name, rule.remind_after)
     events += _failed(robot, nights, rule.remind_after)
     # an alarm of a baseline that has been replaced does not stand any more
-    return Settled(tuple(_last_stands(alarms, series)), tuple(standing), tuple(events))
+    left = list(_last_stands(alarms, series))
+    for index, alarm in enumerate(left):
+        night = _after_maintenance(alarm, nights, declared)
+        if night:
+            left[index] = replace(alarm, cleared=night)
+            text = f"axis {alarm.axis}: the alarm of {alarm.raised} is over, by a new baseline"
+            events.append(Event(night, robot, alarm.axis, "cleared", text))
+    return Settled(tuple(left), tuple(standing), tuple(events))
 
 
 def chart_of(rows: Sequence[Mapping[str, Any]], baseline_nights: int) -> NDArray[np.float64]:
@@ -213,6 +220,18 @@ def _last_stands(
             yield AlarmRow(**{**vars(alarm), "cleared": later[0]})
         else:
             yield alarm
+
+
+def _after_maintenance(
+    alarm: AlarmRow, nights: Sequence[NightRow], declared: Sequence[Declared]
+) -> str:
+    """Return the first night of a baseline that was declared after an alarm; empty without one."""
+    begun = [one.night for one in declared if one.kind == "rebaselined"]
+    after = [night for night in begun if night > alarm.raised]
+    if alarm.cleared is not None or not after:
+        return ""
+    # a date that is still to come, or was mistyped, silences nothing
+    return next((row.night for row in nights if row.night >= min(after)), "")
 
 
 def _not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:

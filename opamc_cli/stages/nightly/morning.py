@@ -63,7 +63,7 @@ def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: P
     names = {robot.name for robot in summary.robots}
     news = [event for event in untold if event.robot in names or event.kind == "silent"]
     failed_now = {(robot, why) for robot, _, why in outcome.failed}
-    lines: list[str] = []
+    lines = list(outcome.absent)
     for robot in summary.needing():
         fresh = {e.axis for e in news if e.robot == robot.name and e.kind in ("alarm", "reminder")}
         for joint in robot.alarms:

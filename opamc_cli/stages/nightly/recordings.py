@@ -101,7 +101,7 @@ def find_recordings(
     known = sorted({*robots, *(robot for robot, _ in history.nights())})
     for name in only or ():
         if name not in known:
-            msg = f"--robot {name}: is none of the cell's robots; it has {_some(known)}"
+            msg = f"--robot {name}: is none of the cell's robots; it has {some(known)}"
             raise InputError(msg)
     wanted = [robot for robot in robots if only is None or robot in only]
     reader = _Reader(cell, history, copies)
@@ -165,5 +165,6 @@ class _Reader:
         return self._day_starts[robot]
 
 
-def _some(names: Sequence[str], most: int = 8) -> str:
+def some(names: Sequence[str], most: int = 8) -> str:
+    """Return the first names of many."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")

@@ -14,7 +14,12 @@ from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
 from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
-from opamc_cli.stages.nightly.recordings import CellRecordings, Recording, find_recordings
+from opamc_cli.stages.nightly.recordings import (
+    CellRecordings,
+    Recording,
+    find_recordings,
+    some,
+)
 from opamc_cli.stages.nightly.settle import settle_cell
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
@@ -75,6 +80,8 @@ class CellOutcome:
         Robot and night of those that were judged or taken into a baseline.
     failed
         Robot, night and why; of nights that were judged in part as well.
+    absent
+        Sentences that say of which nights that were asked for there is no recording.
     ended
         Why the start came to an end before all was done; empty if it did not.
     robots
@@ -86,6 +93,7 @@ class CellOutcome:
     planned: list[PlannedNight] = field(default_factory=list)
     done: list[tuple[str, str]] = field(default_factory=list)
     failed: list[tuple[str, str, str]] = field(default_factory=list)
+    absent: list[str] = field(default_factory=list)
     ended: str = ""
     robots: tuple[str, ...] = ()
     summary: Summary = field(default_factory=lambda: Summary(()))
@@ -99,6 +107,7 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
+    _look_for_absent(recordings, past, wanted, outcome)
     return outcome
 
 
@@ -158,6 +167,7 @@ def run(
                 jobs_of[robot, night.night] = night
             else:
                 _record_unjudged(cell, history, night, outcome)
+    _look_for_absent(recordings, past, wanted, outcome)
     # the newest night first: it is what the morning asks for
     todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
     if todo:
@@ -176,7 +186,8 @@ def run(
     _drop_copies(cell.out / COPIES, outcome.planned)
     progress("alarms and pages")
     outcome.robots = tuple(sorted(recordings.by_robot))
-    outcome.summary = settle_cell(cell, source, history, outcome.robots)
+    whole = wanted == Wanted()
+    outcome.summary = settle_cell(cell, source, history, outcome.robots, whole=whole)
     return outcome
 
 
@@ -232,6 +243,25 @@ def _robot_plan(
         config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),
     )
     return plan_robot(robot, recordings.by_robot[robot], situation)
+
+
+def _look_for_absent(
+    recordings: CellRecordings, past: _Past, wanted: Wanted, outcome: CellOutcome
+) -> None:
+    """Say where there is nothing of what was asked for by date: it may be mistyped, or lost."""
+    if wanted.night is None and wanted.since is None:
+        return
+    what = f"of {wanted.night}" if wanted.night else f"since {wanted.since}"
+    without = [
+        robot
+        for robot, own in recordings.by_robot.items()
+        if not any(map(wanted.has, {*(one.night for one in own), *past.recorded.get(robot, ())}))
+    ]
+    # robots that rest are no news to who asks for all nights since one
+    if without and (wanted.night or len(without) == len(recordings.by_robot)):
+        outcome.absent.append(f"no recording {what} of {some(without)}")
+        night = wanted.night or wanted.since or ""
+        outcome.failed += [(robot, night, f"no recording {what}") for robot in without]
 
 
 def _job(cell: CellConfig, source: str, night: PlannedNight) -> NightJob:

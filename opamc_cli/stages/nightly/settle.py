@@ -13,7 +13,9 @@ from opamc_cli.storage.files.folders import remove_folder
 from opamc_cli.storage.history import Event, History, NightRow
 
 
-def settle_cell(cell: CellConfig, source: str, history: History, robots: Sequence[str]) -> Summary:
+def settle_cell(
+    cell: CellConfig, source: str, history: History, robots: Sequence[str], *, whole: bool = False
+) -> Summary:
     """Bring everything that follows from the nights up to date.
 
     Parameters
@@ -26,6 +28,8 @@ def settle_cell(cell: CellConfig, source: str, history: History, robots: Sequenc
         Of the cell.
     robots
         Those that were looked at.
+    whole
+        Whether all nights of all robots were: only then a night that is not known is missing.
 
     Returns
     -------
@@ -48,8 +52,8 @@ def settle_cell(cell: CellConfig, source: str, history: History, robots: Sequenc
             cell.baseline.nights or NIGHTS_AGAIN,
         )
         history.settle(robot, settled.alarms, settled.standing, settled.events)
-    named = set() if cell.robots == "auto" else set(cell.robots)
-    history.replace_missing(_missing(by_robot, {*robots, *named}))
+    if whole:
+        history.replace_missing(_missing(by_robot, set(robots)))
     _prune(cell, history)
     summary = summarise(history, robots)
     write_page(cell, history, summary)

@@ -112,6 +112,18 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     kinds = {row["kind"]: row["text"] for row in json.loads(said.out)["event"]}
     assert "gear ordered" in kinds["acknowledged"]
 
+    # a date to come ends no alarm; maintenance does, as soon as there is a night after it
+    at = ("--why", "new gear", "--cell", cell)
+    opamc("nightly", "rebaseline", "r2", "--from", "2030-01-01", *at)
+    assert states(json.loads(opamc("nightly", cell, "--json").out)["robots"])["r2"] == "known"
+    opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[4], *at)
+    ended = opamc("nightly", cell)
+    assert (ended.code, ended.out.split("\n")[0]) == (
+        ExitCode.DONE,
+        f"r2 axis 2: the alarm of {NIGHTS[3]} is over, by a new baseline",
+    )
+    assert rows(cell, "SELECT cleared FROM alarm") == [(NIGHTS[4],)]
+
     # a new gear, a new baseline: two nights are not enough for it yet
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[3], "--why", "new gear", "--cell", cell)
     after = opamc("nightly", cell, "--json")
@@ -126,6 +138,34 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
         assert opamc("history", "--cell", cell, "--out", file).code == 0
         assert file.stat().st_size
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
+
+
+def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
+    only = ("nightly", cell, "--quiet", "--robot", "r1", "--night", NIGHTS[4])
+    assert (opamc(*only).code, opamc(*only).out) == (ExitCode.DONE, "")
+    # robots that nobody has asked for so far lack no file
+    assert "no file" not in opamc("nightly", cell, "--quiet", "--night", NIGHTS[0]).out
+    shutil.rmtree(cell.parent / "logs" / "r3" / NIGHTS[1])
+    lost = opamc("nightly", cell, "--quiet", "--night", NIGHTS[1])
+    assert (lost.code, lost.out) == (ExitCode.PARTIAL, f"no recording of {NIGHTS[1]} of r3\n")
+    for option, word in (("--night", "of"), ("--since", "since")):
+        for more in ((), ("--json",)):
+            asked = opamc("nightly", cell, "--quiet", option, "2062-03-01", *more)
+            assert asked.code == ExitCode.PARTIAL
+            why = f"no recording {word} 2062-03-01"
+            if more:
+                for robot in json.loads(asked.out)["robots"].values():
+                    assert robot["failed"] == [{"night": "2062-03-01", "why": why}]
+            else:
+                assert asked.out == f"{why} of r1, r2, r3\n"
+        planned = opamc("nightly", cell, "--dry-run", option, "2062-03-01")
+        assert planned.out.startswith(f"no recording {word} 2062-03-01 of r1, r2, r3\n")
+    assert opamc("nightly", cell, "--quiet", "--since", NIGHTS[2], "--dry-run").out == ""
+
+    shown = ("history", "--cell", cell)
+    assert opamc(*shown, "--since", "yesterday").code == ExitCode.USAGE
+    assert "--robot r9: no night of it is known" in opamc(*shown, "--robot", "r9").err
+    assert opamc(*shown, "--robot", "r1", "--since", NIGHTS[0]).code == ExitCode.DONE
 
 
 @pytest.mark.long
@@ -172,7 +212,7 @@ def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc
     }
     opamc("nightly", cell, "--quiet")
     new = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()} - kept
-    assert len(new) == 2 * 3  # two axes of the one file, three stages
+    assert len(new) == 2 * 3 + 1  # two axes of the one file, three stages; its channels
 
     # what was judged stays judged when logs are cleared away
     shutil.rmtree(logs / "r1" / NIGHTS[3])
