@@ -23,7 +23,9 @@ RobotName = Annotated[str, Field(pattern=r"^[^/\\\x00-\x1f.][^/\\\x00-\x1f]*$")]
 class RobotConfig(Section):
     """What differs for one robot."""
 
-    axes: tuple[Count, ...] | None = Field(None, description="Joints that are watched; null: all.")
+    axes: Annotated[tuple[Count, ...], Field(min_length=1)] | None = Field(
+        None, description="Joints that are watched; null: all."
+    )
     set: dict[str, Any] = Field(
         {}, description="Options of the diagnosis, such as joint.pole_pairs."
     )
@@ -126,10 +128,12 @@ class CellConfig(Section):
             If a key or value is not allowed.
         """
         values: dict[str, Any] = {}
-        for options in (self.set, self._of(robot).set):
+        own = self._of(robot).set
+        where = f"{source}: robots.{robot}.set" if own else f"{source}: set"
+        for options in (self.set, own):
             for key, value in options.items():
-                _set(values, key, value, f"{source}: robots.{robot}.set")
-        return validate(Config, values, f"{source}: robots.{robot}.set")
+                _set(values, key, value, where)
+        return validate(Config, values, where)
 
     def _of(self, robot: str) -> RobotConfig:
         named: Mapping[str, RobotConfig | None] = {} if self.robots == "auto" else self.robots
@@ -155,9 +159,8 @@ def load_cell(path: Path) -> CellConfig:
             "baseline": base,
         }
     )
-    for robot in () if cell.robots == "auto" else cell.robots:
+    for robot in ("", *(() if cell.robots == "auto" else cell.robots)):
         cell.diagnosis_of(robot, str(path))
-    cell.diagnosis_of("", str(path))
     return cell
 
 

@@ -109,16 +109,17 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
     try:
         return model.model_validate(values)
     except ValidationError as error:
-        # a misspelt key is also a missing one: its spelling is what helps
-        first = min(error.errors(), key=lambda found: found["type"] != "extra_forbidden")
-        place = [_part(part) for part in first["loc"]]
+        first = min(error.errors(), key=_helps_little)
+        # pydantic names the choices of "a word or a section", which is no part of the key
+        place = [_part(p) for p in first["loc"] if not str(p).startswith(("dict[", "literal["))]
         key = ".".join(place)
         if first["type"] == "extra_forbidden":
             known = _known_keys(model, first["loc"][:-1])
             if len(place) == 1:
                 refuse_other_kind(source, values, known)
             close = difflib.get_close_matches(place[-1], known, n=1, cutoff=0.5)
-            hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
+            other = f"known: {', '.join(known)}" if known else "check its spelling"
+            hint = f"did you mean {close[0]!r}?" if close else other
             msg = f"{source}: unknown key {key!r}; {hint}"
         elif first["type"] == "value_error":
             named = f"{key}: " if key else ""
@@ -131,6 +132,12 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
                 wanted = f"it takes a list, such as {key}={_example(model, first['loc'])}"
             msg = f"{source}: {key} is {shown(first['input'])}; {wanted}"
         raise ConfigError(msg) from error
+
+
+def _helps_little(found: Mapping[str, Any]) -> tuple[bool, bool]:
+    """Sort key: a misspelt key is also a missing one, and a section is no word."""
+    word_wanted = found["type"] == "literal_error" and not isinstance(found["input"], str)
+    return found["type"] != "extra_forbidden", word_wanted
 
 
 def refuse_other_kind(source: str, values: Mapping[str, Any], known: Iterable[str]) -> None:

@@ -76,7 +76,8 @@ def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: P
         ):
             lines.append(f"{event.robot} {event.text}")
     alarms = any(robot.alarms for robot in summary.robots)
-    failed = bool(failed_now) or any(robot.broken for robot in summary.robots) or outcome.ended
+    broken = any(robot.broken for robot in summary.robots)
+    failed = failed_now or broken or outcome.absent or outcome.ended
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
     return Morning(tuple(lines), _values(summary, outcome), code)
 

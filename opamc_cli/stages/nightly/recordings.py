@@ -93,12 +93,14 @@ def find_recordings(
     """
     named = None if cell.robots == "auto" else tuple(cell.robots)
     logs = find_logs(cell.runs, named)
-    robots = sorted(named or {log.robot for log in logs})
+    judged = {robot for robot, _ in history.nights()}
+    # a robot whose logs were cleared away, or are out of reach, keeps its alarm
+    robots = sorted(named or {log.robot for log in logs} | judged)
     fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
-    if not logs and not history.nights():
+    if not logs and not judged:
         msg = f"{cell.runs}: no file fits this pattern; check `runs` of the cell's file"
         raise InputError(msg)
-    known = sorted({*robots, *(robot for robot, _ in history.nights())})
+    known = sorted({*robots, *judged})
     for name in only or ():
         if name not in known:
             msg = f"--robot {name}: is none of the cell's robots; it has {some(known)}"

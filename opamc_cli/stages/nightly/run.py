@@ -81,7 +81,7 @@ class CellOutcome:
     failed
         Robot, night and why; of nights that were judged in part as well.
     absent
-        Sentences that say of which nights that were asked for there is no recording.
+        Sentences that say of what was asked for that there is no recording of it.
     ended
         Why the start came to an end before all was done; empty if it did not.
     robots
@@ -107,7 +107,7 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
-    _look_for_absent(recordings, past, wanted, outcome)
+    _look_for_absent(cell, recordings, past, wanted, outcome)
     return outcome
 
 
@@ -167,7 +167,7 @@ def run(
                 jobs_of[robot, night.night] = night
             else:
                 _record_unjudged(cell, history, night, outcome)
-    _look_for_absent(recordings, past, wanted, outcome)
+    _look_for_absent(cell, recordings, past, wanted, outcome)
     # the newest night first: it is what the morning asks for
     todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
     if todo:
@@ -246,9 +246,19 @@ def _robot_plan(
 
 
 def _look_for_absent(
-    recordings: CellRecordings, past: _Past, wanted: Wanted, outcome: CellOutcome
+    cell: CellConfig,
+    recordings: CellRecordings,
+    past: _Past,
+    wanted: Wanted,
+    outcome: CellOutcome,
 ) -> None:
-    """Say where there is nothing of what was asked for by date: it may be mistyped, or lost."""
+    """Say where there is nothing of what was asked for: it may be mistyped, or out of reach."""
+    if not any(recordings.by_robot.values()):
+        names = "" if wanted.robots is None else f" of {some(wanted.robots)}"
+        outcome.absent.append(
+            f"{cell.runs}: no file{names} fits this pattern any more; is its folder there?"
+        )
+        return
     if wanted.night is None and wanted.since is None:
         return
     what = f"of {wanted.night}" if wanted.night else f"since {wanted.since}"

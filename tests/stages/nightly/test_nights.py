@@ -168,6 +168,27 @@ def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     assert opamc(*shown, "--robot", "r1", "--since", NIGHTS[0]).code == ExitCode.DONE
 
 
+def test_logs_out_of_reach_and_joints_that_are_not_there_are_said(cell, opamc):
+    cell.write_text(cell.read_text() + "robots: {r2: {axes: [2, 7]}}\n")
+    for night in NIGHTS[3:4]:
+        shutil.rmtree(cell.parent / "logs" / "r2" / night)
+    first = opamc("nightly", cell, "--quiet")
+    why = "axis 7 of program 'cycle' cannot be judged: recorded were axes 1 and 2 (robots.r2.axes)"
+    assert f"r2 {NIGHTS[4]}: {why}" in first.out
+    assert first.code == ExitCode.UNHEALTHY  # axis 2 is, by one gross night
+    # an alarm does not end because a disk is not mounted
+    for text in (cell.read_text(), cell.read_text().replace("robots: {r2: {axes: [2, 7]}}\n", "")):
+        cell.write_text(text)
+        (cell.parent / "logs").rename(cell.parent / "unmounted")
+        for _ in range(2):
+            lost = opamc("nightly", cell, "--quiet")
+            assert lost.code == ExitCode.UNHEALTHY
+            assert "no file fits this pattern any more; is its folder there?" in lost.out
+        (cell.parent / "unmounted").rename(cell.parent / "logs")
+    cell.write_text(cell.read_text() + "robots: {r2: {axes: []}}\n")
+    assert "robots.r2.axes" in opamc("nightly", cell).err
+
+
 @pytest.mark.long
 def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r1: {}, r3: {axes: [1]}, r4: {}}\n")

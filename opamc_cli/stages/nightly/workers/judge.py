@@ -20,6 +20,7 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramJob,
     ProgramResult,
 )
+from opamc_cli.stages.report.wording import axes_phrase
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
 from opamc_cli.storage.schemas import files
@@ -97,6 +98,14 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
     except (InputError, NotEnoughDataError) as error:
         # the recordings' own fault: it would fail again; all other errors are the caller's
         return ProgramResult(wanted.program, failures=(_plain(str(error), folder),))
+    there = [entry["axis"] for entry in outcome.verdict["axes"]]
+    lacking = [axis for axis in job.axes or () if axis not in there]
+    failures = [_plain(str(error), folder) for error in outcome.errors]
+    if lacking:
+        failures.append(
+            f"{axes_phrase(lacking)} of program {wanted.program!r} cannot be judged: recorded "
+            f"were {axes_phrase(there)} (robots.{job.robot}.axes)"
+        )
     axes = tuple(
         _axis(entry, temperatures.get(entry["axis"]))
         for entry in outcome.verdict["axes"]
@@ -106,7 +115,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
         wanted.program,
         axes,
         written,
-        tuple(_plain(str(error), folder) for error in outcome.errors),
+        tuple(failures),
         tuple(_plain(note, folder) for note in outcome.notes),
     )
 
