@@ -73,4 +73,4 @@ def made_once(tmp_path_factory: pytest.TempPathFactory) -> Made:
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Leave the figures out of reports, five sixths of a short diagnosis, where nobody looks."""
     for section in ("EVIDENCE", "LOOP"):
-        monkeypatch.setattr(f"opamc_cli.stages.report.assemble.{section}", ())
+        monkeypatch.setattr(f"opamc_cli.stages.report.figures.shown.{section}", ())

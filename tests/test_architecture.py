@@ -93,8 +93,8 @@ def test_a_witness_is_added(tmp_path):
             (folder / role / path.name).symlink_to(path)
     code = (
         "from opamc_cli import diagnose, read_table\n"
-        "from opamc_cli.stages.report import assemble\n"
-        "assemble.EVIDENCE = ()\n"
+        "from opamc_cli.stages.report.figures import shown\n"
+        "shown.EVIDENCE = ()\n"
         "found = diagnose('normal', 'fault', settings={'joint.explain': False})\n"
         "import json; print(json.dumps([axis['witnesses'] for axis in found.verdict['axes']]))\n"
         "assert read_table('opamc-out/target/peaks.parquet').table.num_rows\n"
