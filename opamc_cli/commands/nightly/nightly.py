@@ -104,7 +104,7 @@ def run(
             output.failure(outcome.ended)
         page = loaded.out / files.PAGE
         output.result(
-            {**morning.values, "page": str(page)},
+            {**morning.values, "absent": outcome.absent, "page": str(page)},
             *morning.lines,
             *([] if quiet and morning.lines else [f"{summary.headline()}; {page}"]),
             urgent=bool(morning.lines),

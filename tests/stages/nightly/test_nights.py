@@ -154,6 +154,7 @@ def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
             assert asked.code == ExitCode.PARTIAL
             why = f"no recording {word} 2062-03-01"
             if more:
+                assert json.loads(asked.out)["absent"] == [f"{why} of r1, r2, r3"]
                 for robot in json.loads(asked.out)["robots"].values():
                     assert robot["failed"] == [{"night": "2062-03-01", "why": why}]
             else:
