@@ -63,6 +63,9 @@ def _run(given: list[str]) -> None:
         if not argument.isprintable() and any("\ud800" <= c <= "\udfff" for c in argument):
             msg = f"{argument!r}: is not UTF-8; rename the file or write the option in UTF-8"
             raise UsageError(msg)
+    if "" in given:
+        msg = "an argument is empty, as of a variable that is not set; name a file or leave it out"
+        raise UsageError(msg)
     from opamc_cli.commands.command_line import run
 
     sys.exit(run(given))

@@ -465,10 +465,11 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     -------
     float
         Median over the siblings, the lower one of an even number, as a log ratio, or in units of
-        each joint's own spread if that is more; 0 if negative or with fewer than two siblings.
+        each joint's own spread if that is more; 0 if negative, with fewer than two siblings, or
+        if the joint itself was not compared.
     """
     others = [shift for key, shift in shifts.items() if key != axis]
-    if len(others) < 2:
+    if axis not in shifts or len(others) < 2:
         return 0.0
     # of two siblings the one that moved less: else one that fails would excuse the others
     share = 1.0 if largest else 0.5

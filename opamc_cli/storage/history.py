@@ -335,8 +335,9 @@ class History:
     def _errors(self) -> Iterator[None]:
         try:
             yield
-        except sqlite3.DatabaseError as error:
-            if "not a database" in str(error) or "malformed" in str(error):
+        except (sqlite3.DatabaseError, UnicodeDecodeError) as error:
+            # of a damaged file even the name of what is wrong may be no text
+            if any(word in str(error) for word in ("not a database", "malformed", "decode")):
                 msg = f"{self.path}: is no history of opamc ({error}); move it away"
                 raise InputError(msg) from error
             msg = f"{self.path}: cannot be written or read ({error}); check space and permissions"

@@ -25,7 +25,7 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
-from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, MOST_HZ, PHASES
+from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, MOST_HZ, NEARLY_COLUMN, PHASES
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
@@ -41,6 +41,9 @@ MOST_GROUP_SAMPLES = 1 << 24
 """Rows of a row group, which is decoded at once: two hours at 2048 Hz."""
 
 MOST_AXES = 999
+
+LARGEST_SAMPLE = 1e9
+"""More is no measurement in whatever unit; the fourth power of this is still a float32."""
 
 Array = npt.NDArray[Any]
 
@@ -237,7 +240,7 @@ class Run:
                 batch = next(batches, None)
             if batch is None:
                 return
-            yield start, {name: _to_numpy(batch.column(name)) for name in columns}
+            yield start, {name: _to_numpy(name, batch.column(name)) for name in columns}
             start += batch.num_rows
 
     def _group(self, group: int, columns: Sequence[str]) -> dict[str, Array]:
@@ -250,7 +253,7 @@ class Run:
         if missing:
             table = self._read_groups([group], missing)
             for name in missing:
-                self._recent[group, name] = _to_numpy(table.column(name))
+                self._recent[group, name] = _to_numpy(name, table.column(name))
         found = {name: self._recent[group, name] for name in columns}
         kept = max(RECENT_GROUPS * len(columns), len(columns))
         while len(self._recent) > kept:
@@ -503,6 +506,7 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     for field in schema:
         match = COLUMN.fullmatch(field.name)
         if match is None and field.name != "time_s":
+            _refuse_misspelt(path, field.name, schema.names)
             continue
         if not (pa.types.is_floating(field.type) or pa.types.is_integer(field.type)):
             msg = f"{path}: column {field.name} has type {field.type}; it must hold numbers"
@@ -527,16 +531,29 @@ def _axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     return channels
 
 
-def _to_numpy(column: pa.ChunkedArray | pa.Array) -> Array:
+def _refuse_misspelt(path: Path, name: str, names: Sequence[str]) -> None:
+    """Refuse a column that is nearly an axis's: an axis left out on both sides is never missed."""
+    match = NEARLY_COLUMN.fullmatch(name)
+    meant = match and f"axis{match[1]}_{match[2].lower()}"
+    if meant and meant not in names:
+        msg = f"{path}: column {shown(name)}: is it {meant}? Rename it"
+        raise InputError(msg)
+
+
+def _to_numpy(name: str, column: pa.ChunkedArray | pa.Array) -> Array:
     if pa.types.is_integer(column.type):
-        column = column.cast(pa.float64())
+        column = column.cast(pa.float64(), safe=False)
     if isinstance(column, pa.Array):
         values = np.asarray(column.to_numpy(zero_copy_only=False))
     else:
         values = np.asarray(column.to_numpy())
+    if values.dtype == np.float16:
+        values = values.astype(np.float32)
+    if name == "time_s":
+        return values
     # an infinite current is no measurement, and one of them spoils every mean and transform
-    infinite = np.isinf(values)
-    return np.where(infinite, np.float32(np.nan), values) if infinite.any() else values
+    beyond = np.abs(values) > LARGEST_SAMPLE
+    return np.where(beyond, np.float32(np.nan), values) if beyond.any() else values
 
 
 def _join(pieces: list[Array]) -> Array:

@@ -23,7 +23,7 @@ from pydantic import ConfigDict, Field, field_validator
 
 from opamc_cli import __version__
 from opamc_cli.config.models import Config, digest
-from opamc_cli.errors import InputError
+from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import LARGEST, Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, read_whole
@@ -61,6 +61,11 @@ def write_table(
         (path, SHA-256) of every file that was read.
     extra
         Further JSON for the same metadata key, such as a fitted reference.
+
+    Raises
+    ------
+    UsageError
+        If a file that is no stage table would be replaced, or it cannot be written.
     """
     record = {
         "stage": stage,
@@ -74,6 +79,7 @@ def write_table(
         **(extra or {}),
     }
     metadata = {TABLE_KEY: json.dumps(record, sort_keys=True).encode()}
+    _refuse_to_replace_others(published(path))
     with atomic_path(path) as temporary:
         pq.write_table(
             table.replace_schema_metadata(metadata),
@@ -81,6 +87,19 @@ def write_table(
             compression="zstd",
             write_page_checksum=True,
         )
+
+
+def _refuse_to_replace_others(path: Path) -> None:
+    """Refuse to write over a recording that happens to have a table's name."""
+    if not path.is_file():
+        return
+    try:
+        metadata = read_schema(path, "").metadata or {}
+    except InputError:
+        return  # a table that was damaged
+    if TABLE_KEY not in metadata:
+        msg = f"{path}: is no table of opamc and would be replaced; choose another --out"
+        raise UsageError(msg)
 
 
 def read_table(path: Path, stage: str, schema: pa.Schema | None = None) -> pa.Table:

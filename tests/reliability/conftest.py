@@ -1,11 +1,28 @@
 """The recordings that the tests of this folder share."""
 
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from fuzz import ALONE
 from fuzz import call as called
 from recordings import record
+
+
+@pytest.fixture
+def in_time() -> Iterator[None]:
+    """Fail a test that waits for ever, as the shell's user would."""
+
+    def late(*_: object) -> None:
+        msg = "not ended after 60 s"
+        raise TimeoutError(msg)
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(60)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 @pytest.fixture(scope="session")

@@ -49,10 +49,20 @@ ssize_t write(int fd, const void *data, size_t size) {
     REAL(write);
     return fd >= 0 && fd < MOST && ours[fd] && fails() ? -1 : real(fd, data, size);
 }
-int fsync(int fd) {
-    REAL(fsync);
-    return fd >= 0 && fd < MOST && ours[fd] && fails() ? -1 : real(fd);
-}
+#define PLACED(name, offset)                                                         \
+    ssize_t name(int fd, const void *data, size_t size, offset at) {                 \
+        REAL(name);                                                                  \
+        return fd >= 0 && fd < MOST && ours[fd] && fails() ? -1 : real(fd, data, size, at); \
+    }
+PLACED(pwrite, off_t) /* as SQLite writes */
+PLACED(pwrite64, off64_t)
+#define FLUSH(name)                                                                  \
+    int name(int fd) {                                                               \
+        REAL(name);                                                                  \
+        return fd >= 0 && fd < MOST && ours[fd] && fails() ? -1 : real(fd);          \
+    }
+FLUSH(fsync)
+FLUSH(fdatasync)
 int close(int fd) {
     REAL(close);
     int failing = fd >= 0 && fd < MOST && ours[fd] && fails(), number = errno;

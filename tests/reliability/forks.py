@@ -5,6 +5,7 @@ the same time tries fifty times as many kills and failing calls. The parent must
 runs there (threads of a library) would be missing in the forks.
 """
 
+import faulthandler
 import importlib
 import os
 import pkgutil
@@ -90,6 +91,7 @@ class Fork:
             # workers start as those of the command do, not as those of this script
             sys.modules["__main__"] = types.ModuleType("__main__")
             os.environ.update(environment)
+            faulthandler.enable(sys.stderr)
             if callable(what):
                 what()
             else:

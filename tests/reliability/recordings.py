@@ -39,11 +39,38 @@ def columns(seed: int, cycles: int = 3) -> Columns:
     return {name: values[:shortest] for name, values in found.items()}
 
 
+def reported(seed: int, cycles: int = 3) -> Columns:
+    """Return what a drive reports of the same cycles: current with its sign, position and speed."""
+    found: Columns = {}
+    for axis, motions in MOTIONS.items():
+        rng = np.random.default_rng([seed, axis, 1])
+        speed = [np.zeros(int(REST_S * RATE_HZ))]
+        for _ in range(cycles):
+            for carrier_hz, duration_s, sense in motions:
+                n = int(duration_s * RATE_HZ)
+                ramp = np.clip(np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.15 * n), 0, 1)
+                # a joint comes back
+                speed += [sense * carrier_hz / duration_s * ramp, np.zeros(int(REST_S * RATE_HZ))]
+        velocity = np.concatenate(speed) / 40
+        n = len(velocity)
+        load = np.convolve(rng.normal(size=n), np.ones(9) / 9, "same")
+        current = 2 * np.sign(velocity) + velocity + 0.3 * load + 0.02 * rng.normal(size=n)
+        found[f"axis{axis}_current"] = current.astype(np.float32)
+        found[f"axis{axis}_position"] = np.cumsum(velocity) / RATE_HZ
+        found[f"axis{axis}_velocity"] = velocity.astype(np.float32)
+    shortest = min(map(len, found.values()))
+    return {name: values[:shortest] for name, values in found.items()}
+
+
 def record(
-    path: Path, seed: int, alter: Callable[[Columns], object] = lambda _: None, **info: object
+    path: Path,
+    seed: int,
+    alter: Callable[[Columns], object] = lambda _: None,
+    made: Callable[[int], Columns] = columns,
+    **info: object,
 ) -> Path:
     """Write one recording, altered in place if that is asked for."""
-    found = columns(seed)
+    found = made(seed)
     alter(found)
     path.parent.mkdir(parents=True, exist_ok=True)
     info = {"started_at": f"2026-03-{seed + 1:02d}T02:00:00+00:00", **info}

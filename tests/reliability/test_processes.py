@@ -199,6 +199,7 @@ def endless(request, tmp_path):
     ],
     ids=lambda arguments: " ".join(arguments[:2]),
 )
+@pytest.mark.usefixtures("in_time")
 def test_only_regular_files_are_read(opamc, tmp_path, monkeypatch, endless, arguments):
     monkeypatch.chdir(ROOT)
     given = [a.replace("{}", str(endless)) for a in arguments]
@@ -210,6 +211,7 @@ def test_only_regular_files_are_read(opamc, tmp_path, monkeypatch, endless, argu
     assert str(endless) in sentence
 
 
+@pytest.mark.usefixtures("in_time")
 def test_a_pipe_among_the_runs_of_a_folder(opamc, tmp_path, tonight):
     folder = tmp_path / "runs"
     folder.mkdir()
@@ -220,6 +222,7 @@ def test_a_pipe_among_the_runs_of_a_folder(opamc, tmp_path, tonight):
     assert "pipe.parquet: cannot be read, it is a named pipe" in ended.err
 
 
+@pytest.mark.usefixtures("in_time")
 @pytest.mark.parametrize("name", ["verdict.json", "scores.parquet", "findings.json"])
 def test_a_pipe_in_an_output_folder(opamc, tmp_path, name):
     os.mkfifo(tmp_path / name)

@@ -113,6 +113,83 @@ def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     assert [axis["state"] for axis in states] == ["healthy", "healthy"]
 
 
+def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):
+    """Three joints have siblings to be held against, two have not."""
+    monkeypatch.setitem(recordings.MOTIONS, 3, ((48.0, 1.1, 1), (70.0, 1.2, -1)))
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed)
+    target = record(tmp_path / "tonight.parquet", 9, gone)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA, ended.err
+    assert "xis 2 not judged" in ended.out
+
+
+# -- what a drive reports ----------------------------------------------------------------------
+
+
+def half(columns):
+    return len(columns["axis2_current"]) // 2
+
+
+def turned(columns):
+    columns["axis2_current"] *= -1
+
+
+def signless(columns):
+    columns["axis2_current"] = np.abs(columns["axis2_current"])
+
+
+def current_stands(columns):
+    columns["axis2_current"][half(columns) :] = columns["axis2_current"][half(columns)]
+
+
+def position_stands(columns):
+    columns["axis2_position"][half(columns) :] = columns["axis2_position"][half(columns)]
+
+
+def position_missing(columns):
+    columns["axis2_position"] *= np.nan
+
+
+def position_constant(columns):
+    columns["axis2_position"][:] = 1.0
+
+
+REPORTED = {
+    turned: "is the sign of the current or of the position inverted?",
+    signless: "the current of axis 2 has lost its sign",
+    current_stands: "axis2_current keeps one value from",
+    position_stands: "axis2_position keeps one value from",
+    position_missing: "the position of axis 2 never changes or is missing",
+    position_constant: "axis2_position keeps one value from 0 s",
+}
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [one if one in (turned, position_stands) else long(one) for one in REPORTED],
+    ids=lambda wrong: wrong.__name__,
+)
+def test_a_reported_joint_that_cannot_be_judged(opamc, tmp_path, wrong):
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
+    target = record(tmp_path / "tonight.parquet", 9, wrong, made=recordings.reported)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA, ended.err
+    first, second = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert first["state"] == "healthy"
+    assert second["state"] == "insufficient-data"
+    assert REPORTED[wrong] in " ".join(second["reasons"])
+
+
+def test_reported_joints_that_are_healthy(opamc, tmp_path):
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
+    target = record(tmp_path / "tonight.parquet", 9, made=recordings.reported)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert (ended.code, ended.out, ended.err) == (ExitCode.DONE, "", "")
+
+
 def test_a_target_of_which_nothing_can_be_judged(opamc, baseline, tmp_path):
     def every_axis(columns):
         for name in columns:
@@ -153,7 +230,7 @@ def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path
     assert ended.code == ExitCode.NOT_ENOUGH_DATA
     axes = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
     assert [axis["state"] for axis in axes] == ["insufficient-data"] * 4
-    assert all("so do the other joints" in " ".join(axis["reasons"]) for axis in axes)
+    assert all("other joints lie as far" in " ".join(axis["reasons"]) for axis in axes)
 
 
 @pytest.mark.long
@@ -198,6 +275,36 @@ def test_joints_exchanged_with_one_another_fit_nothing(opamc, baseline, tmp_path
     ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
     assert ended.code == ExitCode.NOT_ENOUGH_DATA
     assert "no axis can be judged" in ended.sentences[0]
+
+
+@pytest.mark.parametrize("made", [recordings.columns, long(recordings.reported)])
+def test_joints_in_step_that_are_exchanged_are_known_by_their_size(
+    opamc, tmp_path, monkeypatch, made
+):
+    """Both make the same motions, so that each fits the other's; one draws twice the current."""
+    monkeypatch.setitem(recordings.MOTIONS, 2, recordings.MOTIONS[1])
+
+    def as_recorded(columns):
+        for name in columns:
+            if name.startswith("axis2") and not name.endswith(("position", "velocity")):
+                columns[name] *= np.float32(2)
+
+    def exchange(columns):
+        as_recorded(columns)
+        ours = {name: columns[name] for name in columns if name.startswith("axis1")}
+        for name, values in ours.items():
+            other = name.replace("axis1", "axis2")
+            columns[name], columns[other] = columns[other], values
+
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, as_recorded, made)
+    arguments = (tmp_path / "baseline", tmp_path / "tonight.parquet", tmp_path / "out", "--quiet")
+    record(tmp_path / "tonight.parquet", 9, as_recorded, made)
+    assert diagnose(opamc, *arguments).code == ExitCode.DONE
+    record(tmp_path / "tonight.parquet", 9, exchange, made)
+    ended = diagnose(opamc, *arguments)
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "are the two exchanged?" in ended.err
 
 
 @pytest.mark.long

@@ -78,6 +78,18 @@ def test_a_history_whose_tables_were_changed(tmp_path):
         History(path)
 
 
+@pytest.mark.parametrize("of", [b"CREATE TABLE night", b"verdict", b"2026-03-01"])
+def test_a_history_whose_bytes_are_no_text(tmp_path, of):
+    path = tmp_path / "history.sqlite"
+    with History(path) as history:
+        history.record_night(NightRow("r1", "2026-03-01", "{}", "done"))
+    content = path.read_bytes()
+    assert of in content
+    path.write_bytes(content.replace(of, b"\xff" * len(of)))
+    with pytest.raises(InputError, match="history"), History(path) as history:
+        history.nights()
+
+
 def test_names_that_are_no_text(opamc, tmp_path, tonight):
     name = os.fsdecode(b"\xff.parquet")
     (tmp_path / "runs").mkdir()

@@ -71,6 +71,10 @@ def simulate(
         outcome = stage.run(
             testbed, seed, staged, truth_signals=truth_signals, jobs=jobs, watch=steps("simulate")
         )
+    named = {entry["run"] for entry in outcome.results}
+    others = sorted(path.name for path in out.glob("session-*.parquet") if path.name not in named)
+    if others:
+        output.note(f"{out}: {others[0]} and the like ({len(others)}) are not of this simulation")
     rate = testbed.recording.sampling_rate_hz
     output.result(
         {

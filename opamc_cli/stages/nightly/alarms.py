@@ -4,7 +4,7 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import date, timedelta
+from datetime import date
 from itertools import groupby
 from typing import Any
 
@@ -263,7 +263,7 @@ def _reminders(nights: Sequence[str], remind_after: int) -> list[str]:
     """Return the nights in which something that began with the first is said again."""
     said = [nights[0]]
     for night in nights[1:]:
-        if date.fromisoformat(night) >= date.fromisoformat(said[-1]) + timedelta(remind_after):
+        if _day(night) - _day(said[-1]) >= remind_after:
             said.append(night)
     return said[1:]
 

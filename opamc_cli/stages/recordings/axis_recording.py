@@ -3,14 +3,15 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from datetime import datetime
 from typing import Any
 
 import numpy as np
 
+from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
 from opamc_cli.signal.motion.reported import lacks_sign, signed_by_speed, velocity_from_position
+from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs import Array, Run
 from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
 
@@ -142,11 +143,11 @@ def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | 
 def _seconds(run: Run) -> float | None:
     if run.info.started_at is None:
         return None
-    try:
-        return datetime.fromisoformat(run.info.started_at).timestamp()
-    except ValueError as error:
+    time = started(run.info.started_at)
+    if time is None:
         msg = (
-            f"{run.path}: started_at is {run.info.started_at!r}, an ISO 8601 time is needed; "
+            f"{run.path}: started_at is {shown(run.info.started_at)}, an ISO 8601 time is needed; "
             "correct it or leave it out"
         )
-        raise InputError(msg) from error
+        raise InputError(msg)
+    return time.timestamp()

@@ -13,6 +13,7 @@ from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError, OpamcError, UsageError
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.lock import output_lock
+from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.ingest.convert import convert
 from opamc_cli.storage.ingest.map.map_file import (
     ColumnMap,
@@ -29,7 +30,14 @@ from opamc_cli.storage.ingest.source import Array, Block, Name, Selection, Sourc
 from opamc_cli.storage.ingest.time.dates import utc_text
 from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, file_sha256, write_run
+from opamc_cli.storage.runs import (
+    METADATA_KEY,
+    ROW_GROUP_SAMPLES,
+    Run,
+    RunInfo,
+    file_sha256,
+    write_run,
+)
 from opamc_cli.storage.schemas.channels import quantity_of
 
 _TIME = "time"
@@ -175,11 +183,14 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         sha256 = _source_sha256(path)
         replaced = task.run.exists()
         if replaced:
-            with suppress(OpamcError), Run(task.run) as old:
-                known = (old.info.source_sha256, old.info.map_sha256)
-                if known == (sha256, map_digest(task.channels)):
+            known = _made_from(task.run)
+            if known is None:
+                msg = f"{task.run}: was not made by ingest and would be replaced; use another --out"
+                raise InputError(msg)
+            if known == (sha256, map_digest(task.channels)):
+                with Run(task.run) as old:
                     rate, n = old.sampling_rate_hz, old.n_samples
-                    return Ingested(task.source, task.run, rate, n, {}, None, skipped=True)
+                return Ingested(task.source, task.run, rate, n, {}, None, skipped=True)
         channels = for_axes(task.channels, source.channels)
         declared = _declared_rate(path, source, channels)
         selections = {
@@ -208,6 +219,20 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
     )
+
+
+def _made_from(path: Path) -> tuple[str | None, str | None] | None:
+    """Return the hashes of what a run was made from and by; None if it is of somebody else."""
+    try:
+        metadata = read_schema(path, "").metadata or {}
+    except InputError:
+        return "", ""  # a run that was damaged is made again
+    if METADATA_KEY not in metadata:
+        return None
+    with suppress(OpamcError), Run(path) as old:
+        found = (old.info.source_sha256, old.info.map_sha256)
+        return found if found[0] else None
+    return "", ""
 
 
 def _label(column: ColumnMap, labels: Mapping[Name, Sequence[str]]) -> Name:

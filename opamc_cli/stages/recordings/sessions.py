@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, date, datetime, timedelta
+from datetime import MAXYEAR, MINYEAR, UTC, date, datetime, timedelta
 
 from opamc_cli.storage.sources import RunSource
 
@@ -86,6 +86,8 @@ def night_of(started_at: str | None, day_starts_at_h: float) -> date | None:
 def started(text: str | None) -> datetime | None:
     """Return the time that ISO 8601 text states, UTC where it names no zone; None if it does not.
 
+    A clock that was never set is none: a year without neighbours has no night before or after it.
+
     A zone other than UTC is turned into it, so that a night does not depend on how it was written.
     """
     if not text:
@@ -93,6 +95,8 @@ def started(text: str | None) -> datetime | None:
     try:
         time = datetime.fromisoformat(text)
     except ValueError:
+        return None
+    if not MINYEAR < time.year < MAXYEAR:
         return None
     return time.replace(tzinfo=UTC) if time.tzinfo is None else time.astimezone(UTC)
 

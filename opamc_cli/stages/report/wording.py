@@ -2,9 +2,9 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any
 
+from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.stages.verdict.reasons import CHECK_FIRST, FOUND, INSPECT, lies_outside
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
@@ -199,13 +199,8 @@ def said_elsewhere(entry: Mapping[str, Any]) -> set[str]:
 
 def moment(iso: str) -> str:
     """Return an ISO 8601 time as "2026-03-10 06:00 UTC", or as it is if it is not one."""
-    try:
-        parsed = datetime.fromisoformat(iso)
-    except ValueError:
-        return iso
-    if parsed.tzinfo is None:
-        return f"{parsed:%Y-%m-%d %H:%M}"
-    return f"{parsed.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+    time = started(iso)
+    return iso if time is None else f"{time:%Y-%m-%d %H:%M} UTC"
 
 
 def cause_phrase(cause: Mapping[str, Any] | None) -> str:

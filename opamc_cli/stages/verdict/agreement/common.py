@@ -11,13 +11,22 @@ by more (a wrong unit, another controller, a changed logger) hides any fault."""
 
 def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
     """Return the axes that are called healthy though far from the baseline, with the reason."""
+    far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
     return {
         entry["axis"]: (
             f"It lies {entry['health_index']:.3g} of the baseline's own spreads from the baseline, "
-            "and so do the other joints: what moves all of them so far is no fault of one, but "
-            "would hide it; check unit, sensors, program, payload and speed, and record again, or "
-            "record a new baseline.",
+            + (_COMMON if len(far) > 1 else _ALONE),
         )
         for entry in verdict["axes"]
-        if entry["state"] == "healthy" and (entry["health_index"] or 0.0) > FAR
+        if entry["state"] == "healthy" and entry["axis"] in far
     }
+
+
+_COMMON = (
+    "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
+    "check unit, sensors, program, payload and speed, and record again, or record a new baseline."
+)
+_ALONE = (
+    "too far to be called healthy, though what was compared does not suffice to call it changed; "
+    "check its sensor, and record again, or more for the baseline."
+)

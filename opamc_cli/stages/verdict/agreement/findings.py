@@ -1,8 +1,10 @@
 """Why an axis of a run cannot be compared with the baseline, rule by rule."""
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 from statistics import median_low
 
 import numpy as np
@@ -13,12 +15,23 @@ LARGEST_RATIO = 20.0
 """Of the current's size to the baseline's: a healthy joint's load, warmth and wear change it by
 some tens of per cent, a seized gear by a few times; wrong units by 1000 (mA) or 57 (degrees)."""
 
+ALIKE, UNLIKE = 1.2, 1.5
+"""Two joints are exchanged if every channel of each is within 20 % of the other's size in the
+baseline and one is 50 % away from its own: no fault makes two joints each the other."""
+
 LARGEST_IMBALANCE = 0.5
 """Of the phases' sum to the phases: 0 for a motor without neutral, 1.15 with one phase inverted,
 0.82 with one dead; sensors of equal make leave some per cent."""
 
 DEAD_SHARE = 0.1
 """Of the baseline's current in motion: noise alone is less than that (0.4 % in the samples)."""
+
+TURNED = 0.2
+"""Share of a current that has the sign of the speed: friction makes it positive, a load between
+nothing and some of it; less tells no direction."""
+
+REVERSING = 0.1
+"""Share of the samples with the rarer sign, from which on a current that has none lost it."""
 
 CLIPPED_SHARE = 0.01
 """Of the samples, beyond the baseline's: from here the clipped crests are patterns of their own."""
@@ -52,6 +65,8 @@ class Reference:
     size: Mapping[tuple[int, str], float]
     imbalance: Mapping[int, float]
     clipped: Mapping[int, float]
+    leaning: Mapping[int, float]
+    reversing: Mapping[int, float]
 
 
 def reference_of(baseline: Sequence[Measured]) -> Reference:
@@ -72,6 +87,8 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         },
         {axis: _middle([own.imbalance for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([_most_clipped(own)[1] for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
     )
 
 
@@ -89,7 +106,34 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
                 found.append(Finding(own.run, own.axis, why))
             elif not own.moves:
                 found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
+    known = {(finding.run, finding.axis) for finding in found}
+    left = [own for own in measured if own.moves and (own.run, own.axis) not in known]
+    return found + _exchanged(left, reference)
+
+
+def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
+    """Find pairs of joints of a run whose sizes are each the other's."""
+    found = []
+    for one, other in combinations(measured, 2):
+        if one.run != other.run:
+            continue
+        own = min(_away(each, each.axis, reference) for each in (one, other))
+        across = max(_away(one, other.axis, reference), _away(other, one.axis, reference))
+        if across <= math.log(ALIKE) and own >= math.log(UNLIKE):
+            why = (
+                f"axes {one.axis} and {other.axis} each look like the other: are the two exchanged?"
+            )
+            found += [Finding(each.run, each.axis, why) for each in (one, other)]
     return found
+
+
+def _away(own: Measured, axis: int, reference: Reference) -> float:
+    """Return by how much, as a logarithm, the sizes of an axis are not those of one's baseline."""
+    usual = {kind: reference.size.get((axis, kind), 0.0) for kind in own.size}
+    pairs = [(own.size[kind], usual[kind]) for kind in usual]
+    if not all(size > 0 and known > 0 for size, known in pairs):
+        return math.inf if axis != own.axis else 0.0
+    return max(abs(math.log(size / known)) for size, known in pairs)
 
 
 def _other_signal(own: Measured, reference: Reference) -> str | None:
@@ -106,7 +150,8 @@ def _frozen(own: Measured, _: Reference) -> str | None:
     if own.frozen is None:
         return None
     name, second = own.frozen
-    return f"{name} keeps one value from {second:.4g} s on while another phase swings; check it"
+    other = "another phase swings" if len(own.signal) == 3 else "the joint moves"
+    return f"{name} keeps one value from {second:.4g} s on while {other}; check it"
 
 
 def _other_unit(own: Measured, reference: Reference) -> str | None:
@@ -115,6 +160,10 @@ def _other_unit(own: Measured, reference: Reference) -> str | None:
         if usual is None or (usual == 0 and size == 0):
             continue
         if not usual / LARGEST_RATIO <= size <= usual * LARGEST_RATIO:
+            if size == 0:
+                return (
+                    f"the {kind} of axis {own.axis} never changes or is missing; check its sensor"
+                )
             times = f"{size / usual:.3g}" if usual > 0 else "infinitely many"
             unit = {"current": "mA for A", "position": "degrees", "velocity": "degrees or rpm"}
             return (
@@ -153,11 +202,26 @@ def _clipped(own: Measured, reference: Reference) -> str | None:
     return f"{name} is clipped in {share:.1%} of the motion; check the sensor's range"
 
 
+def _other_sign(own: Measured, reference: Reference) -> str | None:
+    usual = reference.leaning[own.axis], reference.reversing[own.axis]
+    if own.leaning is None or own.reversing is None:
+        return None
+    if own.reversing == 0 and usual[1] >= REVERSING:
+        return f"the current of axis {own.axis} has lost its sign; log it with its sign"
+    if own.leaning * usual[0] < 0 and min(abs(own.leaning), abs(usual[0])) >= TURNED:
+        return (
+            f"the current of axis {own.axis} drives against the motion where the baseline's drives "
+            "it: is the sign of the current or of the position inverted?"
+        )
+    return None
+
+
 RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_signal,
     _frozen,
     _other_unit,
     _unbalanced,
+    _other_sign,
     _clipped,
 )
 """In the order in which they are asked."""

@@ -50,6 +50,11 @@ class Measured:
         Share of clipped samples by column.
     frozen
         Column that keeps one value while another swings, and from when on in seconds, or None.
+    leaning
+        Of a reported current: share of it that has the sign of the speed, less what has the other;
+        None without one.
+    reversing
+        Of a reported current: share of the samples that have the rarer of both signs.
     """
 
     run: str
@@ -61,6 +66,8 @@ class Measured:
     imbalance: float | None
     clipped: Mapping[str, float]
     frozen: tuple[str, float] | None
+    leaning: float | None = None
+    reversing: float | None = None
 
 
 @dataclass(frozen=True)
@@ -125,6 +132,7 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         for start, stop in stretches
     ]
     currents = [name for name in signal if name not in motion]
+    motion_told = currents == [channels.current] and bool(motion)
     kinds = {"current": currents, "position": channels.position, "velocity": channels.velocity}
     return {
         "axis": axis,
@@ -139,7 +147,8 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         "clipped": {
             name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents
         },
-        "frozen": _frozen(run, currents),
+        "frozen": _frozen(run, currents, motion, looks, [start for start, _ in stretches] if spans else []),
+        **(_signs(looks, currents[0], motion[0], run.sampling_rate_hz) if motion_told else {}),
     }
 
 
@@ -158,22 +167,59 @@ def _imbalance(looks: Sequence[Mapping[str, Floats]], names: Sequence[str]) -> f
     return _rms([np.sum(phases, axis=0) for phases in own]) / size if size > 0 else None
 
 
-def _frozen(run: Run, names: Sequence[str]) -> tuple[str, float] | None:
-    """Look for a stretch in which one phase keeps its value while another swings."""
-    if len(names) < 2:
-        return None  # nothing tells a frozen current from a joint that rests
+def _frozen(
+    run: Run,
+    currents: Sequence[str],
+    motion: Sequence[str],
+    looks: Sequence[Mapping[str, Floats]],
+    starts: Sequence[int],
+) -> tuple[str, float] | None:
+    """Look for a channel that keeps its value while what belongs to it swings."""
+    found = _still_beside(run, currents, currents) if len(currents) > 1 else []
+    if len(motion) == 2:
+        # a speed keeps its value while a joint turns evenly, a position does not
+        found += _still_beside(run, motion, motion[:1])
+    if len(currents) == 1 and motion:
+        # nothing tells a frozen current from a joint that rests, but through a motion none rests
+        name = currents[0]
+        found += [
+            (start, name)
+            for start, look in zip(starts, looks, strict=False)
+            if np.isfinite(look[name]).any() and not _swing(look[name])
+        ]
+    return (min(found)[1], min(found)[0] / run.sampling_rate_hz) if found else None
+
+
+def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> list[tuple[int, str]]:
+    """Return where suspects keep their value while another of the channels swings."""
     least = max(int(FROZEN_S * run.sampling_rate_hz), 2)
+    measure = [name for name in names if name not in suspects] or names
     swing = 0.0
     found: list[tuple[str, int, float]] = []
     for start, block in run.blocks(names):
-        values = {name: block[name] for name in names}
-        swing = max(swing, *(_swing(each) for each in values.values()))
-        for name, each in values.items():
-            for first, last in _constant(each, least):
-                others = [_swing(v[first:last]) for n, v in values.items() if n != name]
+        swing = max(swing, *(_swing(block[name]) for name in measure))
+        for name in suspects:
+            for first, last in _constant(block[name], least):
+                others = [_swing(block[n][first:last]) for n in names if n != name]
                 found.append((name, start + first, max(others)))
-    frozen = [(at, name) for name, at, others in found if others > SWING * swing]
-    return (min(frozen)[1], min(frozen)[0] / run.sampling_rate_hz) if frozen else None
+    return [(at, name) for name, at, others in found if others > SWING * swing]
+
+
+def _signs(
+    looks: Sequence[Mapping[str, Floats]], current: str, motion: str, rate_hz: float
+) -> dict[str, float]:
+    """Return how a reported current leans with the speed, and how often it has the rarer sign."""
+    values = np.concatenate([look[current] for look in looks])
+    speeds = [
+        look[motion] if motion.endswith("velocity") else np.gradient(look[motion]) * rate_hz
+        for look in looks
+    ]
+    drawn, size = np.nansum(values * np.sign(np.concatenate(speeds))), np.nansum(np.abs(values))
+    signed = [int(np.count_nonzero(values > 0)), int(np.count_nonzero(values < 0))]
+    return {
+        "leaning": float(drawn / size) if size else 0.0,
+        "reversing": min(signed) / max(sum(signed), 1),
+    }
 
 
 def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, int]]:

@@ -1,7 +1,7 @@
 """Dates and times of foreign recordings."""
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import MAXYEAR, MINYEAR, UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -63,7 +63,7 @@ def utc_text(value: object) -> str | None:
             value = datetime.fromisoformat(value.strip())
         except ValueError:
             return None
-    if not isinstance(value, datetime):
+    if not isinstance(value, datetime) or not MINYEAR < value.year < MAXYEAR:
         return None
     zoned = value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
     return zoned.isoformat().replace("+00:00", "Z")
