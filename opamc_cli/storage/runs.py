@@ -25,7 +25,14 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
-from opamc_cli.storage.schemas.channels import COLUMN, CURRENTS, MOST_HZ, NEARLY_COLUMN, PHASES
+from opamc_cli.storage.schemas.channels import (
+    COLUMN,
+    CURRENTS,
+    LEAST_HZ,
+    MOST_HZ,
+    NEARLY_COLUMN,
+    PHASES,
+)
 
 METADATA_KEY = b"opamc"
 ROW_GROUP_SAMPLES = 1 << 18
@@ -376,6 +383,11 @@ def _may_be_run(folder: Path, file: Path) -> bool:
 def write_run(path: Path, info: RunInfo, schema: pa.Schema) -> Iterator[pq.ParquetWriter]:
     """Open a run for writing, block by block; it appears under its name when all is written.
 
+    Raises
+    ------
+    InputError
+        If what it says of itself is out of bounds.
+
     Yields
     ------
     pyarrow.parquet.ParquetWriter
@@ -383,7 +395,9 @@ def write_run(path: Path, info: RunInfo, schema: pa.Schema) -> Iterator[pq.Parqu
         keep row groups whole.
     """
     metadata = dict(schema.metadata or {})
-    metadata[METADATA_KEY] = info.to_json().encode()
+    metadata[METADATA_KEY] = raw = info.to_json().encode()
+    # what no reader would take is not written
+    parsed(RunMetadata, raw, f"{path}: its metadata", "correct the map or what was recorded")
     with (
         atomic_path(path) as temporary,
         pq.ParquetWriter(
@@ -489,7 +503,7 @@ Condition = Annotated[float, Field(ge=-1e6, le=1e6)]
 class RunMetadata(Document):
     """The JSON of the metadata key `opamc`; see `RunInfo`."""
 
-    sampling_rate_hz: Annotated[float, Field(gt=0, le=MOST_HZ)]
+    sampling_rate_hz: Annotated[float, Field(ge=LEAST_HZ, le=MOST_HZ)]
     robot: Text | None = None
     program: Text | None = None
     speed_percent: Condition | None = None

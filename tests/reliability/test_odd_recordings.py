@@ -147,6 +147,32 @@ def test_ingest_replaces_nothing_but_its_own_runs(opamc, tonight, tmp_path, whos
     assert (out / "log.parquet").read_bytes() == before
 
 
+RATE, ONE = "sampling_rate_hz: 1000\n", "columns: {axis1_a: {source: a, unit: A}}"
+ODD_MAPS = {
+    RATE + ONE[:-1] + ", axis1_b: {source: a, unit: A}}": "axis1_a and columns.axis1_b are both of",
+    RATE + "columns: {axis1_a: {source: a, unit: A, scale: 0}}": "scale is 0",
+    RATE + "columns: {axis1_a: {source: t, unit: A, scale: 1.e+9}}": "has no value in",
+    "time: {source: t, unit: s}\n" + ONE: "sampling_rate_hz is",
+    MAP + "metadata: {payload_kg: 1.e+9}": "payload_kg is 1000000000",
+    MAP + f"metadata: {{robot: {'x' * 1001}}}": "at most 1000",
+}
+
+
+@pytest.mark.parametrize("text", ODD_MAPS, ids=range(len(ODD_MAPS)))
+def test_no_run_is_made_that_could_not_be_used(opamc, tmp_path, text):
+    """Clock in nanoseconds, one channel for two phases, conditions of no robot."""
+    rows = "".join(f"{n % 7},{1e9 * (n + 1)}\n" for n in range(300))
+    (tmp_path / "log.csv").write_text("a,t\n" + rows)
+    (tmp_path / "map.yaml").write_text(text)
+    ended = opamc(
+        "ingest", tmp_path / "log.csv", "--map", tmp_path / "map.yaml", "--out", tmp_path / "out"
+    )
+    assert ended.code in (ExitCode.USAGE, ExitCode.BAD_INPUT)
+    (sentence,) = ended.sentences
+    assert ODD_MAPS[text] in sentence
+    assert not list((tmp_path / "out").glob("*.parquet"))
+
+
 # -- bounded ---------------------------------------------------------------------------------
 
 

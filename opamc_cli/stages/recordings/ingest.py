@@ -31,6 +31,7 @@ from opamc_cli.storage.ingest.time.dates import utc_text
 from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
 from opamc_cli.storage.runs import (
+    LARGEST_SAMPLE,
     METADATA_KEY,
     ROW_GROUP_SAMPLES,
     Run,
@@ -435,8 +436,6 @@ def _row_groups(blocks: Iterable[Block], schema: pa.Schema) -> Generator[pa.Tabl
 
 
 def _measured(values: Array, width: pa.DataType) -> Array:
-    # what float32 cannot hold is as little a measurement as an infinity
-    with np.errstate(over="ignore"):
-        column = values.astype(width.to_pandas_dtype())
-    column[np.isinf(column)] = np.nan
-    return np.asarray(column)
+    # what no reader takes for a measurement, an infinity among it
+    known = np.where(np.abs(values) <= LARGEST_SAMPLE, values, np.nan)
+    return np.asarray(known.astype(width.to_pandas_dtype()))

@@ -78,8 +78,9 @@ LOGGED = {
 """By name and quantity, in the order in which a map lists them."""
 
 CHANNELS = (*CURRENTS, *LOGGED)
-MOST_HZ = 1e8
-"""No converter of a motor current is faster; a time in nanoseconds that was taken for a rate is."""
+LEAST_HZ, MOST_HZ = 1e-3, 1e8
+"""A current that is sampled once in a quarter of an hour has a clock in another unit; no converter
+is faster than the other, but a time in nanoseconds that was taken for a rate is."""
 
 COLUMN = re.compile(rf"axis([1-9][0-9]*)_({'|'.join(CHANNELS)})")
 """Name of a run's column."""

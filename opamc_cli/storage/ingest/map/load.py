@@ -81,7 +81,21 @@ def _check_columns(path: Path, channels: IngestMap) -> None:
         if column.unwrap and quantity != "position":
             msg = f"{path}: columns.{name}.unwrap is for positions, {name} is a {quantity}"
             raise ConfigError(msg)
+    _check_sources(path, channels)
     _check_currents(path, channels)
+
+
+def _check_sources(path: Path, channels: IngestMap) -> None:
+    """Refuse a channel that two columns are made from; one thermometer may serve all joints."""
+    used: dict[tuple[object, object], str] = {}
+    for name, column in channels.columns.items():
+        if column.scale == 0:
+            msg = f"{path}: columns.{name}.scale is 0, which leaves nothing of the channel"
+            raise ConfigError(msg)
+        first = used.setdefault((column.source, column.index), name)
+        if first != name and quantity_of(name) != "temperature":
+            msg = f"{path}: columns.{first} and columns.{name} are both of {column.source!r}"
+            raise ConfigError(msg)
 
 
 def _check_currents(path: Path, channels: IngestMap) -> None:
