@@ -15,6 +15,9 @@ from opamc_cli.commands.terminal.streams import complain, finish, open_streams, 
 from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
 from opamc_cli.stages.processes.interruption import interruptible
 
+MOST_DIGITS = 11
+"""Of seconds since 1970: to the year 5138."""
+
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run `opamc` and exit with one of `ExitCode`, or 128 and the number of a signal."""
@@ -66,9 +69,21 @@ def _run(given: list[str]) -> None:
     if "" in given:
         msg = "an argument is empty, as of a variable that is not set; name a file or leave it out"
         raise UsageError(msg)
+    _prepare_environment()
     from opamc_cli.commands.command_line import run
 
     sys.exit(run(given))
+
+
+def _prepare_environment() -> None:
+    """Refuse or replace what libraries stumble over as they are imported."""
+    if fixed := os.environ.get("SOURCE_DATE_EPOCH"):
+        if not (fixed.isascii() and fixed.isdecimal() and len(fixed) <= MOST_DIGITS):
+            msg = f"SOURCE_DATE_EPOCH is {fixed[:40]!r}; it takes whole seconds since 1970"
+            raise UsageError(msg)
+    else:
+        os.environ.pop("SOURCE_DATE_EPOCH", None)
+    os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:

@@ -1,9 +1,13 @@
 """Recordings, maps and paths as an outsider would get them wrong: said, and nothing lost by it."""
 
+import os
 import shutil
 import socket
+import subprocess
+import sys
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -109,13 +113,25 @@ def test_a_variable_of_the_shell_that_is_not_set(opamc, tmp_path, tonight, monke
     assert "an argument is empty" in ended.sentences[0]
 
 
-@pytest.mark.parametrize("text", ["rubbish", "-1e9", "9" * 20])
-def test_a_fixed_time_that_is_none(opamc, diagnosed, tmp_path, monkeypatch, text):
-    out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
+@pytest.mark.parametrize("text", ["rubbish", long("-1"), long("9" * 20)])
+def test_a_fixed_time_that_is_none(opamc, tmp_path, monkeypatch, text):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", text)
-    ended = opamc("decide", "--out", out)
+    ended = opamc("decide", "--out", tmp_path)
     assert ended.code == ExitCode.USAGE
     assert "SOURCE_DATE_EPOCH" in ended.sentences[0]
+
+
+def test_an_environment_that_libraries_stumble_over(diagnosed, tmp_path):
+    out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
+    odd = {"SOURCE_DATE_EPOCH": "", "MPLBACKEND": "rubbish", "COLUMNS": "-1", "TZ": ":rubbish"}
+    ended = subprocess.run(
+        [sys.executable, "-m", "opamc_cli", "report", "--out", str(out)],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2]), **odd},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
 
 
 # -- what is not ours is not replaced --------------------------------------------------------

@@ -7,8 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from opamc_cli import __version__
-from opamc_cli.config.reading import shown
-from opamc_cli.errors import UsageError
 from opamc_cli.storage.runs import file_sha256
 from opamc_cli.storage.sources import RunSource
 
@@ -47,13 +45,7 @@ def header(
 def _now() -> datetime:
     """Return the time, or what SOURCE_DATE_EPOCH says: two runs can then be compared bytewise."""
     fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
-    if not fixed:
-        return datetime.now(UTC)
-    try:
-        return datetime.fromtimestamp(int(fixed), UTC)
-    except (ValueError, OverflowError, OSError) as error:
-        msg = f"SOURCE_DATE_EPOCH is {shown(fixed)}; it takes seconds since 1970"
-        raise UsageError(msg) from error
+    return datetime.fromtimestamp(int(fixed), UTC) if fixed.isdecimal() else datetime.now(UTC)
 
 
 def _common(values: Iterable[str | None]) -> str | None:
