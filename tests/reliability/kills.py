@@ -45,7 +45,7 @@ def kill(trial: Trial, after_s: float, number: signal.Signals, forked: bool = Tr
     if "Traceback" in ended.stderr and (forked or after_s > INTERPRETER_S):
         return f"a traceback after {number.name}: {ended.stderr.strip()[-700:]}"
     if ended.returncode not in (*trial.codes, -number, 128 + number):
-        return f"exit {ended.returncode} after {number.name}: {ended.stderr.strip()[-160:]}"
+        return f"exit {ended.returncode} after {number.name}: {ended.stderr.strip()[-2000:]}"
     return broken(trial.out)
 
 
