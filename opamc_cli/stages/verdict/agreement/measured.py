@@ -147,8 +147,10 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         "clipped": {
             name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents
         },
-        "frozen": _frozen(run, currents, motion, looks, [start for start, _ in stretches] if spans else []),
-        **(_signs(looks, currents[0], motion[0], run.sampling_rate_hz) if motion_told else {}),
+        "frozen": _frozen(
+            run, currents, motion, looks, [start for start, _ in stretches] if spans else []
+        ),
+        **(_signs(looks, currents[0], motion[0]) if motion_told else {}),
     }
 
 
@@ -205,13 +207,13 @@ def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> li
     return [(at, name) for name, at, others in found if others > SWING * swing]
 
 
-def _signs(
-    looks: Sequence[Mapping[str, Floats]], current: str, motion: str, rate_hz: float
-) -> dict[str, float]:
+def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> dict[str, float]:
     """Return how a reported current leans with the speed, and how often it has the rarer sign."""
     values = np.concatenate([look[current] for look in looks])
     speeds = [
-        look[motion] if motion.endswith("velocity") else np.gradient(look[motion]) * rate_hz
+        look[motion]
+        if motion.endswith("velocity")
+        else np.diff(look[motion], prepend=look[motion][:1])
         for look in looks
     ]
     drawn, size = np.nansum(values * np.sign(np.concatenate(speeds))), np.nansum(np.abs(values))
