@@ -16,6 +16,7 @@ import pytest
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly import run as stage
 from opamc_cli.stages.nightly.workers.workers import run_all
+from opamc_cli.storage.logs import Facts
 
 NIGHTS = [cell_logs.night(i) for i in range(7)]
 COLUMNS = (
@@ -138,6 +139,14 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
         assert opamc("history", "--cell", cell, "--out", file).code == 0
         assert file.stat().st_size
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
+
+
+def test_facts_of_thousands_of_known_files_are_read_at_once():
+    text = Facts("cycle", 100.0, 0.0, 2048.0, "2026-03-01T22:00:00+00:00").to_json()
+    begun = time.process_time()
+    for _ in range(5000):
+        assert Facts.from_json(text).program == "cycle"
+    assert time.process_time() - begun < 2.0  # 0.1 s; it was once 35 s
 
 
 def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
