@@ -30,6 +30,7 @@ from panel.case import SIZES, Case, Wanted
 
 SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "measured": measured.cases,
+    "actuator": measured.actuator_cases,
     "testbed": testbed.cases,
     "smooth": formulas.smooth_cases,
     "algebraic": formulas.algebraic_cases,

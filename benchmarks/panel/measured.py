@@ -12,6 +12,11 @@ FOLDER = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 DECLARED = ("inertia", "gravity", "offset", "coulomb", "viscous")
 PROGRAMS = ("Trajectory1", "RunTrajectory1")
 RATE_HZ = 1000.0
+ACTUATOR = FOLDER.parent / "linear_actuator"
+ACTUATOR_HZ = 25.0
+SCREW_RAD_PER_MM = 0.02
+"""Any constant would do: the stroke of 120 mm as 2.4 rad of a joint."""
+FIVE = tuple(f"run_{k:02d}" for k in range(1, 6))
 
 
 def cases(seed: int, wanted: Wanted) -> Iterator[Case]:
@@ -46,3 +51,34 @@ def read(files: tuple[str, ...], joint: int) -> list[Logged]:
             )
         )
     return recordings
+
+
+def actuator_cases(seed: int, wanted: Wanted) -> Iterator[Case]:
+    """One recording of every state of the ball screw, and five together; the same for all seeds."""
+    if not ACTUATOR.is_dir():
+        print(f"the actuator left out: {ACTUATOR} is not there")
+        return
+    for state in sorted(path.name for path in ACTUATOR.iterdir() if path.is_dir()):
+        for name, files in (("one run", ("run_01",)), ("five runs", FIVE)):
+            make = partial(read_actuator, state, files)
+            declared = ("inertia", "offset", "coulomb", "viscous")
+            yield Case("actuator", f"{state}, {name}", name, "position", declared, None, make)
+
+
+def read_actuator(state: str, files: tuple[str, ...]) -> list[Logged]:
+    """Read the strokes of some recordings of a state, to and fro, each a recording of its own.
+
+    The source has cut out part of the rest between them. The current is unsigned: it drives the
+    motion that the set point asks for.
+    """
+    strokes = []
+    for file in files:
+        table = np.genfromtxt(ACTUATOR / state / f"{file}.csv", delimiter=",", names=True)
+        for cycle in np.unique(table["cycle"]):
+            part = table[table["cycle"] == cycle]
+            asked = np.sign(np.gradient(part["set_point_mm"]))
+            for sign in (1, -1):
+                rows = part[asked == sign]
+                position = rows["position_mm"] * SCREW_RAD_PER_MM
+                strokes.append(Logged(ACTUATOR_HZ, sign * rows["current_a"], position=position))
+    return strokes

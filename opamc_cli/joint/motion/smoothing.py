@@ -8,6 +8,9 @@ from opamc_cli.joint.motion.track import Floats
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
 LONGEST_WINDOW_S = 0.2
+LONGEST_WINDOW = 15
+"""Samples that a window may have however long they last: of a noisy position logged at 25 Hz, five
+samples leave a fifth of the speed as noise, and no direction is certain."""
 ALLOWED_NOISE_SHARE = 0.01
 QUIET_NOISE_SHARE = 0.0025
 OFF_GRID = 0.05
@@ -64,9 +67,10 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     Returns
     -------
     int
-        Odd number of samples, 5 or more, at most 0.2 s.
+        Odd number of samples, 5 or more, at most 0.2 s or 15 samples.
     """
-    longest = min(int(LONGEST_WINDOW_S * rate_hz) | 1, (path.size - 1) | 1)
+    longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
+    longest = min(longest, (path.size - 1) | 1)
     noise = measurement_noise(path)
     window = SHORTEST_WINDOW
     while window < longest:
