@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.effects.second_order import at_rest, discrete
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.noise.spectra import order_lines, order_resolution
+from opamc_cli.joint.noise.spectra import highest_order, order_lines, order_resolution
 
 SWITCHES = ("speed", "direction", "load", "current")
 DAMPING = 0.4
@@ -72,6 +72,9 @@ class Ripple(Effect):
     def _density(self, track: Track, order: float, power: float) -> float:
         """Choose how many filters per octave a line may be worth; 0 where it has no answer."""
         top_hz = _top_hz(track, order)
+        if order > highest_order(track):
+            # Its frequency is not the one that the samples show.
+            return 0.0
         if top_hz <= LOWEST_HZ or np.count_nonzero(track.moving) > MOST_ANSWERED:
             return 0.0
         turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)

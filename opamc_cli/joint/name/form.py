@@ -9,9 +9,9 @@ from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import LEAST_T, Chain
 from opamc_cli.joint.name.search import Pool, trials
 
-EXACT, APPROXIMATE = 0.9, 0.5
-"""Shares of its domain's curve that a form holds: from the first on it has the name, from the
-second on approximately; below, the curve has none."""
+APPROXIMATE = 0.5
+"""Share of its domain's curve that a form holds, from which on it has the name approximately (from
+`EXACT` on without that word); below, the curve has none."""
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 

@@ -9,6 +9,8 @@ from opamc_cli.joint.name.search import Pool, Trial, objection, paired, trials
 CLEARLY = 0.05
 """Of the score: where an effect stands against another or a function without a name, a difference
 of less is none."""
+EXACT = 0.9
+"""Share of its domain's curve from which on a form has the name."""
 MOST_ROUNDS = 4
 
 
@@ -101,7 +103,7 @@ def _asked_again(
         return min(passing, key=lambda chain: chain.score, default=parent), []
     if "unnamed" not in pool.without:
         for rival in trials(parent, _slow(unnamed)):
-            if rival.why_not is None and _takes_the_name(rival.chain, best, term):
+            if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain, []
     for other in others:
         better = other.chain.score < best.score - CLEARLY
@@ -143,15 +145,19 @@ def _slow(pool: Pool) -> Pool:
     return replace(pool, library=slow)
 
 
-def _takes_the_name(rival: Chain, best: Chain, term: Term) -> bool:
+def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> bool:
     """Whether a smooth function without a name stands in the place of an effect.
 
-    Where a smooth function does as well as a line, it is no line.
+    Where a smooth function does as well as a line, it is no line. A name that holds nine tenths of
+    what the function explains stays: the rest is asked for beside it.
     """
     difference, error = paired(rival.error, best.error)
     if term.effect.fast:
         return rival.score < best.score + CLEARLY and difference > -LEAST_T * error
     if rival.score >= best.score - CLEARLY or difference <= LEAST_T * error:
+        return False
+    named, explained = (float((parent.error - one.error).sum()) for one in (best, rival))
+    if named >= EXACT * explained:
         return False
     # What follows slow noise is no better form of an effect.
     share, t_value = rival.gain_beside_drift(best)

@@ -11,6 +11,12 @@ MOST_BINS = 2**21
 MOST_TIME = 8
 """Pieces of a recording are put on its clock if it is at most so many times as long."""
 NYQUIST_SHARE = 0.9
+FOLDED, FOLDED_HZ = 4.0, 500.0
+"""Times the highest order that is not folded, and frequency at the median speed, up to which lines
+are looked for: at 100 Hz half of the kinematic error's speeds fold, and the angle, which is known
+at every sample, unfolds them; above some hundred hertz a drive answers little."""
+ABOVE_ITS_IMAGE = 1.1
+"""At constant speed a line and its folded image are one; that of another order is no stronger."""
 LOWEST_ORDER = {"motor": 0.4, "joint": 8.0, "electrical": 0.05}
 SURROUNDINGS = 20
 """Resolutions on both sides of a line over which its surroundings are averaged."""
@@ -41,7 +47,17 @@ def order_resolution(track: Track) -> float:
     return float(2 * np.pi / np.ptp(track.machine_angle_rad[track.moving]))
 
 
-def order_spectrum(track: Track, residual: Floats) -> tuple[Floats, Floats, int]:
+def highest_folded(track: Track) -> float:
+    """Highest order that is looked for where the motion's changes of speed unfold it."""
+    highest = highest_order(track)
+    # The highest order is what NYQUIST_SHARE of half the rate is at the median speed.
+    per_hz = highest / (NYQUIST_SHARE * 0.5 * track.rate_hz)
+    return max(highest, min(FOLDED * highest, FOLDED_HZ * per_hz))
+
+
+def order_spectrum(
+    track: Track, residual: Floats, top: float | None = None
+) -> tuple[Floats, Floats, int]:
     """Power of a residual over orders of the machine angle, in units of white noise's power.
 
     Samples are binned by angle, separately for both directions and for slow and fast motion, so
@@ -54,6 +70,8 @@ def order_spectrum(track: Track, residual: Floats) -> tuple[Floats, Floats, int]
         Track at the full rate.
     residual : array of shape (n,)
         Whitened residual; zero where samples do not count.
+    top : float, optional
+        Highest order; that which is not folded at the median speed if missing.
 
     Returns
     -------
@@ -64,7 +82,7 @@ def order_spectrum(track: Track, residual: Floats) -> tuple[Floats, Floats, int]
         Number of classes that were summed.
     """
     valid = track.moving & (residual != 0)
-    top = highest_order(track)
+    top = highest_order(track) if top is None else top
     if valid.sum() < 50 or top <= 0:
         return np.empty(0), np.empty(0), 1
     angle = track.machine_angle_rad[valid]
@@ -120,13 +138,16 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
         Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
         and their power in units of white noise's, where they hold 2 % of the residual's power.
     """
-    orders, power, _ = order_spectrum(track, residual)
+    orders, power, _ = order_spectrum(track, residual, highest_folded(track))
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
     first = int(np.searchsorted(orders, lowest))
     if orders.size - first < 8:
         return []
     power = power.copy()
     power[:first] = 0
+    folded = int(np.searchsorted(orders, highest_order(track)))
+    if power[folded:].max(initial=0.0) <= ABOVE_ITS_IMAGE * power[:folded].max():
+        orders, power = orders[:folded], power[:folded]
     # A sine that holds a share s of the power shows with half of s times the samples.
     threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
     spacing = float(orders[1] - orders[0])
