@@ -54,6 +54,8 @@ class Effect:
     """True where the coefficients are one, and the parameters alone say how large the effect is."""
     carries_load: bool = False
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
+    follows_load: bool = False
+    """True where the regressors are in proportion to the load's magnitude."""
     per: tuple[str, ...] | None = None
     """Unit of each regressor, "" for a bare number and "current" for one in the current's own; the
     last one is that of all further ones. A coefficient is the current's unit by it."""

@@ -19,6 +19,7 @@ class LoadFriction(Effect):
     per = ("current",)
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
     needs = ("position",)
+    follows_load = True
 
     def untestable(self, track: Track) -> str | None:
         """Needs a load that is fitted and changes."""
@@ -33,13 +34,16 @@ class LoadFriction(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the magnitude of the fitted load current that passes the gear."""
-        share = parameters.get("inertia_share", 1.0)
-        load = track.load_a if share == 1 else track.load_a - (1 - share) * _inertial(track)
-        return stack(track.direction * np.abs(load))
+        return stack(track.direction * np.abs(_passing(track, parameters)))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""
         return bool(coefficients[0] > 0)
+
+
+def _passing(track: Track, parameters: Parameters) -> Floats:
+    share = parameters.get("inertia_share", 1.0)
+    return track.load_a if share == 1 else track.load_a - (1 - share) * _inertial(track)
 
 
 def _inertial(track: Track) -> Floats:

@@ -344,8 +344,45 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
         settled = number >= fewest and abs(before - error) <= SETTLED * error
         if not circular or settled:
             break
-        session, before = fitted.session, error
+        session, before = _with_newton_load(fitted), error
     return fitted
+
+
+def _with_newton_load(fitted: Fit) -> Session:
+    """Return the session with the load that Gauss-Newton steps through it find.
+
+    To fit anew beside the last load alone may stay where it is: a gravity and an offset that have
+    taken up the friction which grows with the load leave that load's zero in the wrong place.
+    """
+    session, terms = fitted.session, fitted.terms
+    track, rows = session.fine.track, session.fine.fit
+    if not any(term.effect.follows_load for term in terms):
+        return session
+    blocks = [session.columns(term, fine=True) for term in terms]
+    carries = np.concatenate(
+        [np.full(b.shape[1], t.effect.carries_load) for b, t in zip(blocks, terms, strict=True)]
+    )
+    follows = np.concatenate(
+        [np.full(b.shape[1], t.effect.follows_load) for b, t in zip(blocks, terms, strict=True)]
+    )
+    columns = np.concatenate(blocks, axis=1)
+    solution = np.concatenate(fitted.coefficients)
+    best, least = track.load_a, np.inf
+    for _ in range(MOST_ROUNDS):
+        load = columns[:, carries] @ solution[carries]
+        moved = replace(track, load_a=load)
+        following = [term.columns(moved) for term in terms if term.effect.follows_load]
+        columns[:, follows] = np.concatenate(following, axis=1)
+        rest = (track.current_a - columns @ solution)[rows]
+        error = float(rest @ rest)
+        if error < least:
+            best, least = load, error
+        # Proportional to the load's magnitude, so that by it is to divide by the load.
+        slope = columns[:, follows] @ solution[follows] / np.where(load == 0, np.inf, load)
+        jacobian = columns[rows]
+        jacobian[:, carries] *= 1 + slope[rows, None]
+        solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
+    return session.with_model(best, track.model_a, track.static_terms)
 
 
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
