@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closing import MOTIONS, close_on, close_recording, fit_declared, joint_of
+from closing import MOTIONS, close_on, close_recording, fit_declared, joint_of, moved
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
@@ -62,6 +62,42 @@ def test_an_effect_of_fifteen_times_the_noise_does_not_hide(motion, effect):
     assert loop.verdict == "closed"
     assert loop.rmse_before_a > 0.1
     assert loop.rmse_after_a < 1.5 * 0.02
+
+
+def test_a_ripple_that_folds_is_found_where_the_speed_changes():
+    # 300 per turn of the joint: at the median speed 1.3 times half the sampling rate.
+    loop = close(joint_of("cyclic", lambda q, v, a, t: np.cos(300 * q + 0.4), rate=50.0))
+    (step,) = loop.steps
+    assert step.term.effect.name == "ripple"
+    assert step.term.parameters["order"] == pytest.approx(300, abs=0.2)
+    assert loop.verdict == "closed"
+
+
+def test_friction_that_grows_with_the_load_is_found_beside_an_offset():
+    # Gravity and offset take it up over a short stroke, and the load's zero moves with them.
+    recording = joint_of("cyclic", None)
+    q, v, a = moved("cyclic")
+    short = 0.4 * q - 0.9
+    load = 0.08 * a + np.sin(short) + 0.4 * np.cos(short)
+    rng = np.random.default_rng(7)
+    current = load + np.sign(v) * (0.5 + 0.9 * np.abs(load)) + 0.12 * v
+    recording = replace(
+        recording, current_a=current + rng.normal(0, 0.02, v.size), position_rad=short
+    )
+    loop = close(recording, (*DECLARED, "offset"))
+    assert names_of(loop)[0] == {"load_friction"}
+    assert loop.rmse_after_a < 1.1 * 0.02
+
+
+@pytest.mark.parametrize("noise_rad", [1e-4, 1.5e-2])
+def test_a_slow_log_of_a_noisy_position_is_served(noise_rad):
+    # 25 samples a second, a fifth of the speed is noise from sample to sample.
+    recording = joint_of("cyclic", SHAPES["spring"], rate=25.0, seconds=60.0, noise_a=0.05)
+    rng = np.random.default_rng(3)
+    position = recording.position_rad + rng.normal(0, noise_rad, recording.position_rad.size)
+    loop = close(replace(recording, position_rad=position))
+    assert "spring" in names_of(loop)[0]
+    assert loop.rmse_after_a < 0.2 * loop.rmse_before_a
 
 
 @pytest.mark.parametrize(

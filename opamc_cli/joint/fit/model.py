@@ -22,6 +22,8 @@ COARSE_OF_LONG = 12_000
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
+LOAD_SAMPLES = 10_000
+"""By which the load is found that friction follows: a handful of coefficients."""
 SMALLEST_KERNEL = 5
 """A moving average of up to 5 samples needs no counterpart."""
 
@@ -355,32 +357,37 @@ def _with_newton_load(fitted: Fit) -> Session:
     taken up the friction which grows with the load leave that load's zero in the wrong place.
     """
     session, terms = fitted.session, fitted.terms
-    track, rows = session.fine.track, session.fine.fit
+    track = session.fine.track
     if not any(term.effect.follows_load for term in terms):
         return session
+    rows = np.flatnonzero(session.fine.fit)
+    rows = rows[:: max(rows.size // LOAD_SAMPLES, 1)]
     blocks = [session.columns(term, fine=True) for term in terms]
-    carries = np.concatenate(
-        [np.full(b.shape[1], t.effect.carries_load) for b, t in zip(blocks, terms, strict=True)]
+    widths = [block.shape[1] for block in blocks]
+    carries, follows = (
+        np.repeat([getattr(term.effect, name) for term in terms], widths)
+        for name in ("carries_load", "follows_load")
     )
-    follows = np.concatenate(
-        [np.full(b.shape[1], t.effect.follows_load) for b, t in zip(blocks, terms, strict=True)]
+    carriers = np.concatenate(
+        [b for b, t in zip(blocks, terms, strict=True) if t.effect.carries_load], axis=1
     )
-    columns = np.concatenate(blocks, axis=1)
+    columns = np.concatenate([block[rows] for block in blocks], axis=1)
     solution = np.concatenate(fitted.coefficients)
     best, least = track.load_a, np.inf
     for _ in range(MOST_ROUNDS):
-        load = columns[:, carries] @ solution[carries]
+        load = carriers @ solution[carries]
         moved = replace(track, load_a=load)
-        following = [term.columns(moved) for term in terms if term.effect.follows_load]
+        following = [t.columns(moved)[rows] for t in terms if t.effect.follows_load]
         columns[:, follows] = np.concatenate(following, axis=1)
-        rest = (track.current_a - columns @ solution)[rows]
+        rest = track.current_a[rows] - columns @ solution
         error = float(rest @ rest)
-        if error < least:
-            best, least = load, error
+        if least - error <= SETTLED * least < np.inf:
+            break
+        best, least = load, error
         # Proportional to the load's magnitude, so that by it is to divide by the load.
-        slope = columns[:, follows] @ solution[follows] / np.where(load == 0, np.inf, load)
-        jacobian = columns[rows]
-        jacobian[:, carries] *= 1 + slope[rows, None]
+        over = np.where(load[rows] == 0, np.inf, load[rows])
+        jacobian = columns.copy()
+        jacobian[:, carries] *= 1 + (columns[:, follows] @ solution[follows] / over)[:, None]
         solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
     return session.with_model(best, track.model_a, track.static_terms)
 

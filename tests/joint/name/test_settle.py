@@ -62,3 +62,13 @@ def test_of_two_names_for_one_regressor_each_tells_the_other():
         assert named[0].ties == (other,)
     chain, named = settle(constant, term("offset"), names=("offset",))
     assert named[0].ties == ()
+
+
+def test_a_name_that_holds_nine_tenths_of_a_function_keeps_its_place():
+    # The rest is told beside it, and is no reason to take the name off.
+    def bent(q, v, a, t):
+        return np.sign(v) * (np.exp(-((v / 0.1) ** 2)) + 0.12 * np.exp(-((v / 0.4) ** 8)))
+
+    chain, named = settle(bent, term("stribeck", **SPEED), names=("stribeck",), strength=20.0)
+    assert [one.term.effect.name for one in named] == ["stribeck"]
+    assert [one.effect.name for one in chain.terms] == ["stribeck"]
