@@ -389,7 +389,8 @@ def _with_newton_load(fitted: Fit) -> Session:
         jacobian = columns.copy()
         jacobian[:, carries] *= 1 + (columns[:, follows] @ solution[follows] / over)[:, None]
         solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
-    return session.with_model(best, track.model_a, track.static_terms)
+    static = tuple(term for term in terms if term.effect.static and not term.effect.fast)
+    return session.with_model(best, track.model_a, static)
 
 
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:

@@ -67,12 +67,27 @@ class Chain:
         pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
         return pairs[len(pairs) - self.added :]
 
-    @property
-    def plausible(self) -> bool:
-        """Whether every added term's coefficients have the sign that physics gives it."""
-        return all(
-            term.effect.plausible(values, term.parameters) for term, values in self._added_values
+    def plausible_beside(self, other: "Chain") -> bool:
+        """Whether coefficients have the sign that physics gives them, or had another before.
+
+        All of the added terms' have to; a declared one's may not be turned by an effect that is
+        added last: friction that grows with a load which never passes zero takes dry friction away.
+        """
+        signs = self._signs
+        first = len(signs) - self.added
+        last = self.terms[-1].effect
+        if last.unnamed or last.fast:
+            return all(signs[first:])
+        return all(signs[first:]) and all(
+            now or not before for now, before in zip(signs[:first], other._signs, strict=False)
         )
+
+    @property
+    def _signs(self) -> list[bool]:
+        return [
+            term.effect.plausible(values, term.parameters)
+            for term, values in zip(self.fit.terms, self.fit.coefficients, strict=True)
+        ]
 
     @cached_property
     def signature(self) -> Signature:

@@ -227,7 +227,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     if child.terms[-1].effect.unnamed and t_value < LEAST_T and "certain" not in pool.without:
         # What may have any form has to show it everywhere; a payload changes once.
         return "takes something off the held-out error here and there, not everywhere"
-    if "sign" not in pool.without and not child.plausible:
+    if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     effect = child.terms[-1].effect
     drifts = effect.changes_in_time and "drift" not in pool.without
