@@ -21,7 +21,3 @@ class Coulomb(Effect):
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Friction resists."""
         return bool(coefficients[0] > 0)
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)
