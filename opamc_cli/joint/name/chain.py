@@ -70,17 +70,14 @@ class Chain:
     def plausible_beside(self, other: "Chain") -> bool:
         """Whether coefficients have the sign that physics gives them, or had another before.
 
-        All of the added terms' have to; a declared one's may not be turned by an effect that is
-        added last: friction that grows with a load which never passes zero takes dry friction away.
+        All of the added terms' have to. A declared one's may not be turned by friction that grows
+        with the load: where that never passes zero, it does little else.
         """
         signs = self._signs
         first = len(signs) - self.added
-        last = self.terms[-1].effect
-        if last.unnamed or last.fast:
-            return all(signs[first:])
-        return all(signs[first:]) and all(
-            now or not before for now, before in zip(signs[:first], other._signs, strict=False)
-        )
+        kept = zip(signs[:first], other._signs, strict=False)
+        turned = any(before and not now for now, before in kept)
+        return all(signs[first:]) and not (turned and self.terms[-1].effect.follows_load)
 
     @property
     def _signs(self) -> list[bool]:
