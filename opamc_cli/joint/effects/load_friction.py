@@ -19,6 +19,7 @@ class LoadFriction(Effect):
     per = ("current",)
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
     needs = ("position",)
+    searches = ("inertia_share",)
     follows_load = True
 
     def untestable(self, track: Track) -> str | None:
