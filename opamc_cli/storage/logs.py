@@ -27,6 +27,9 @@ from opamc_cli.storage.runs import Run, RunInfo
 
 BLOCK_BYTES = 1 << 22
 
+A_NIGHT = r"\d{4}[-_.]?\d{1,2}[-_.]?\d{1,2}"
+"""What stands for {night}, or is meant to; other names beside the nights are no logs."""
+
 
 @dataclass(frozen=True)
 class LogFile:
@@ -135,8 +138,9 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
             continue
         named = fits.groupdict()
         robot, night = named.get("robot") or "", named.get("night")
-        if (robots is not None and robot and robot not in robots) or not _is_night(night):
+        if robots is not None and robot and robot not in robots:
             continue
+        night = _as_night(night)
         if robot:
             found.append(LogFile(path, robot, night, size, mtime_ns))
         else:  # one baseline for several robots
@@ -240,7 +244,7 @@ def _expression(pattern: str) -> re.Pattern[str]:
     for part in parts:
         if part in ("{robot}", "{night}"):
             name = part[1:-1]
-            form = r"[^/]+?" if name == "robot" else r"\d{4}-\d{2}-\d{2}"
+            form = r"[^/]+?" if name == "robot" else A_NIGHT
             text += f"(?P={name})" if name in known else f"(?P<{name}>{form})"
             known.add(name)
         elif part.startswith("["):
@@ -250,14 +254,12 @@ def _expression(pattern: str) -> re.Pattern[str]:
     return re.compile(text)
 
 
-def _is_night(text: str | None) -> bool:
-    if text is None:
-        return True
+def _as_night(text: str | None) -> str | None:
+    """Write a day as YYYY-MM-DD; None where it is none, and the recording itself has to tell."""
     try:
-        date.fromisoformat(text)
+        return None if text is None else date.fromisoformat(text).isoformat()
     except ValueError:
-        return False
-    return True
+        return None
 
 
 def _first_line(error: Exception) -> str:
