@@ -294,7 +294,7 @@ UNUSABLE = [
     (bad_runs.text_column, ["column axis1_a has type string"]),
     (bad_runs.no_metadata, ["is not a run", "sampling_rate_hz"]),
     (bad_runs.no_rate, ["no sampling_rate_hz"]),
-    (bad_runs.zero_rate, ["sampling_rate_hz is 0", "greater than 0"]),
+    (bad_runs.zero_rate, ["sampling_rate_hz is 0", "greater than or equal to 0.001"]),
     (bad_runs.no_rows, ["no samples"]),
     (bad_runs.wrong_time, ["column time_s", "0.002 s", "0.001 s"]),
     (bad_runs.stage_table, ["is a stage table"]),

@@ -12,7 +12,7 @@ from output_folder import Plan
 
 from opamc_cli.errors import InputError
 from opamc_cli.stages import report
-from opamc_cli.stages.report import assemble
+from opamc_cli.stages.report.figures import shown
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "use", "rect"}
 FIGURES = {
@@ -70,8 +70,8 @@ def drawn_alone(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
 
     def draw(*names: str) -> None:
         for section in ("EVIDENCE", "LOOP"):
-            chosen = tuple(part for part in getattr(assemble, section) if part[0] in names)
-            monkeypatch.setattr(assemble, section, chosen)
+            chosen = tuple(part for part in getattr(shown, section) if part[0] in names)
+            monkeypatch.setattr(shown, section, chosen)
 
     return draw
 
