@@ -175,23 +175,6 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     return sorted(better, key=lambda candidate: candidate.score)
 
 
-def _by_load(chain: Chain, pool: Pool) -> list[Term]:
-    """Effects that follow the load, each in the form that fits best together with it.
-
-    Beside the load that was fitted without it, a friction that has moved the load's zero shows
-    as little.
-    """
-    session = chain.fit.session
-    present = {term.effect.name for term in chain.fit.terms}
-    found = []
-    for effect in pool.library.values():
-        free = effect.follows_load and effect.name not in present
-        if free and not effect.untestable(session.coarse.track):
-            forms = guessed(effect, session)
-            found.append(min(forms, key=lambda term: extended(chain, term).score))
-    return found
-
-
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
     """Fit the most promising candidates of a chain, and say of each whether it may be added.
 
@@ -204,19 +187,39 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
     known : set, optional
         Chains that were tried; they are not tried again, and new ones are added.
     """
+    tried = set() if known is None else known
+    ordered = [[candidate.term] for candidate in candidates(chain, pool)[:TRIED]]
+    ordered = [forms for forms in ordered if not forms[0].effect.follows_load]
     found = []
-    terms = [candidate.term for candidate in candidates(chain, pool)[:TRIED]]
-    terms = [term for term in terms if not term.effect.follows_load]
-    for term in (*terms, *_by_load(chain, pool)):
-        signature = chain.signature | signature_of((term,))
-        if known is not None:
-            if signature in known:
-                continue
-            known.add(signature)
-        child = extended(chain, term)
+    for forms in (*ordered, *_by_load(chain, pool)):
+        signatures = {chain.signature | signature_of((term,)) for term in forms}
+        if not signatures.isdisjoint(tried):
+            continue
+        tried |= signatures
+        child = extended(chain, forms[0])
+        if child.gain_over(chain)[0] >= pool.least_share:
+            others = (extended(chain, term) for term in forms[1:])
+            child = min((child, *others), key=lambda one: one.score)
         share, t_value = child.gain_over(chain)
         found.append(Trial(chain, child, share, t_value, objection(child, chain, pool)))
     return found
+
+
+def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
+    """Forms of each effect that follows the load: always tried, fitted together with the load.
+
+    Beside the load that was fitted without it, a friction that has moved the load's zero shows
+    as little.
+    """
+    session = chain.fit.session
+    present = {term.effect.name for term in chain.fit.terms}
+    return [
+        guessed(effect, session)
+        for effect in pool.library.values()
+        if effect.follows_load
+        and effect.name not in present
+        and not effect.untestable(session.coarse.track)
+    ]
 
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
