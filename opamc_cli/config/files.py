@@ -1,7 +1,7 @@
 """Configuration from YAML files and `--set key=value`, with errors that name the key."""
 
 import difflib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, get_args
 
@@ -186,9 +186,15 @@ def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[st
         field = getattr(current, "model_fields", {}).get(part)
         annotation = current if field is None else field.annotation
         # a section may be optional, one of several kinds, or the value of a free-named mapping
-        options = [annotation, *get_args(annotation)]
-        current = next((o for o in options if hasattr(o, "model_fields")), annotation)
+        current = next((o for o in _within(annotation) if hasattr(o, "model_fields")), annotation)
     return sorted(getattr(current, "model_fields", {}))
+
+
+def _within(annotation: Any) -> Iterator[Any]:
+    """Yield an annotation and all that it is made of, outside first."""
+    yield annotation
+    for part in get_args(annotation):
+        yield from _within(part)
 
 
 def _set(values: dict[str, Any], keys: list[str], value: Any, override: str) -> None:

@@ -290,6 +290,7 @@ def test_other_conditions_have_a_baseline_of_their_own(cell, opamc):
         ("runs: '{robot}/*.parquet'\nalarm: {nights: 4, of: 3}", "could never be reached"),
         ("runs: '{robot}/*.parquet'\nset: {patterns.gama: 1}", "did you mean 'gamma'"),
         ("runs: '{robot}/*.parquet'\nrobots: {../x: {}}", "robots"),
+        ("runs: '{robot}/*.parquet'\nrobots: {r1: {axis: [1]}}", "did you mean 'axes'"),
         ("runs: '{robot}/*.parquet'", "no file fits"),
         ("- 1", "a mapping of keys is needed"),
     ],
