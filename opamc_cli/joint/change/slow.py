@@ -16,9 +16,9 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Floats
 
-LOAD_SPREAD, FRICTION_SPREAD, COMMON_SPREAD = 0.02, 0.05, 0.005
-"""What is expected of healthy sessions: the load's coefficients differ by 2 % of themselves
-(current sensors), friction's by 5 %, and all by what moves half a per cent of the current."""
+GAIN_SPREAD, FRICTION_SPREAD, COMMON_SPREAD = 0.02, 0.05, 0.005
+"""What is expected of healthy sessions: all coefficients differ by 2 % alike (current sensors),
+friction's by 5 % of themselves, and each by what moves half a per cent of the current."""
 
 FEWEST_EXCITED = 10.0
 
@@ -105,13 +105,19 @@ def learn(units: list[Unit], terms: tuple[Term, ...], between: float = 0.0) -> P
     own = [
         np.full(
             units[0].columns(term).shape[1],
-            LOAD_SPREAD if term.effect.carries_load else FRICTION_SPREAD,
+            0.0 if term.effect.carries_load else FRICTION_SPREAD,
         )
         for term in terms
     ]
     prior = np.diag(
         (np.concatenate(own) * centre) ** 2 + COMMON_SPREAD**2 * power / np.maximum(sizes, 1e-300)
     )
+    prior += GAIN_SPREAD**2 * np.outer(centre, centre)
+    # Where sessions differ more than is expected, friction is what differs most.
+    names = np.repeat([term.effect.domain for term in terms], [part.size for part in own])
+    friction = np.flatnonzero(names == "velocity")
+    ratio = float(np.median(np.var(sample, axis=0, ddof=1) / np.diag(prior)))
+    prior[np.ix_(friction, friction)] *= max(ratio, 1.0)
     variance = float(np.median([np.mean(residual**2) for _, residual in fits]))
     covariance = moderated_covariance(sample, prior)
     return Population(terms, sample.mean(axis=0), covariance, variance, power, between)
@@ -164,15 +170,18 @@ def shifts(
         _spread_ratio([pair for pair, new in zip(pairs, after, strict=True) if not new])
         for _, _, _, pairs in trials
     ]
-    # Units differ by more than noise in what the declared effects do not hold, too.
+    # Units differ by more than noise in what the declared effects do not hold, too; how their
+    # declared friction differs, the population's covariance knows already.
     inflation = max(float(np.median(ratios)), 1.0) if ratios else 1.0
+    friction = {t.effect.name for t in population.terms if t.effect.domain == "velocity"}
     found = []
     for terms, candidate, columns, pairs in trials:
         estimates = np.stack([estimate for estimate, _ in pairs])
         information = np.mean(
             [gram for (_, gram), new in zip(pairs, after, strict=True) if not new], axis=0
         )
-        expected = inflation * np.linalg.pinv(information, rcond=1e-9, hermitian=True)
+        expected = np.linalg.pinv(information, rcond=1e-9, hermitian=True)
+        expected *= 1.0 if candidate.effect.name in friction else inflation
         before, later = estimates[~after], estimates[after]
         shift = later.mean(axis=0) - before.mean(axis=0)
         covariance = moderated_covariance(before, expected) * (1 / len(before) + 1 / len(later))

@@ -15,8 +15,11 @@ from tests.marks import long
 BASELINE, TARGET = 4, 3
 
 
-def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
-    """Sessions of two cycles each, whose friction differs by 5 %; the target's has an effect."""
+def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
+    """Sessions of two cycles each, whose friction differs by 5 %; the target's has an effect.
+
+    What the declared effects do not hold may `wander` from session to session, too.
+    """
     count = BASELINE + TARGET
     made = simulate(seed, (), 0.0, cycles=2 * count, rate=250.0)
     rng = np.random.default_rng(seed)
@@ -41,6 +44,8 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True):
         new = k >= (BASELINE if sessions else 1)
         current = made.current[rows] + new * shape[rows]
         current += 0.05 * (rng.normal() * np.sign(v[rows]) + rng.normal() * v[rows] / top)
+        if wander:
+            current += wander * rng.normal() * np.sin(5 * q[rows])
         recordings.append(
             Recording(
                 f"session-{k}",
@@ -61,6 +66,13 @@ def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
     change = change_of("nothing", seed, sessions=sessions)
     assert change.causes == ()
     assert not change.harmless
+
+
+@pytest.mark.parametrize("seed", [1, long(2)])
+def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
+    cause = change_of("friction", seed, wander=0.3).causes[0]
+    assert "viscous" in (cause.effect, *cause.ties)
+    assert change_of("nothing", seed, wander=0.3).causes == ()
 
 
 @pytest.mark.parametrize("sessions", [True, long(False)])
