@@ -9,6 +9,7 @@ from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
+from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.decoy import decoy_gain
 from opamc_cli.joint.name.experiments import separating_experiment
@@ -114,6 +115,8 @@ class Loop:
         On the sealed data.
     floor_a : float
         Sealed error that the ceiling leaves.
+    noise_a : float
+        Standard deviation of what changes from sample to sample in the final residual.
     explained_share : float
         Share of the ceiling that named effects reach, 0 to 1.
     remaining_domain : str or None
@@ -135,6 +138,7 @@ class Loop:
     r2_before: float
     r2_after: float
     floor_a: float
+    noise_a: float
     explained_share: float
     remaining_domain: str | None
     orders_note: str
@@ -282,6 +286,7 @@ def _opened(
         r2_before=_r2(before),
         r2_after=_r2(after),
         floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
+        noise_a=measurement_noise(after.residual_a[after.session.sharp.fit]),
         explained_share=float(np.clip(reached, 0.0, 1.0)),
         remaining_domain=domain,
         orders_note=(

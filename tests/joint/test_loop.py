@@ -37,6 +37,7 @@ def test_nothing_is_added_where_nothing_is_missing(motion):
     assert loop.explained_share == 1.0
     assert loop.rmse_after_a == loop.rmse_before_a
     assert not loop.ceiling.certain
+    assert loop.noise_a == pytest.approx(0.02, rel=0.1)
 
 
 @pytest.mark.parametrize(

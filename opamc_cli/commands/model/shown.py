@@ -61,7 +61,9 @@ def _headline(result: Mapping[str, Any]) -> str:
     if words:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
     if result.get("verdict") == "nothing-missing":
-        return f"Axis {axis} lacks nothing that the data can show: error {before} {unit}"
+        noise = result.get("noise_a")
+        of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
+        return f"Axis {axis} lacks nothing that the data can show: error {before} {unit}{of_it}"
     if "verdict" not in result or "steps" not in result:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")

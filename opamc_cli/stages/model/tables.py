@@ -165,6 +165,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "steps": [step_entry(step, loop.steps, laid.session.fine.track) for step in loop.steps],
         "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
         "floor_a": loop.floor_a,
+        "noise_a": loop.noise_a,
         "explained_share": loop.explained_share,
         "rejected": [
             {
