@@ -168,6 +168,8 @@ def explain_change(
     if len(before) < 2 or not after:
         why = "too few cycles or recordings whose torque axis can be followed"
         return Change((), 0.0, 0.0, False, why_not=why)
+    if not any(unit.current_a().any() for unit in before):
+        return Change((), 0.0, 0.0, False, why_not="no current in the baseline")
     population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
     units = [unit.with_model(terms, population.mean) for unit in before + after]
 

@@ -75,6 +75,12 @@ def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
     assert change_of("nothing", seed, wander=0.3).causes == ()
 
 
+def test_a_current_that_is_always_zero_has_no_cause():
+    made = simulate(1, (), 0.0, cycles=2, rate=250.0)
+    dead = Recording("0", 250.0, current_a=np.zeros(made.time.size), position_rad=made.position)
+    assert explain_change([dead] * BASELINE, [dead] * TARGET, Joint()).causes == ()
+
+
 @pytest.mark.parametrize("sessions", [True, long(False)])
 @pytest.mark.parametrize("seed", [1, long(4)])
 def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
