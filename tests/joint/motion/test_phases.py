@@ -64,9 +64,9 @@ def test_delay_of_the_phase_sensors_does_not_turn_the_torque_axis():
 
 def test_short_gaps_of_current_are_bridged_and_long_ones_are_lost():
     strong = np.ones(1000, dtype=bool)
-    strong[200:210] = False
+    strong[200:203] = False
     strong[500:600] = False
-    gone = lost(strong, rate_hz=1000.0)
+    gone = lost(strong, rate_hz=2000.0)
     assert np.array_equal(np.flatnonzero(gone), np.arange(500, 600))
     assert lost(np.zeros(10, dtype=bool), 1000.0).all()
 
@@ -130,6 +130,28 @@ def test_half_turns_are_counted_through_gaps_of_the_current(gap_s):
     # The recording begins in full motion: the filter needs a moment to know the speed.
     settled = np.flatnonzero(strong) > 0.2 * rate
     assert np.ptp(error[settled]) < 0.5
+
+
+def test_a_torque_that_passes_zero_while_braking_keeps_its_sign():
+    """Gaps of some milliseconds at a reversal: counted as one stretch, 3 % had the wrong sign."""
+    rng = np.random.default_rng(1)
+    rate, place, moves = 2000.0, 0.0, []
+    for _ in range(8):
+        to, seconds = rng.uniform(-200, 200), rng.uniform(0.4, 0.9)
+        part = np.arange(int(seconds * rate)) / (seconds * rate)
+        moves += [place + (to - place) * part**3 * (10 - 15 * part + 6 * part**2)]
+        moves += [np.full(int(0.05 * rate), to)]
+        place = to
+    angle = np.concatenate(moves)
+    speed = np.gradient(angle) * rate
+    torque = 1.2e-3 * np.gradient(speed) * rate + 0.4 * np.tanh(speed / 3) + 3e-3 * speed
+    torque += 2.0 * np.cos(angle / 120)
+    phases = np.stack([torque * np.cos(angle - k * 2 * np.pi / 3) for k in range(3)], axis=1)
+    phases += 0.02 * rng.normal(size=phases.shape)
+    track = build_track([Recording("run", rate, phases_a=phases)], Joint(100.0, 5))
+    rows = track.moving & track.clear
+    assert np.mean(rows) > 0.5
+    assert np.mean(np.abs(track.current_a - torque)[rows] > 0.3) < 0.005
 
 
 def test_a_joint_that_rests_without_current_has_not_turned():

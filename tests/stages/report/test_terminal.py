@@ -95,6 +95,16 @@ def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
     assert "None" not in headline(entry)
 
 
+def test_an_error_far_above_the_noise_is_not_called_complete() -> None:
+    entry = {
+        "axis": 2, "unit": "A", "before": {"rmse_a": 0.69}, "after": {"rmse_a": 0.69},
+        "steps": [], "verdict": "nothing-missing", "noise_a": 0.06,
+    }  # fmt: skip
+    assert "is not explained either: error 0.69 A, of which 0.06 A is noise" in headline(entry)
+    entry["noise_a"] = 0.3
+    assert headline(entry).startswith("Axis 2 lacks nothing that the data can show: error 0.69 A")
+
+
 @pytest.mark.usefixtures("undrawn")
 def test_report_command_prints_verdict_and_loop(
     folder: Path, capsys: pytest.CaptureFixture[str]

