@@ -234,3 +234,36 @@ def test_friction_tells_the_side_of_the_torque_where_gravity_is_large():
         found, flux = torque_current(phases, electrical + turned, velocity, position)
         np.testing.assert_allclose(found, torque, atol=1e-9)
         np.testing.assert_allclose(flux, 0.0, atol=1e-9)
+
+
+def _strokes(torque_of) -> tuple[np.ndarray, np.ndarray, PhaseAngle]:
+    """Six strokes with rests between, current throughout, and an angle without a slip."""
+    rate = 1000.0
+    part = np.arange(1000) / rate
+    to_and_fro = 300 * part**3 * (10 - 15 * part + 6 * part**2)
+    rest = np.ones(200)
+    once = np.concatenate([to_and_fro, 300 * rest, 300 - to_and_fro, 0 * rest])
+    angle = np.tile(once, 3)
+    speed = np.gradient(angle) * rate
+    torque = torque_of(speed, angle)
+    every = np.ones(angle.size, dtype=bool)
+    blur = np.zeros((angle.size, 2))
+    followed = PhaseAngle(
+        angle, speed, np.gradient(speed) * rate, every, every, 1, np.ones(1), blur
+    )
+    return torque, np.abs(speed) > 0.1 * speed.max(), followed
+
+
+def test_a_stroke_that_slipped_at_rest_is_turned_back():
+    torque, rows, angle = _strokes(lambda v, q: np.sign(v) + 2e-3 * v + 0.5 * np.cos(q / 200))
+    seen = torque.copy()
+    seen[2400:3400] *= -1  # the third stroke, with no gap of the current before it
+    turned = seen * side_of_torque(seen, angle, 1000.0)
+    np.testing.assert_allclose(turned[rows], torque[rows])
+
+
+def test_friction_resists_though_it_grows_with_the_square_of_the_speed():
+    torque, rows, angle = _strokes(lambda v, q: 1e-5 * v * np.abs(v))
+    for sign in (1.0, -1.0):
+        turned = sign * torque * side_of_torque(sign * torque, angle, 1000.0)
+        np.testing.assert_allclose(turned[rows], torque[rows])

@@ -9,6 +9,10 @@ from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.track import Floats
 
 SIDE_ROUNDS = 8
+CLEARLY = 0.3
+"""Of its squared error: a stroke that loses less by being turned is followed rightly, and the model
+lacks something."""
+
 SLOWEST_SHARE = 0.05
 """Of the top speed: slower, friction has no certain direction."""
 
@@ -68,7 +72,9 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     Between stretches, where the current is too small to be followed, the angle may slip by pi.
     The sides are those that fit best to dry and lubricant friction, inertia and a smooth function
     of the position: starting from the sides on which the current does work, and from those as
-    followed, one stretch after the other is turned where that lowers the squared error.
+    followed, one stretch after the other is turned where that lowers the squared error. At rest
+    zero errors of the sensors can turn the angle of a small current: then one stroke after the
+    other is turned where that lowers it further.
 
     Parameters
     ----------
@@ -93,39 +99,55 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     inertia = angle.acceleration_rad_s2[:, None]
     columns = np.concatenate([_frictions(speed), inertia, _powers(angle.angle_rad)], axis=1)
     columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
-    sides = []
-    grams, moments = [], []
-    for start, stop in pieces:
-        rows = slice(start, stop)
-        part = columns[rows][moving[rows]]
-        values = torque_a[rows][moving[rows]]
-        work = float(np.dot(values, part[:, 0])) if values.size else 0.0
-        sides.append(1.0 if work >= 0 else -1.0)
-        grams.append(part.T @ part)
-        moments.append(part.T @ values)
-    gram, moment = np.array(grams), np.array(moments)
-    starts = (np.array(sides), np.ones(len(sides)))
-    signs = max((_turned(start, gram, moment) for start in starts), key=lambda found: found[0])[1]
+
+    def sums(parts: list[tuple[int, int]]) -> tuple[Floats, Floats, Floats]:
+        rows = [np.flatnonzero(moving[start:stop]) + start for start, stop in parts]
+        gram = np.array([columns[part].T @ columns[part] for part in rows])
+        moment = np.array([columns[part].T @ torque_a[part] for part in rows])
+        return gram, moment, np.array([float(np.sum(torque_a[part] ** 2)) for part in rows])
+
+    found = sums(pieces)
+    starts = (np.where(found[1][:, 0] >= 0, 1.0, -1.0), np.ones(len(pieces)))
+    signs = max((_turned(start, *found) for start in starts), key=lambda one: one[0])[1]
     side = np.ones(torque_a.size)
     for (start, _), sign in zip(pieces, signs, strict=True):
         side[start:] = sign
+    strokes = [
+        (start + first, start + last)
+        for start, stop in pieces
+        for first, last in stretches(moving[start:stop], rate_hz)
+    ]
+    if strokes:
+        started = side[[start for start, _ in strokes]]
+        turned = started * _turned(started, *sums(strokes), share=CLEARLY)[1]
+        for (start, stop), sign in zip(strokes, turned, strict=True):
+            side[start:stop] *= sign
     return side
 
 
-def _turned(signs: Floats, gram: Floats, moment: Floats) -> tuple[float, Floats]:
-    """Turn one stretch after the other while that explains more; also how much is explained."""
+def _turned(
+    signs: Floats, gram: Floats, moment: Floats, power: Floats, share: float = 1.0
+) -> tuple[float, Floats]:
+    """Turn one stretch after the other while its squared error falls below a share of what it was.
+
+    Also says how much is explained.
+    """
     signs = signs.copy()
     total = gram.sum(axis=0)
     for _ in range(SIDE_ROUNDS):
         turned = False
         for k in range(signs.size):
             coefficients = solve(total - gram[k], signs @ moment - signs[k] * moment[k])
-            better = 1.0 if float(coefficients @ moment[k]) >= 0 else -1.0
-            turned |= better != signs[k]
-            signs[k] = better
+            model = power[k] + float(coefficients @ gram[k] @ coefficients)
+            product = 2.0 * signs[k] * float(coefficients @ moment[k])
+            if model + product < share * (model - product):
+                signs[k] = -signs[k]
+                turned = True
         if not turned:
             break
     joint = signs @ moment
-    explained = float(solve(total, joint) @ joint)
-    # Friction resists: of two mirror images only one has it positive.
-    return explained, signs if solve(total, joint)[0] >= 0 else -signs
+    coefficients = solve(total, joint)
+    # Friction resists: in only one of two mirror images do its columns do work against the speed,
+    # which is the second of them. One that grows with the square has a dry part below zero.
+    resists = float(coefficients[:2] @ total[:2, 1]) >= 0
+    return float(coefficients @ joint), signs if resists else -signs
