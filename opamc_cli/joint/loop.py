@@ -11,11 +11,11 @@ from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnam
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
-from opamc_cli.joint.name.significance import decoy_gain
-from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import Pool, Trial, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
+from opamc_cli.joint.name.significance import decoy_gain
+from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.noise.spectra import highest_order, order_resolution
 
 CLOSED_SHARE = 0.9

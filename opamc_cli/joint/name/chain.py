@@ -10,8 +10,6 @@ from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.motion.track import Bools, Floats
 
 Signature = frozenset[tuple[object, ...]]
-LEAST_T = 2.0
-"""A difference over its standard error, over parts of the open data, that is none below it."""
 PRICE = 0.02
 """Logarithm of the held-out mean square error per degree of freedom: 2 % of the error."""
 MOST_CHARGED = 16

@@ -6,8 +6,9 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.name.chain import LEAST_T, Chain
+from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Pool, trials
+from opamc_cli.joint.name.significance import LEAST_T
 
 APPROXIMATE = 0.5
 """Share of its domain's curve that a form holds, from which on it has the name approximately (from

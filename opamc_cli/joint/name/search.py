@@ -4,15 +4,14 @@ from collections.abc import Collection
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.special import stdtr
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Session, Term
-from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
-from opamc_cli.joint.name.chain import LEAST_T, Chain, Signature, extended, signature_of
+from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
 from opamc_cli.joint.name.refine import refined
+from opamc_cli.joint.name.significance import LEAST_T, p_value
 
 CHAINS = 2
 """Followed side by side: a bump that imitates a spring shows itself only beside the spring. Four
@@ -98,7 +97,7 @@ class Trial:
     @property
     def p_value(self) -> float:
         """Probability of such a t where the effect does nothing."""
-        return float(stdtr(max(self.chain.error.size - 1, 1), -self.t_value))
+        return p_value(self.t_value, self.chain.error.size)
 
 
 def guessed(effect: Effect, session: Session) -> list[Term]:
@@ -270,9 +269,3 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
         chains = sorted(following, key=lambda chain: chain.score)[:width]
         reached += chains
     return min(reached, key=lambda chain: chain.score)
-
-
-def paired(before: Floats, after: Floats) -> tuple[float, float]:
-    """Difference of two chains' held-out errors, and its standard error over the parts."""
-    difference = after - before
-    return float(difference.sum()), float(np.std(difference, ddof=1)) * np.sqrt(difference.size)

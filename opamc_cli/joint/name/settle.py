@@ -1,10 +1,12 @@
-"""What a chain keeps when each effect is asked again beside the others; what ties with it."""
+"""What a chain keeps when each effect is asked again beside the others."""
 
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.name.chain import LEAST_T, Chain, extended, without
-from opamc_cli.joint.name.search import Pool, Trial, objection, paired, trials
+from opamc_cli.joint.name.chain import Chain, extended, without
+from opamc_cli.joint.name.search import Pool, Trial, objection, trials
+from opamc_cli.joint.name.significance import LEAST_T, paired
+from opamc_cli.joint.name.ties import ties_of
 
 CLEARLY = 0.05
 """Of the score: where an effect stands against another or a function without a name, a difference
@@ -109,13 +111,8 @@ def _asked_again(
         better = other.chain.score < best.score - CLEARLY
         if better and other.why_not is None and "exchange" not in pool.without:
             return other.chain, []
-    ties = []
-    for other in others:
-        difference, error = paired(best.error, other.chain.error)
-        if other.why_not is None and difference <= LEAST_T * error:
-            ties.append(other.term.effect.name)
-    names = tuple(name for name in dict.fromkeys(ties) if name != term.effect.name)
-    return None, [Named(trial, tuple(others), names)]
+    ties = ties_of(best, term.effect.name, others)
+    return None, [Named(trial, tuple(others), ties)]
 
 
 def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:

@@ -1,12 +1,28 @@
-"""What an effect takes off a residual that is none of its own."""
+"""How sure it is that an effect does something, and what it does to a residual of chance."""
 
 import numpy as np
+from scipy.special import stdtr
 
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.fit.parts import Sums
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain
 
+LEAST_T = 2.0
+"""A difference over its standard error, over parts of the open data, that is none below it."""
+
 DECOYS = 5
+
+
+def paired(before: Floats, after: Floats) -> tuple[float, float]:
+    """Difference of two chains' held-out errors, and its standard error over the parts."""
+    difference = after - before
+    return float(difference.sum()), float(np.std(difference, ddof=1)) * np.sqrt(difference.size)
+
+
+def p_value(t_value: float, n_parts: int) -> float:
+    """Probability of such a t where the effect does nothing."""
+    return float(stdtr(max(n_parts - 1, 1), -t_value))
 
 
 def decoy_gain(chain: Chain, term: Term, seed: int) -> float:

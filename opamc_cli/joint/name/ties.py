@@ -1,4 +1,10 @@
-"""The recording that would tell tied explanations apart."""
+"""Explanations that the data cannot tell apart, and the recording that would."""
+
+from collections.abc import Sequence
+
+from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.search import Trial
+from opamc_cli.joint.name.significance import LEAST_T, paired
 
 SPEED = frozenset({"coulomb", "viscous", "stribeck", "quadratic_friction", "sublinear_friction"})
 PLACE = frozenset(
@@ -20,6 +26,26 @@ ADVICE = (
     ),
     (PLACE, "cover more of the travel, through every place in both directions"),
 )
+
+
+def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
+    """Return the effects that in the place of one leave no surely larger held-out error.
+
+    Parameters
+    ----------
+    best : Chain
+        With the effect.
+    name : str
+        The effect's.
+    others : sequence of Trial
+        The chain with others in its place.
+    """
+    found = []
+    for other in others:
+        difference, error = paired(best.error, other.chain.error)
+        if other.why_not is None and difference <= LEAST_T * error:
+            found.append(other.term.effect.name)
+    return tuple(other for other in dict.fromkeys(found) if other != name)
 
 
 def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
