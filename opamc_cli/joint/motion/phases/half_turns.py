@@ -9,11 +9,15 @@ from opamc_cli.joint.motion.phases.angle_filter import smoothed_angle
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.track import Bools, Floats
 
-LOST_S = 0.002
+UNSEEN_S = 0.002
 """After this long without current half turns are counted anew: while the torque passes zero and the
 joint brakes hard the angle turns unseen. Of 140 simulated recordings (phases at 2 kHz, the panel's
 seeds 77000 to 82000) 19 left more than 1.5 times the least error of all values tried at 15 ms, 6 at
 4 ms, 3 at 2 ms and at 1 ms."""
+
+LOST_S = 0.015
+"""After this long without current nothing is known of the motion in between; at 2 ms as well, the
+cause of a change loses samples, and one pair of twelve twice (benchmarks/cause.py, seed 31000)."""
 
 REST_SHARE = 0.03
 REST_MARGIN_S = 0.02
@@ -193,17 +197,17 @@ def lost(strong: Bools, rate_hz: float) -> Bools:
         False also in gaps of up to `LOST_S`: the filter bridges them.
     """
     result: Bools = np.ones(strong.size, dtype=bool)
-    for start, stop in stretches(strong, rate_hz):
+    for start, stop in stretches(strong, rate_hz, LOST_S):
         result[start:stop] = False
     return result
 
 
-def stretches(strong: Bools, rate_hz: float) -> list[tuple[int, int]]:
-    """Half-open stretches of strong samples; gaps of up to `LOST_S` do not end them."""
+def stretches(strong: Bools, rate_hz: float, gap_s: float = UNSEEN_S) -> list[tuple[int, int]]:
+    """Half-open stretches of strong samples; gaps of up to `gap_s` do not end them."""
     rows = np.flatnonzero(strong)
     if not rows.size:
         return []
-    breaks = np.flatnonzero(np.diff(rows) > max(int(LOST_S * rate_hz), 2))
+    breaks = np.flatnonzero(np.diff(rows) > max(int(gap_s * rate_hz), 2))
     starts = [int(rows[0]), *(int(rows[b + 1]) for b in breaks)]
     stops = [*(int(rows[b]) + 1 for b in breaks), int(rows[-1]) + 1]
     return list(zip(starts, stops, strict=True))
