@@ -100,8 +100,8 @@ def run(
     kept
         Where results of the same work on the baseline may lie.
     figures_of_healthy
-        Whether the report of a diagnosis in which every joint is healthy has figures: they take
-        longer than the diagnosis of a short recording.
+        Whether joints that are healthy have their part in the report's figures, which take longer
+        than the diagnosis of a short recording.
 
     Raises
     ------
@@ -193,9 +193,7 @@ def _diagnose(
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
-    healthy = all(entry["state"] == "healthy" for entry in written.verdict["axes"])
-    figures = figures_of_healthy or not healthy
-    page = report.run(out, title=config.report.title, figures=figures)
+    page = report.run(out, title=config.report.title, figures_of_healthy=figures_of_healthy)
     return DiagnoseOutcome(
         verdict=written.verdict,
         verdict_path=written.path,

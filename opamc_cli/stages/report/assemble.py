@@ -56,7 +56,7 @@ def run(
     title: str = "Joint health",
     baseline: Sequence[Path] = (),
     target: Sequence[Path] = (),
-    figures: bool = True,
+    figures_of_healthy: bool = True,
 ) -> ReportOutcome:
     """Write report.html of an output folder.
 
@@ -68,8 +68,8 @@ def run(
         Heading of the page.
     baseline, target
         Where the runs are now, if not where the tables remember them.
-    figures
-        Whether the evidence is drawn.
+    figures_of_healthy
+        Whether joints that are healthy have their part in the figures.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def run(
         If scores or features are missing, or any file is damaged.
     """
     inputs = read_inputs(out, {"baseline": _folders(baseline), "target": _folders(target)})
-    page, omitted = render(inputs, title, figures)
+    page, omitted = render(inputs, title, figures_of_healthy)
     path = out / files.REPORT
     write_text(path, page)
     return ReportOutcome(path, inputs, omitted)
@@ -88,15 +88,18 @@ def _folders(paths: Sequence[Path]) -> list[Path]:
     return [path if path.is_dir() else path.parent for path in paths]
 
 
-def render(inputs: ReportInputs, title: str, figures: bool = True) -> tuple[str, tuple[str, ...]]:
+def render(
+    inputs: ReportInputs, title: str, figures_of_healthy: bool = True
+) -> tuple[str, tuple[str, ...]]:
     """Return the page, and one line for each part that could not be drawn."""
     if inputs.axes:
         focus = choose_focus(inputs)
         evidence = Section((), ("figures: not drawn of a healthy night",))
-        if figures:
+        drawn = inputs if figures_of_healthy else inputs.unhealthy()
+        if drawn.axes:
             from opamc_cli.stages.report.figures.shown import EVIDENCE
 
-            evidence = _draw(EVIDENCE, lambda draw: draw(inputs, focus))
+            evidence = _draw(EVIDENCE, lambda draw: draw(drawn, focus))
         views = {axis: axis_view(inputs, axis, focus) for axis in by_severity(inputs)}
     else:
         evidence, views = Section((), ()), {}

@@ -1,7 +1,7 @@
 """What a report is made from: the tables, the verdict and the loop of one output folder."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages.report.results.columns import Columns, n_rows, to_columns
+from opamc_cli.stages.report.results.columns import Columns, n_rows, select, to_columns
 from opamc_cli.storage.files.json_documents import read_json
 from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.runs import Run, file_sha256
@@ -117,6 +117,12 @@ class ReportInputs:
     def axes(self) -> list[int]:
         """Axes with scores, ascending."""
         return sorted({int(axis) for axis in self.scores.get("axis", ())})
+
+    def unhealthy(self) -> "ReportInputs":
+        """Return the same with the scores of joints alone that are not healthy."""
+        axes = [axis for axis in self.axes if self.state(axis) != "healthy"]
+        mask = np.isin(self.scores["axis"], axes) if self.scores else np.empty(0, dtype=bool)
+        return replace(self, scores=select(self.scores, mask))
 
     @property
     def all_axes(self) -> list[int]:
