@@ -65,7 +65,7 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
         return finish(
             drawing,
             "feature-space",
-            "Features of every axis",
+            "Features by axis",
             "Change of mean and variance of each axis's divergences, and the distance of their "
             f"two distributions, over all motions, order {orders}.",
             f"Three panels of points, Δμ, Δσ² and KS: {words}.",
