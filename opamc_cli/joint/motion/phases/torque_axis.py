@@ -109,7 +109,7 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
 
     found = sums(pieces)
     starts = (np.where(found[1][:, 0] >= 0, 1.0, -1.0), np.ones(len(pieces)))
-    signs = max((_turned(start, *found) for start in starts), key=lambda one: one[0])[1]
+    _, signs, resists = max((_turned(start, *found) for start in starts), key=lambda one: one[0])
     side = np.ones(torque_a.size)
     for (start, _), sign in zip(pieces, signs, strict=True):
         side[start:] = sign
@@ -120,18 +120,19 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     ]
     if strokes:
         started = side[[start for start, _ in strokes]]
-        turned = started * _turned(started, *sums(strokes), share=CLEARLY)[1]
-        for (start, stop), sign in zip(strokes, turned, strict=True):
-            side[start:stop] *= sign
-    return side
+        _, signs, resists = _turned(started, *sums(strokes), share=CLEARLY)
+        for (start, stop), sign in zip(strokes, signs, strict=True):
+            side[start:stop] = sign
+    return side if resists else -side
 
 
 def _turned(
     signs: Floats, gram: Floats, moment: Floats, power: Floats, share: float = 1.0
-) -> tuple[float, Floats]:
+) -> tuple[float, Floats, bool]:
     """Turn one stretch after the other while its squared error falls below a share of what it was.
 
-    Also says how much is explained.
+    Also says how much is explained, and whether friction resists: of two mirror images it does in
+    one.
     """
     signs = signs.copy()
     total = gram.sum(axis=0)
@@ -148,7 +149,7 @@ def _turned(
             break
     joint = signs @ moment
     coefficients = solve(total, joint)
-    # Friction resists: in only one of two mirror images do its columns do work against the speed,
-    # which is the second of them. One that grows with the square has a dry part below zero.
+    # All that depends on the speed's direction does work against the speed, the second column:
+    # friction that grows with the square has a dry part below zero.
     resists = float(coefficients[:2] @ total[:2, 1]) >= 0
-    return float(coefficients @ joint), signs if resists else -signs
+    return float(coefficients @ joint), signs, resists
