@@ -10,11 +10,6 @@ if TYPE_CHECKING:
 
 MOST_REJECTED = 3
 
-UNEXPLAINED = 3.0
-"""Times the noise between samples: a larger error is not said to be all that there is. A measured
-arm's joints leave 1.2 to 3.5 times where one moves alone; 4 to 16 times in programs of two seconds
-in which its neighbours push it and the model lacks nothing that it can be shown to lack."""
-
 
 def parameters(values: Mapping[str, float]) -> str:
     """Return parameters with four digits."""
@@ -44,6 +39,8 @@ def headline(result: Mapping[str, Any]) -> str:
 
 
 def _headline(result: Mapping[str, Any]) -> str:
+    from opamc_cli.stages.report.wording import unexplained
+
     # a file that another version wrote may lack fields
     axis, unit, steps = result["axis"], result.get("unit", "A"), result.get("steps", ())
     before, after = (
@@ -66,9 +63,9 @@ def _headline(result: Mapping[str, Any]) -> str:
     if words:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
     if result.get("verdict") == "nothing-missing":
-        noise, left = result.get("noise_a"), result.get("before", {}).get("rmse_a")
+        noise = result.get("noise_a")
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
-        if noise is not None and left is not None and left > UNEXPLAINED * noise:
+        if unexplained(result):
             return (
                 f"Axis {axis} lacks nothing that is known, and is not explained either: error "
                 f"{before} {unit}{of_it}; check how its motion was logged, units and gear ratio, "

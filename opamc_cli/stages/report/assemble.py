@@ -94,7 +94,7 @@ def render(
     """Return the page, and one line for each part that could not be drawn."""
     if inputs.axes:
         focus = choose_focus(inputs)
-        evidence = Section((), ("figures: not drawn of a healthy night",))
+        evidence = Section((), ("figures: not drawn of healthy joints",))
         drawn = inputs if figures_of_healthy else inputs.unhealthy()
         if drawn.axes:
             from opamc_cli.stages.report.figures.shown import EVIDENCE

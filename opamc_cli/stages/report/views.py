@@ -107,7 +107,7 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "axis": int(entry["axis"]),
         "unit": entry.get("unit", "A"),
-        "summary": wording.loop_phrase(entry.get("verdict")),
+        "summary": wording.loop_phrase(entry),
         "declared": ", ".join(map(str, entry.get("declared", ()))),
         "sealed": ", ".join(map(str, entry.get("sealed", ()))),
         "before": entry.get("before") or {},

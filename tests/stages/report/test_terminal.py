@@ -10,6 +10,7 @@ from rich.console import Console, RenderableType
 from opamc_cli import __main__
 from opamc_cli.commands.model.shown import headline
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
+from opamc_cli.stages.report.wording import loop_phrase
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -101,8 +102,10 @@ def test_an_error_far_above_the_noise_is_not_called_complete() -> None:
         "steps": [], "verdict": "nothing-missing", "noise_a": 0.06,
     }  # fmt: skip
     assert "is not explained either: error 0.69 A, of which 0.06 A is noise" in headline(entry)
+    assert "not explained" in loop_phrase(entry)
     entry["noise_a"] = 0.3
     assert headline(entry).startswith("Axis 2 lacks nothing that the data can show: error 0.69 A")
+    assert loop_phrase(entry).startswith("nothing is missing")
 
 
 @pytest.mark.usefixtures("undrawn")
