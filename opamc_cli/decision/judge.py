@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.divergence.jensen_shannon import chance_divergence, jensen_shannon
-from opamc_cli.decision.significance.multiplicity import holm
+from opamc_cli.decision.significance.multiplicity import harmonic_mean, holm
 from opamc_cli.decision.significance.permutation import relabelled_p_value, relabellings
 from opamc_cli.decision.significance.spread import (
     BETWEEN_SESSIONS,
@@ -249,7 +249,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         step, own = together.lowest_step(axis), witnesses.get(axis, {})
         asked = sum(math.isfinite(p) for p in own.values())
         ranked = [own[name] for name in ranking.get(axis, {})]
-        p_values[axis] = _beyond_ranks(together.p_value(axis), step, ranked, asked)
+        p_values[axis] = _beyond_ranks(together.p_value(axis), step, ranked)
         for name, kind in evidence.get(axis, {}).items():
             sure = asked * own[name]
             if not kind.ranks and sure < min(p_values[axis], policy.false_alarm_rate):
@@ -289,17 +289,17 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     return judgements
 
 
-def _beyond_ranks(p_value: float, step: float, ranked: Sequence[float], asked: int) -> float:
+def _beyond_ranks(p_value: float, step: float, ranked: Sequence[float]) -> float:
     """Say how improbable a shift is that exceeds all healthy ones.
 
     Ranks say no more of it than the lowest step. The soft maximum has a longer tail than its parts
-    have, which a Student tail does not know: below the step the p-value is that of the witness
-    that is surest, times the number that were asked (Bonferroni).
+    have, which a Student tail does not know: below the step it is the harmonic mean of the p-values
+    by those that rank.
     """
     known = [p for p in ranked if math.isfinite(p)]
-    if asked < 2 or not known or not p_value <= step:
+    if len(known) < 2 or not p_value <= step:
         return p_value
-    return min(step, asked * min(known))
+    return min(step, harmonic_mean(known))
 
 
 class _Comparison:

@@ -1,10 +1,11 @@
-"""Holm's procedure against its definition."""
+"""Corrections for several questions against their definitions."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.decision.significance.multiplicity import holm
+from opamc_cli.decision.significance.multiplicity import harmonic_mean, holm
 
 
 @settings(deadline=None)
@@ -22,3 +23,13 @@ def test_holm_rejects_what_its_step_down_definition_rejects(p, level):
 
 def test_holm_passes_over_joints_without_a_verdict():
     np.testing.assert_allclose(holm([0.01, np.nan, 0.04]), [0.02, np.nan, 0.04])
+
+
+def test_two_witnesses_together_keep_the_level_and_lie_between_the_least_and_its_double():
+    p = np.random.default_rng(7).random((60_000, 2))
+    together = np.array([harmonic_mean(pair) for pair in p])
+    least = p.min(axis=1)
+    assert (together >= least).all()
+    assert (together <= 2 * least).all()
+    assert np.mean(together <= 0.01) == pytest.approx(0.0103, abs=0.0012)
+    assert harmonic_mean([0.0, 0.5]) < 1e-300

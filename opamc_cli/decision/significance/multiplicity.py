@@ -1,4 +1,4 @@
-"""Correction for having asked about several joints at once."""
+"""Corrections for having asked several joints, or several witnesses of one joint."""
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -28,3 +28,26 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     factors = len(order) - np.arange(len(order))
     adjusted[order] = np.minimum(np.maximum.accumulate(factors * p[order]), 1.0)
     return adjusted
+
+
+def harmonic_mean(p_values: ArrayLike) -> float:
+    """Combine p-values of one hypothesis that may depend on each other.
+
+    Parameters
+    ----------
+    p_values : array_like, shape (N,)
+        Without NaN.
+
+    Returns
+    -------
+    float
+        Between the least of them, if all agree, and N times that (Bonferroni), if one alone is
+        small.
+
+    Notes
+    -----
+    D. J. Wilson, PNAS 116 (2019) 1195-1200: of two independent ones 1.03 % fall below 1 % (4 million draws).
+    """
+    # a tail too small for a floating point number is zero
+    p = np.maximum(np.asarray(p_values, dtype=np.float64), np.finfo(np.float64).tiny)
+    return float(p.size / np.sum(1 / p))
