@@ -46,7 +46,8 @@ def harmonic_mean(p_values: ArrayLike) -> float:
 
     Notes
     -----
-    D. J. Wilson, PNAS 116 (2019) 1195-1200: of two independent ones 1.03 % fall below 1 % (4 million draws).
+    D. J. Wilson, PNAS 116 (2019) 1195-1200. Of two independent ones 1.03 % fall
+    below 1 % (4 million draws).
     """
     # a tail too small for a floating point number is zero
     p = np.maximum(np.asarray(p_values, dtype=np.float64), np.finfo(np.float64).tiny)
