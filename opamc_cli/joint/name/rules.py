@@ -7,7 +7,6 @@ RULES = {
     "sign": "coefficients have the sign that physics gives them",
     "drift": "a change in time is seen beside free offsets, or explains as much as they do",
     "smoothing": "a wind-up or a delay is seen beside what other windows make of the motion",
-    "exchange": "an effect gives way to one that explains the data better beside the others",
     "unnamed": "an effect gives way to an unnamed function that explains the data clearly better",
     "windows": "the motion is differentiated over the window that predicts best",
 }

@@ -9,8 +9,7 @@ from opamc_cli.joint.name.significance import LEAST_T, paired
 from opamc_cli.joint.name.ties import ties_of
 
 CLEARLY = 0.05
-"""Of the score: where an effect stands against another or a function without a name, a difference
-of less is none."""
+"""Of the score: where an effect stands against a function without a name, less is no difference."""
 EXACT = 0.9
 """Share of its domain's curve from which on a form has the name."""
 MOST_ROUNDS = 4
@@ -41,7 +40,7 @@ class Named:
 
 
 def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]:
-    """Drop what is not worth its price, exchange what another effect explains better.
+    """Drop what is not worth its price, take the name off what a function without one does better.
 
     Parameters
     ----------
@@ -107,10 +106,6 @@ def _asked_again(
         for rival in trials(parent, _slow(unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain, []
-    for other in others:
-        better = other.chain.score < best.score - CLEARLY
-        if better and other.why_not is None and "exchange" not in pool.without:
-            return other.chain, []
     ties = ties_of(best, term.effect.name, others)
     return None, [Named(trial, tuple(others), ties)]
 

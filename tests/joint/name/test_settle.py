@@ -47,7 +47,7 @@ def test_two_imitators_give_way_to_the_effect_that_is_there():
     names = ("stribeck", "quadratic_friction", "sublinear_friction")
     chain, _ = settle(stribeck, *terms, names=names)
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
-    kept, _ = settle(stribeck, terms[0], names=names, without=("exchange", "unnamed"))
+    kept, _ = settle(stribeck, terms[0], names=names, without=("unnamed",))
     assert [one.effect.name for one in kept.terms] == ["quadratic_friction"]
 
 
