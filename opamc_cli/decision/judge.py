@@ -324,7 +324,9 @@ class _Comparison:
         self._distances = {axis: one for axis, one in distances.items() if one.known}
         self._pooled: dict[int, FloatArray] = {}
         self._by_cycles: dict[int, float] = {}
-        self.shifts = _session_shifts(self._distances)
+        # of several witnesses the first one's: those that rank differ little
+        self._expected = {axis: next(iter(one.values())).expected for axis, one in evidence.items()}
+        self.shifts = _session_shifts(self._distances, self._expected)
         self.shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
 
     def p_value(self, axis: int, taken_off: float = 0.0) -> float:
@@ -357,7 +359,7 @@ class _Comparison:
         values = self._pooled[axis].copy()
         values[0] *= math.exp(-taken_off)
         values = values[np.isfinite(values)]
-        relabelled = relabelled_p_value(values, n_baseline + n_target)
+        relabelled = relabelled_p_value(values, n_baseline + n_target, self._expected[axis])
         # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
         # observed one, the pairs' own tail may go below it, doubled for the second look.
         return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
@@ -479,7 +481,9 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
-def _session_shifts(distances: Mapping[int, SessionDistances]) -> dict[int, Shift]:
+def _session_shifts(
+    distances: Mapping[int, SessionDistances], expected: Mapping[int, Spread]
+) -> dict[int, Shift]:
     variances = {
         axis: float(one.own.var(ddof=1)) if len(one.own) > 2 else math.nan
         for axis, one in distances.items()
@@ -493,7 +497,7 @@ def _session_shifts(distances: Mapping[int, SessionDistances]) -> dict[int, Shif
         siblings = [key for key in distances if key != axis]
         if len(one.own) > 2:
             others = [variances[key] for key in siblings]
-            unit = spread_among_siblings(variances[axis], others, len(one.own) - 1)
+            unit = spread_among_siblings(variances[axis], others, len(one.own) - 1, expected[axis])
         else:
             # Two sessions have the same divergence from each other: no spread can be had from
             # them. What the target's session did to the siblings stands in for it.

@@ -7,8 +7,10 @@ from opamc_cli.decision import judge as decision
 from opamc_cli.decision.judge import Bundle
 from opamc_cli.decision.significance.permutation import relabellings
 from opamc_cli.decision.witnesses.deviation import PRIOR_DOF
+from opamc_cli.decision.witnesses.evidence import session_distances
 from opamc_cli.decision.witnesses.profiles import (
     LEAST_SHARE,
+    TWO_INFLUENCES,
     ProfileEvidence,
     between_groups,
     profile_cell,
@@ -71,6 +73,21 @@ def test_a_course_that_moved_on_all_joints_is_the_fault_of_none():
     found = [judged(seed, 0.8, everyone=True) for seed in range(5)]
     states = [one.state for joints in found for one in joints.values()]
     assert states.count("healthy") >= len(states) - 1
+
+
+def test_where_two_things_move_the_course_its_distances_scatter_as_is_expected():
+    rng = np.random.default_rng(11)
+    n_sessions, scatter = 31, []
+    shape = np.cos(np.linspace(0, 6, 32))
+    for _ in range(20):
+        moved = rng.normal(0, 0.02, (2, n_sessions, 1))
+        rows = np.repeat(MEAN_A * (1 + moved[0]) + shape * moved[1], PLAN.n_cycles, axis=0)
+        rows += rng.normal(0, 0.001, rows.shape)
+        session = np.repeat(np.arange(n_sessions), PLAN.n_cycles)
+        evidence = ProfileEvidence([profile_cell(0, rows, session, n_sessions)], n_sessions - 1)
+        scatter.append(session_distances(evidence, n_sessions - 1, 1).own.std(ddof=1))
+    assert np.mean(scatter) == pytest.approx(TWO_INFLUENCES.scale, rel=0.1)
+    assert evidence.expected is TWO_INFLUENCES
 
 
 def slow_between(sessions, is_target):

@@ -60,6 +60,13 @@ def test_the_tail_widens_with_fewer_degrees_of_freedom():
     assert upper_tail(0.0, Spread(1.0, 3.0)) == 0.5
 
 
+def test_what_is_expected_counts_for_one_value_where_the_sessions_say_little():
+    wide = spread_among_siblings(0.01, [], 2, Spread(1.2, 1.0))
+    usual = spread_among_siblings(0.01, [], 2)
+    assert wide.dof == usual.dof == 3
+    assert wide.scale / usual.scale == pytest.approx((1.2 / EXPECTED.scale) ** (1 / 3))
+
+
 def test_a_spread_among_siblings_is_the_mean_of_log_variances_by_their_freedom():
     """Its own, a tenth of what the siblings' median says, and what is usual elsewhere."""
 

@@ -77,7 +77,9 @@ SIBLING_SHARE = 0.1
 """Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread."""
 
 
-def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
+def spread_among_siblings(
+    variance: float, siblings: ArrayLike, dof: float, expected: Spread = EXPECTED
+) -> Spread:
     """Spread of one joint's healthy sessions, from its own and its siblings'.
 
     Parameters
@@ -88,16 +90,18 @@ def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> S
         Those of the other joints; NaN where unknown.
     dof : float
         Degrees of freedom of each, positive.
+    expected : Spread
+        Where nothing else is known.
 
     Returns
     -------
     Spread
         Of the joint's own, the siblings' median, which one odd sibling cannot move, and
-        `EXPECTED`.
+        `expected`.
     """
     values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
-    prior = EXPECTED
+    prior = expected
     if values.size:
         shared = SIBLING_SHARE * dof * values.size
         median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
