@@ -7,180 +7,63 @@ import pyarrow as pa
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.channels import MOST_HZ
 
-PLACE = ("run", "axis", "cycle", "motion", "segment", "start", "stop")
+COLUMNS: Mapping[pa.DataType, str] = {
+    pa.string(): "run kind signal role left_out effect parameters unit domain why_not",
+    pa.bool_(): "edge reference added",
+    pa.int8(): "direction order",
+    pa.int16(): "axis regressor round",
+    pa.int32(): "segment cycle motion tau tau_opt frames bins parts",
+    pa.int64(): "start stop lag reference_samples n_patterns n_masked n_pool n_baseline n_target",
+    pa.float64(): "sampling_rate_hz f_max_hz reference_f_max_hz variance similarity temperature_c "
+    "gamma bin_hz jsd chance excess base delta_mu delta_var ks lda self_consistency "
+    "patterns_per_cell coefficient standard_error low high condition_number rmse_a score p_value "
+    "gain t_value time_s position_rad velocity_rad_s residual_before_a residual_after_a before_a "
+    "after_a",
+    pa.list_(pa.int64()): "counts",
+    pa.list_(pa.float32()): "log_power current_a",
+}
+"""A column is of one type in all tables but one, see `ORDER_SPECTRUM`."""
+
+_TYPES = {name: kind for kind, names in COLUMNS.items() for name in names.split()}
+
+
+def _table(columns: str) -> pa.Schema:
+    return pa.schema([(name, _TYPES[name]) for name in columns.split()])
+
+
+_PLACE = "run axis cycle motion segment start stop"
+PLACE = tuple(_PLACE.split())
 """Columns that say what a row is of."""
 
-SEGMENTS = pa.schema(
-    [
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("segment", pa.int32()),
-        ("start", pa.int64()),
-        ("stop", pa.int64()),
-        ("sampling_rate_hz", pa.float64()),
-        ("f_max_hz", pa.float64()),
-        ("direction", pa.int8()),
-        ("variance", pa.float64()),
-        ("edge", pa.bool_()),
-        ("kind", pa.string()),
-        ("signal", pa.string()),
-        ("temperature_c", pa.float64()),
-    ]
+SEGMENTS = _table(
+    "run axis segment start stop sampling_rate_hz f_max_hz direction variance edge kind signal "
+    "temperature_c"
 )
-MOTIONS = pa.schema(
-    [
-        *SEGMENTS,
-        pa.field("cycle", pa.int32()),
-        pa.field("motion", pa.int32()),
-        pa.field("similarity", pa.float64()),
-        pa.field("lag", pa.int64()),
-        pa.field("reference", pa.bool_()),
-        pa.field("reference_f_max_hz", pa.float64()),
-        pa.field("reference_samples", pa.int64()),
-    ]
+MOTIONS = _table(
+    " ".join(SEGMENTS.names)
+    + " cycle motion similarity lag reference reference_f_max_hz reference_samples"
 )
-PATTERNS = pa.schema(
-    [
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("segment", pa.int32()),
-        ("start", pa.int64()),
-        ("stop", pa.int64()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("gamma", pa.float64()),
-        ("f_max_hz", pa.float64()),
-        ("n_patterns", pa.int64()),
-        ("n_masked", pa.int64()),
-        ("counts", pa.list_(pa.int64())),
-        ("signal", pa.string()),
-        ("temperature_c", pa.float64()),
-    ]
+PATTERNS = _table(
+    f"{_PLACE} order tau gamma f_max_hz n_patterns n_masked counts signal temperature_c"
 )
-_PLACE = pa.schema([PATTERNS.field(name) for name in PLACE])
-SPECTRA = pa.schema(
-    [
-        *_PLACE,
-        pa.field("frames", pa.int32()),
-        pa.field("bins", pa.int32()),
-        pa.field("bin_hz", pa.float64()),
-        pa.field("log_power", pa.list_(pa.float32())),
-    ]
+SPECTRA = _table(f"{_PLACE} frames bins bin_hz log_power")
+PROFILES = _table(f"{_PLACE} parts current_a")
+SCORES = _table(
+    "role run axis cycle motion segment order tau n_patterns n_pool left_out jsd chance excess base"
 )
-PROFILES = pa.schema(
-    [
-        *_PLACE,
-        pa.field("parts", pa.int32()),
-        pa.field("current_a", pa.list_(pa.float32())),
-    ]
+FEATURES = _table("axis motion order delta_mu delta_var ks n_baseline n_target f_max_hz lda base")
+SWEEP = _table("role run axis cycle motion order tau n_patterns jsd tau_opt")
+SELECTION = _table("axis order gamma self_consistency patterns_per_cell")
+FIT = _table(
+    "axis effect parameters regressor coefficient unit standard_error low high condition_number "
+    "rmse_a"
 )
-SCORES = pa.schema(
-    [
-        ("role", pa.string()),
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("segment", pa.int32()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("n_patterns", pa.int64()),
-        ("n_pool", pa.int64()),
-        ("left_out", pa.string()),
-        ("jsd", pa.float64()),
-        ("chance", pa.float64()),
-        ("excess", pa.float64()),
-        ("base", pa.float64()),
-    ]
-)
-FEATURES = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("motion", pa.int32()),
-        ("order", pa.int8()),
-        ("delta_mu", pa.float64()),
-        ("delta_var", pa.float64()),
-        ("ks", pa.float64()),
-        ("n_baseline", pa.int64()),
-        ("n_target", pa.int64()),
-        ("f_max_hz", pa.float64()),
-        ("lda", pa.float64()),
-        ("base", pa.float64()),
-    ]
-)
-SWEEP = pa.schema(
-    [
-        ("role", pa.string()),
-        ("run", pa.string()),
-        ("axis", pa.int16()),
-        ("cycle", pa.int32()),
-        ("motion", pa.int32()),
-        ("order", pa.int8()),
-        ("tau", pa.int32()),
-        ("n_patterns", pa.int64()),
-        ("jsd", pa.float64()),
-        ("tau_opt", pa.int32()),
-    ]
-)
-SELECTION = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("order", pa.int8()),
-        ("gamma", pa.float64()),
-        ("self_consistency", pa.float64()),
-        ("patterns_per_cell", pa.float64()),
-    ]
-)
-FIT = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("effect", pa.string()),
-        ("parameters", pa.string()),
-        ("regressor", pa.int16()),
-        ("coefficient", pa.float64()),
-        ("unit", pa.string()),
-        ("standard_error", pa.float64()),
-        ("low", pa.float64()),
-        ("high", pa.float64()),
-        ("condition_number", pa.float64()),
-        ("rmse_a", pa.float64()),
-    ]
-)
-CANDIDATES = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("round", pa.int16()),
-        ("effect", pa.string()),
-        ("domain", pa.string()),
-        ("parameters", pa.string()),
-        ("score", pa.float64()),
-        ("p_value", pa.float64()),
-        ("gain", pa.float64()),
-        ("t_value", pa.float64()),
-        ("added", pa.bool_()),
-        ("why_not", pa.string()),
-    ]
-)
-RESIDUALS = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("time_s", pa.float64()),
-        ("position_rad", pa.float64()),
-        ("velocity_rad_s", pa.float64()),
-        ("residual_before_a", pa.float64()),
-        ("residual_after_a", pa.float64()),
-    ]
-)
+CANDIDATES = _table("axis round effect domain parameters score p_value gain t_value added why_not")
+RESIDUALS = _table("axis time_s position_rad velocity_rad_s residual_before_a residual_after_a")
 ORDER_SPECTRUM = pa.schema(
-    [
-        ("axis", pa.int16()),
-        ("order", pa.float64()),
-        ("before_a", pa.float64()),
-        ("after_a", pa.float64()),
-    ]
+    [("axis", pa.int16()), ("order", pa.float64()), *_table("before_a after_a")]
 )
+"""Its order is a line's, periods per motor turn."""
 
 TABLES: Mapping[str, pa.Schema] = {
     files.SEGMENTS: SEGMENTS,
