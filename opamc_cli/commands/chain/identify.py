@@ -5,17 +5,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    ConfigFile,
-    Jobs,
-    Json,
-    MovedRuns,
-    Out,
-    Overrides,
-    Quiet,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.storage.schemas import files
 
@@ -33,13 +23,13 @@ def identify(
         str | None,
         typer.Option(metavar="NAME", help="Run in which the reference cycle is looked for."),
     ] = None,
-    runs: MovedRuns = None,
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    runs: options.MovedRuns = None,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find cycles and motions in a segment table; writes motions.parquet."""
     from opamc_cli.config import load_config

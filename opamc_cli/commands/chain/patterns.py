@@ -5,17 +5,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    ConfigFile,
-    Jobs,
-    Json,
-    MovedRuns,
-    Out,
-    Overrides,
-    Quiet,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.storage.schemas import files
 
@@ -25,13 +15,13 @@ def patterns(
         Path | None,
         typer.Argument(metavar="[MOTIONS]", help="Motion table; default: that in --out."),
     ] = None,
-    runs: MovedRuns = None,
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    runs: options.MovedRuns = None,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Count ordinal patterns of identified segments; writes patterns.parquet, spectra.parquet."""
     from opamc_cli.config import load_config

@@ -5,16 +5,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    ConfigFile,
-    Jobs,
-    Json,
-    Out,
-    Overrides,
-    Quiet,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 
 
@@ -23,12 +14,12 @@ def segment(
         list[Path],
         typer.Argument(metavar="RUN...", help="Run files, folders of them, quoted patterns."),
     ],
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Cut runs into motions, axis by axis; writes segments.parquet."""
     from opamc_cli.config import load_config

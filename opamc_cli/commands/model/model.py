@@ -9,15 +9,7 @@ import typer
 
 from opamc_cli.commands.model.effects import effects
 from opamc_cli.commands.model.shown import fields_table, loop_tables, parameters, untestable
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    Jobs,
-    Json,
-    Out,
-    Overrides,
-    Quiet,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import ConfigError
 
@@ -60,12 +52,12 @@ MOST_COEFFICIENTS = 4
 def fit(
     runs: Runs,
     model: ModelFile = DECLARED,
-    overrides: Overrides = None,
+    overrides: options.Overrides = None,
     axis: Axis = None,
-    out: Out = DEFAULT_OUT,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Fit the declared effects jointly; writes fit.parquet."""
     from opamc_cli.stages.model import model as stage
@@ -78,12 +70,12 @@ def fit(
 def trace(
     runs: Runs,
     model: ModelFile = DECLARED,
-    overrides: Overrides = None,
+    overrides: options.Overrides = None,
     axis: Axis = None,
-    out: Out = DEFAULT_OUT,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Trace the declared model's residual to its causes; writes candidates.parquet."""
     from opamc_cli.stages.model import model as stage
@@ -96,13 +88,13 @@ def trace(
 def close(
     runs: Runs,
     model: ModelFile = DECLARED,
-    overrides: Overrides = None,
+    overrides: options.Overrides = None,
     axis: Axis = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
-    out: Out = DEFAULT_OUT,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find and add what the declared model lacks; writes loop.json and the extended model."""
     from opamc_cli.config.joint_model import load_joint_model
@@ -140,12 +132,12 @@ def evaluate(
         Path,
         typer.Option("--model", "--config", metavar="FILE", help="The model.yaml of a close."),
     ],
-    overrides: Overrides = None,
+    overrides: options.Overrides = None,
     axis: Axis = None,
-    out: Out = DEFAULT_OUT,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Apply a closed model to other runs, coefficients frozen; writes evaluation.json."""
     from opamc_cli.stages.model.evaluate import evaluate as stage

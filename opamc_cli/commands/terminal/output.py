@@ -21,18 +21,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Output:
-    """Where results and notes go.
-
-    Attributes
-    ----------
-    as_json
-        Print the machine-readable result alone on stdout.
-    quiet
-        Print nothing but errors (and the JSON result, if asked for).
-    """
+    """Where results and notes go."""
 
     as_json: bool = False
+    """Print the machine-readable result alone on stdout."""
     quiet: bool = False
+    """Print nothing but errors (and the JSON result, if asked for)."""
 
     def note(self, text: str) -> None:
         """Print something worth knowing that is not the result."""

@@ -6,16 +6,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    ConfigFile,
-    Jobs,
-    Json,
-    Out,
-    Overrides,
-    Quiet,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import UsageError
 from opamc_cli.storage.schemas import files
@@ -34,12 +25,12 @@ def sweep(
     ] = None,
     tau: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Delays, in samples.")] = "1:25",
     order: Annotated[str, typer.Option(metavar="FIRST:LAST", help="Orders, 3..7.")] = "4:5",
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    jobs: Jobs = ALL_CORES,
-    as_json: Json = False,
-    quiet: Quiet = False,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    jobs: options.Jobs = options.ALL_CORES,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
 ) -> None:
     """Compute divergences over delays and orders; writes sweep.parquet and sweep.png."""
     taus, orders = _span("--tau", tau, 1, 10_000), _span("--order", order, 3, 7)

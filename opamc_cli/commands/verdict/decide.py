@@ -5,16 +5,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    DEFAULT_OUT,
-    ConfigFile,
-    ExitZero,
-    Json,
-    Out,
-    Overrides,
-    Quiet,
-    Verbose,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import ExitCode
 
@@ -36,13 +27,13 @@ def decide(
             help="Pattern table of the target; default: that of the diagnosis in --out.",
         ),
     ] = None,
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    exit_zero: ExitZero = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    exit_zero: options.ExitZero = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Decide again from patterns, spectra and profiles, without the runs; writes verdict.json.
 

@@ -5,18 +5,7 @@ from typing import Annotated
 
 import typer
 
-from opamc_cli.commands.terminal.options import (
-    ALL_CORES,
-    DEFAULT_OUT,
-    ConfigFile,
-    ExitZero,
-    Jobs,
-    Json,
-    Out,
-    Overrides,
-    Quiet,
-    Verbose,
-)
+from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import ExitCode
 
@@ -38,14 +27,14 @@ def diagnose(
         Path | None,
         typer.Option("--lda", metavar="FILE", help="Trained discriminant, from `score --learn`."),
     ] = None,
-    out: Out = DEFAULT_OUT,
-    config: ConfigFile = None,
-    overrides: Overrides = None,
-    jobs: Jobs = ALL_CORES,
-    exit_zero: ExitZero = False,
-    as_json: Json = False,
-    quiet: Quiet = False,
-    verbose: Verbose = False,
+    out: options.Out = options.DEFAULT_OUT,
+    config: options.ConfigFile = None,
+    overrides: options.Overrides = None,
+    jobs: options.Jobs = options.ALL_CORES,
+    exit_zero: options.ExitZero = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    verbose: options.Verbose = False,
 ) -> None:
     """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
     from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
