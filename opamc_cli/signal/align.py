@@ -12,19 +12,13 @@ MIN_OVERLAP = 0.5
 
 @dataclass(frozen=True)
 class Alignment:
-    """The lag at which a segment fits its reference best.
-
-    Attributes
-    ----------
-    lag
-        Samples by which the segment's content comes later than the reference's, counted from
-        the starts of both: ``segment[i + lag]`` corresponds to ``reference[i]``.
-    correlation
-        Pearson correlation of the overlapping parts at this lag, -1..1.
-    """
+    """The lag at which a segment fits its reference best."""
 
     lag: int
+    """Samples by which the segment's content comes later than the reference's, counted from the
+    starts of both: ``segment[i + lag]`` corresponds to ``reference[i]``."""
     correlation: float
+    """Pearson correlation of the overlapping parts at this lag, -1..1."""
 
 
 def align(

@@ -14,27 +14,18 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class SegmentFeatures:
-    """What identification knows of a series of segments, in time order; each of shape (n,).
-
-    Attributes
-    ----------
-    variance
-        Variance of the current, A², > 0.
-    duration_s
-        Length, s.
-    f_max_hz
-        Largest fundamental frequency reached, Hz.
-    direction
-        -1, 0 (unknown) or 1.
-    pause_s
-        Standstill before the segment, s; NaN where the recording starts too late to know.
-    """
+    """What identification knows of a series of segments, in time order; each of shape (n,)."""
 
     variance: Floats
+    """Variance of the current, A², > 0."""
     duration_s: Floats
+    """Length, s."""
     f_max_hz: Floats
+    """Largest fundamental frequency reached, Hz."""
     direction: Ints
+    """-1, 0 (unknown) or 1."""
     pause_s: Floats
+    """Standstill before the segment, s; NaN where the recording starts too late to know."""
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -57,40 +48,27 @@ class SegmentFeatures:
 
 @dataclass(frozen=True)
 class MatchRule:
-    """When a series of segments is the reference cycle once more.
-
-    Attributes
-    ----------
-    min_similarity
-        Least cosine similarity of the variance vectors, 0..1.
-    duration_tolerance, f_max_tolerance
-        Largest relative difference of each segment from its reference.
-    use_direction
-        Whether known directions must agree.
-    """
+    """When a series of segments is the reference cycle once more."""
 
     min_similarity: float = 0.9
+    """Least cosine similarity of the variance vectors, 0..1."""
     duration_tolerance: float = 0.35
     f_max_tolerance: float = 0.25
+    """With `duration_tolerance`: largest relative difference of each segment from its reference."""
     use_direction: bool = True
+    """Whether known directions must agree."""
 
 
 @dataclass(frozen=True)
 class Identification:
-    """Cycle, motion and similarity of each segment; -1, -1 and its best similarity where none.
-
-    Attributes
-    ----------
-    cycle, motion
-        Shape (n,); counted from 0, -1 where unidentified.
-    similarity
-        Shape (n,); cosine similarity of the cycle that the segment belongs to, or the largest
-        among the windows that hold an unidentified one.
-    """
+    """Cycle, motion and similarity of each segment; -1, -1 and its best similarity where none."""
 
     cycle: Ints
     motion: Ints
+    """With `cycle`: shape (n,); counted from 0, -1 where unidentified."""
     similarity: Floats
+    """Shape (n,); cosine similarity of the cycle that the segment belongs to, or the largest among
+    the windows that hold an unidentified one."""
 
 
 def sliding_similarity(reference_variance: Floats, variance: Floats) -> Floats:

@@ -42,31 +42,21 @@ LEAST_SHARE = 0.05
 
 @dataclass(frozen=True)
 class DiagnoseOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    verdict
-        Content of verdict.json.
-    verdict_path, report_path
-        The files that were written.
-    exit_code
-        What the verdict ends with.
-    n_runs
-        Runs that went through.
-    errors
-        One for each run, or axis of a run, that could not be used.
-    notes
-        What is worth knowing besides.
-    """
+    """What `run` did."""
 
     verdict: dict[str, Any]
+    """Content of verdict.json."""
     verdict_path: Path
     report_path: Path
+    """With `verdict_path`: the files that were written."""
     exit_code: ExitCode
+    """What the verdict ends with."""
     n_runs: int
+    """Runs that went through."""
     errors: tuple[OpamcError, ...]
+    """One for each run, or axis of a run, that could not be used."""
     notes: tuple[str, ...]
+    """What is worth knowing besides."""
 
 
 def run(

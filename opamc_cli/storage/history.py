@@ -106,61 +106,42 @@ class VerdictRow:
 
 @dataclass(frozen=True)
 class MeasureRow:
-    """What trend and alarm rest on beside the verdict.
-
-    Attributes
-    ----------
-    baseline
-        Name of the baseline that the night was compared with; a series ends where it changes.
-    distance
-        Logarithm of the distance from the baseline in healthy sessions' own.
-    common
-        What of it the robot's joints have in common.
-    effect
-        Relative change behind the state.
-    harmless
-        Whether the change has a cause outside the joint.
-    reason
-        First reason of the verdict, for what could not be judged.
-    """
+    """What trend and alarm rest on beside the verdict."""
 
     robot: str
     program: str
     axis: int
     night: str
     baseline: str
+    """Name of the baseline that the night was compared with; a series ends where it changes."""
     distance: float | None
+    """Logarithm of the distance from the baseline in healthy sessions' own."""
     common: float | None
+    """What of it the robot's joints have in common."""
     effect: float | None
+    """Relative change behind the state."""
     harmless: int
+    """Whether the change has a cause outside the joint."""
     reason: str
+    """First reason of the verdict, for what could not be judged."""
 
 
 @dataclass(frozen=True)
 class NightRow:
-    """What became of one robot's night.
-
-    Attributes
-    ----------
-    key
-        Hash of its inputs, options and version.
-    status
-        done, partial, baseline, failed (will fail again) or broken (may be tried again).
-    attempts
-        Starts that it broke in.
-    why
-        One sentence, if anything failed.
-    notes
-        JSON list of what is worth knowing.
-    """
+    """What became of one robot's night."""
 
     robot: str
     night: str
     key: str
+    """Hash of its inputs, options and version."""
     status: str
+    """done, partial, baseline, failed (will fail again) or broken (may be tried again)."""
     attempts: int = 0
+    """Starts that it broke in."""
     why: str = ""
+    """One sentence, if anything failed."""
     notes: str = "[]"
+    """JSON list of what is worth knowing."""
 
 
 @dataclass(frozen=True)

@@ -33,25 +33,17 @@ A_NIGHT = r"\d{4}[-_.]?\d{1,2}[-_.]?\d{1,2}"
 
 @dataclass(frozen=True)
 class LogFile:
-    """A recording that was found.
-
-    Attributes
-    ----------
-    path
-        Where it is: a path, or an address with ``://``.
-    robot
-        Name in the place of {robot}.
-    night
-        YYYY-MM-DD in the place of {night}; None where the pattern has none.
-    size, mtime_ns
-        To tell whether it is the file that it was.
-    """
+    """A recording that was found."""
 
     path: str
+    """Where it is: a path, or an address with ``://``."""
     robot: str
+    """Name in the place of {robot}."""
     night: str | None
+    """YYYY-MM-DD in the place of {night}; None where the pattern has none."""
     size: int
     mtime_ns: int
+    """With `size`: to tell whether it is the file that it was."""
 
     @property
     def remote(self) -> bool:
@@ -61,26 +53,18 @@ class LogFile:
 
 @dataclass(frozen=True)
 class Facts:
-    """What a recording says of itself, or why it cannot be read.
-
-    Attributes
-    ----------
-    program
-        Its name; empty if the recording names none.
-    speed_percent, payload_kg, sampling_rate_hz
-        Its conditions.
-    started_at
-        ISO 8601.
-    error
-        Why it is no recording; empty if it is one.
-    """
+    """What a recording says of itself, or why it cannot be read."""
 
     program: str = ""
+    """Its name; empty if the recording names none."""
     speed_percent: float | None = None
     payload_kg: float | None = None
     sampling_rate_hz: float | None = None
+    """With `speed_percent`, `payload_kg`: its conditions."""
     started_at: str | None = None
+    """ISO 8601."""
     error: str = ""
+    """Why it is no recording; empty if it is one."""
 
     @classmethod
     def of(cls, info: RunInfo) -> "Facts":

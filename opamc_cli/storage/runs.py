@@ -57,36 +57,26 @@ Array = npt.NDArray[Any]
 
 @dataclass(frozen=True)
 class RunInfo:
-    """What a run says of itself in the schema metadata key `opamc`.
-
-    Attributes
-    ----------
-    sampling_rate_hz
-        Samples per second; required, positive.
-    robot, program
-        Names; runs of different program or robot are not comparable.
-    speed_percent, payload_kg
-        Conditions of the recording.
-    started_at
-        ISO 8601, UTC.
-    session
-        Name of the recording session; runs of one session are not independent.
-    source_sha256, map_sha256
-        Of the file that the run was made from, and of the map that it was read by.
-    current_unit
-        "A", or "Nm" where a joint's torque stands for its motor's current.
-    """
+    """What a run says of itself in the schema metadata key `opamc`."""
 
     sampling_rate_hz: float
+    """Samples per second; required, positive."""
     robot: str | None = None
     program: str | None = None
+    """With `robot`: names; runs of different program or robot are not comparable."""
     speed_percent: float | None = None
     payload_kg: float | None = None
+    """With `speed_percent`: conditions of the recording."""
     started_at: str | None = None
+    """ISO 8601, UTC."""
     session: str | None = None
+    """Name of the recording session; runs of one session are not independent."""
     source_sha256: str | None = None
     map_sha256: str | None = None
+    """With `source_sha256`: of the file that the run was made from, and of the map that it was read
+    by."""
     current_unit: str = "A"
+    """"A", or "Nm" where a joint's torque stands for its motor's current."""
 
     def to_json(self) -> str:
         """Return canonical JSON without the unknown fields and an ordinary unit."""
@@ -98,18 +88,12 @@ class RunInfo:
 
 @dataclass(frozen=True)
 class AxisChannels:
-    """Names of the columns that a run holds for one axis.
-
-    Attributes
-    ----------
-    axis
-        Counted from 1.
-    columns
-        By channel, see `schemas.channels`.
-    """
+    """Names of the columns that a run holds for one axis."""
 
     axis: int
+    """Counted from 1."""
     columns: Mapping[str, str]
+    """By channel, see `schemas.channels`."""
 
     @property
     def phases(self) -> tuple[str, ...]:

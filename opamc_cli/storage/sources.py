@@ -21,27 +21,18 @@ WORTH_NOTING = ("robot", "speed_percent", "payload_kg")
 
 @dataclass(frozen=True)
 class RunSource:
-    """A run as a stage table remembers it.
-
-    Attributes
-    ----------
-    name
-        How the table's rows call it.
-    path
-        Where its file was.
-    sha256
-        Of the file.
-    n_samples
-        Its length.
-    info
-        Its metadata.
-    """
+    """A run as a stage table remembers it."""
 
     name: str
+    """How the table's rows call it."""
     path: Path
+    """Where its file was."""
     sha256: str
+    """Of the file."""
     n_samples: int
+    """Its length."""
     info: RunInfo
+    """Its metadata."""
 
     @classmethod
     def of(cls, run: Run) -> "RunSource":

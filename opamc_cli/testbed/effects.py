@@ -20,22 +20,14 @@ _Change = Callable[[Constants, float, dict[str, float]], None]
 
 @dataclass(frozen=True)
 class EffectKind:
-    """One name of the list.
-
-    Attributes
-    ----------
-    unit : str
-        Of the magnitude.
-    parameters : dict
-        Parameters with their defaults.
-    change : callable or None
-        Changes the constants of the axis; None for ripples and for what happens to the
-        recording.
-    """
+    """One name of the list."""
 
     unit: str
+    """Of the magnitude."""
     parameters: dict[str, float]
+    """Parameters with their defaults."""
     change: _Change | None
+    """Changes the constants of the axis; None for ripples and for what happens to the recording."""
 
 
 def _set(*names: str) -> _Change:

@@ -11,43 +11,30 @@ from opamc_cli.testbed.trajectory import Move, evaluate_move, plan_move
 
 @dataclass(frozen=True)
 class Program:
-    """What the robot is taught, the same for every axis that moves.
-
-    Attributes
-    ----------
-    waypoints_rad : tuple of float
-        A cycle visits them in turn and returns to the first: as many motions as way points.
-    dwell_s, dwell_jitter_s : float
-        Mean of the rest between motions, and half the width of its uniform jitter.
-    lead_s : float
-        Rest before the first and after the last motion of each axis.
-    cycles : int
-        Repetitions.
-    axes : tuple of int
-        The axes that move, counted from 1.
-    order : "sequential" or "together"
-        One axis at a time as in the thesis (all cycles of one, then the next), or all at once.
-    speed_percent, payload_kg : float
-        Speed override, 1..100; payload, 0 or more.
-    acceleration_rad_s2, jerk_rad_s3 : float
-        Limits at full speed.
-    acceleration_exponent : float
-        The acceleration limit scales with the speed override to this power e, the jerk limit
-        to 2 e - 1, so that 1 keeps the ramps' duration and 2 scales time as a whole.
-    """
+    """What the robot is taught, the same for every axis that moves."""
 
     waypoints_rad: tuple[float, ...]
+    """A cycle visits them in turn and returns to the first: as many motions as way points."""
     dwell_s: float
     dwell_jitter_s: float
+    """With `dwell_s`: mean rest between motions, and half the width of its uniform jitter."""
     lead_s: float
+    """Rest before the first and after the last motion of each axis."""
     cycles: int
+    """Repetitions."""
     axes: tuple[int, ...]
+    """The axes that move, counted from 1."""
     order: Literal["sequential", "together"]
+    """One axis at a time as in the thesis (all cycles of one, then the next), or all at once."""
     speed_percent: float
     payload_kg: float
+    """With `speed_percent`: speed override, 1..100; payload, 0 or more."""
     acceleration_rad_s2: float
     jerk_rad_s3: float
+    """With `acceleration_rad_s2`: limits at full speed."""
     acceleration_exponent: float
+    """The acceleration limit scales with the speed override to this power e, the jerk limit to
+    2 e - 1, so that 1 keeps the ramps' duration and 2 scales time as a whole."""
 
 
 @dataclass(frozen=True)

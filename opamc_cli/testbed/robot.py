@@ -40,33 +40,25 @@ class TrueSegment:
 
 @dataclass(frozen=True)
 class AxisRecording:
-    """What one axis's sensors give, and what truly happened.
-
-    Attributes
-    ----------
-    phases_a : ndarray of float32, shape (n, 3)
-    reported_a : ndarray of float32, shape (n,)
-        Signed motor current as the drive reports it.
-    position_rad, velocity_rad_s : ndarray, shape (n,)
-        Joint side, from the motor encoder, as a drive reports them.
-    temperature_c : ndarray of float32, shape (n,)
-    iq_a, motor_angle_rad, motor_velocity_rad_s : ndarray, shape (n,)
-        Truth.
-    joint_angle_rad, joint_velocity_rad_s, true_temperature_c : ndarray, shape (n,)
-        Truth.
-    """
+    """What one axis's sensors give, and what truly happened."""
 
     phases_a: NDArray[np.float32]
+    """Shape (n, 3)."""
     reported_a: NDArray[np.float32]
+    """Signed motor current as the drive reports it; shape (n,)."""
     position_rad: NDArray[np.float64]
     velocity_rad_s: NDArray[np.float64]
+    """With `position_rad`: joint side, from the motor encoder, as a drive reports; shape (n,)."""
     temperature_c: NDArray[np.float32]
+    """Shape (n,)."""
     iq_a: NDArray[np.float64]
     motor_angle_rad: NDArray[np.float64]
     motor_velocity_rad_s: NDArray[np.float64]
+    """With `iq_a`, `motor_angle_rad`: truth; shape (n,)."""
     joint_angle_rad: NDArray[np.float64]
     joint_velocity_rad_s: NDArray[np.float64]
     true_temperature_c: NDArray[np.float64]
+    """With `joint_angle_rad`, `joint_velocity_rad_s`: truth; shape (n,)."""
 
 
 @dataclass(frozen=True)

@@ -10,29 +10,20 @@ from opamc_cli.testbed.parameters import Robot
 
 @dataclass(frozen=True)
 class AxisSession:
-    """One axis as found in one session.
-
-    Attributes
-    ----------
-    temperature_c : float
-        Winding and gear temperature at the start.
-    friction, viscous : float
-        Factors on all friction, and on its viscous part once more.
-    error : float
-        Factor on the kinematic error.
-    mount_rad : ndarray, shape (5,)
-        Mounting angles: phases of the four kinematic error terms, angle of the sector.
-    phase_gain, phase_offset_a : ndarray, shape (3,)
-        Of the three current sensors.
-    """
+    """One axis as found in one session."""
 
     temperature_c: float
+    """Winding and gear temperature at the start."""
     friction: float
     viscous: float
+    """With `friction`: factors on all friction, and on its viscous part once more."""
     error: float
+    """Factor on the kinematic error."""
     mount_rad: NDArray[np.float64]
+    """Mounting angles: phases of four kinematic error terms, angle of the sector; shape (5,)."""
     phase_gain: NDArray[np.float64]
     phase_offset_a: NDArray[np.float64]
+    """With `phase_gain`: of the three current sensors; shape (3,)."""
 
 
 def draw_session(robot: Robot, axis: int, seed: int, session: int) -> AxisSession:

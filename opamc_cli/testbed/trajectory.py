@@ -9,21 +9,14 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Move:
-    """A rest-to-rest move in seven phases of constant jerk.
-
-    Attributes
-    ----------
-    distance_rad : float
-        Signed distance.
-    durations_s : tuple of float
-        The seven phases' durations.
-    jerk_rad_s3 : float
-        Magnitude of the jerk.
-    """
+    """A rest-to-rest move in seven phases of constant jerk."""
 
     distance_rad: float
+    """Signed distance."""
     durations_s: tuple[float, ...]
+    """The seven phases' durations."""
     jerk_rad_s3: float
+    """Magnitude of the jerk."""
 
     @property
     def duration_s(self) -> float:

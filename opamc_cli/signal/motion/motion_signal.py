@@ -19,41 +19,28 @@ OVERLAP_DURATIONS = 5.0
 
 @dataclass(frozen=True)
 class MotionFrames:
-    """Motion signal at evenly spaced samples.
-
-    Attributes
-    ----------
-    step : int
-        Samples between frames; frame i is at sample i·step.
-    strength : array of float32, shape (n,)
-        S(t), 0 at standstill, 1 for a carrier of constant frequency.
-    ridge_hz : array of float32, shape (n,)
-        Frequency of the scale with the largest modulus, refined between scales, Hz.
-    """
+    """Motion signal at evenly spaced samples."""
 
     step: int
+    """Samples between frames; frame i is at sample i·step."""
     strength: NDArray[np.float32]
+    """S(t), 0 at standstill, 1 for a carrier of constant frequency; shape (n,)."""
     ridge_hz: NDArray[np.float32]
+    """Frequency of the scale with the largest modulus, refined between scales, Hz; shape (n,)."""
 
 
 @dataclass(frozen=True)
 class MotionBand:
-    """Where carriers are looked for, and with which wavelet.
-
-    Attributes
-    ----------
-    f_min_hz, f_max_hz : float
-        Lowest and highest peak frequency, Hz; `f_max_hz` below half the sampling rate.
-    voices_per_octave : int
-        Scales per octave.
-    wavelet : Morse
-        The wavelet.
-    """
+    """Where carriers are looked for, and with which wavelet."""
 
     f_min_hz: float = 8.0
     f_max_hz: float = 800.0
+    """With `f_min_hz`: lowest and highest peak frequency, Hz; `f_max_hz` below half the sampling
+    rate."""
     voices_per_octave: int = 16
+    """Scales per octave."""
     wavelet: Morse = field(default_factory=Morse)
+    """The wavelet."""
 
     def frequencies_hz(self) -> NDArray[np.float64]:
         """Peak frequencies of the scales, ascending, Hz."""

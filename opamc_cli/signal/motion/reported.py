@@ -23,22 +23,15 @@ FEWEST_SAMPLES = 10
 
 @dataclass(frozen=True)
 class JointMotion:
-    """A motion told from velocity.
-
-    Attributes
-    ----------
-    start, stop : int
-        Samples, half-open.
-    direction : int
-        Sign of the velocity, 1 or -1.
-    speed_rad_s : float
-        Largest speed of the joint that lasted, rad/s.
-    """
+    """A motion told from velocity."""
 
     start: int
     stop: int
+    """With `start`: samples, half-open."""
     direction: int
+    """Sign of the velocity, 1 or -1."""
     speed_rad_s: float
+    """Largest speed of the joint that lasted, rad/s."""
 
 
 def velocity_from_position(

@@ -14,17 +14,12 @@ class Rotation:
     The sum over a frame of z[t]·conj(z[t-1]) has the angle by which the vector turns in a sample.
     White noise adds nothing to its mean, a change of the torque's sign next to nothing, and
     strong current counts more than weak.
-
-    Attributes
-    ----------
-    turn : array of float32, shape (n,), A^2
-        Imaginary part of the sum: positive where the vector turns forwards.
-    along : array of float32, shape (n,), A^2
-        Real part of the sum.
     """
 
     turn: NDArray[np.float32]
+    """Imaginary part of the sum: positive where the vector turns forwards; shape (n,), A^2."""
     along: NDArray[np.float32]
+    """Real part of the sum; shape (n,), A^2."""
 
     def __getitem__(self, frames: slice) -> "Rotation":
         """Rotation within some of the frames."""

@@ -26,78 +26,53 @@ FAST_SHARE = 0.7
 
 @dataclass(frozen=True)
 class MotionRule:
-    """What counts as a motion.
-
-    Attributes
-    ----------
-    on, off : float
-        Motion begins where S(t) reaches `on` and lasts while it stays above `off`; 0..1.
-    min_motion_s, min_still_s : float
-        Shorter motions are dropped; shorter standstills belong to the motion around them, s.
-    max_dip_s : float
-        Longest dip of S(t) inside one motion that is bridged because the carrier is as fast
-        after it as before it, s.
-    """
+    """What counts as a motion."""
 
     on: float = 0.5
     off: float = 0.3
+    """Motion begins where S(t) reaches `on` and lasts while it stays above `off`; 0..1."""
     min_motion_s: float = 0.1
     min_still_s: float = 0.06
+    """With `min_motion_s`: shorter motions are dropped; shorter standstills belong to the motion
+    around them, s."""
     max_dip_s: float = 2.0
+    """Longest dip of S(t) inside one motion that is bridged because the carrier is as fast after it
+    as before it, s."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion at the resolution of frames.
-
-    Attributes
-    ----------
-    first, last : int
-        Half-open interval of frames.
-    direction : int
-        Sense of rotation: 1, -1, or 0 where unknown.
-    f_max_hz : float
-        Largest fundamental frequency that lasted, Hz.
-    f_last_hz : float
-        Frequency in the last frame, Hz.
-    n_to_f_last : int
-        Frames from the first one to that in which the frequency first was as high as in the last.
-    """
+    """A motion at the resolution of frames."""
 
     first: int
     last: int
+    """With `first`: half-open interval of frames."""
     direction: int
+    """Sense of rotation: 1, -1, or 0 where unknown."""
     f_max_hz: float
+    """Largest fundamental frequency that lasted, Hz."""
     f_last_hz: float
+    """Frequency in the last frame, Hz."""
     n_to_f_last: int
+    """Frames from the first one to that in which the frequency first was as high as in the last."""
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What is known of one axis, frame by frame.
-
-    Attributes
-    ----------
-    frames : MotionFrames
-        Motion signal and ridge.
-    rotation : Rotation
-        Rotation of the analytic signal in the same frames.
-    has_direction : bool
-        Whether the rotation's sign means something: true for three phases, false for one.
-    fs_hz : float
-        Sampling rate, Hz.
-    noise_a : float
-        Standard deviation of the noise in each component of the analytic signal, A.
-    f_floor_hz : float
-        Lowest frequency of the motion signal's band, Hz.
-    """
+    """What is known of one axis, frame by frame."""
 
     frames: MotionFrames
+    """Motion signal and ridge."""
     rotation: Rotation
+    """Rotation of the analytic signal in the same frames."""
     has_direction: bool
+    """Whether the rotation's sign means something: true for three phases, false for one."""
     fs_hz: float
+    """Sampling rate, Hz."""
     noise_a: float
+    """Standard deviation of the noise in each component of the analytic signal, A."""
     f_floor_hz: float
+    """Lowest frequency of the motion signal's band, Hz."""
 
     @property
     def frame_s(self) -> float:

@@ -42,21 +42,14 @@ with the program; where they cut it anywhere, a motion is as often half as whole
 
 @dataclass(frozen=True)
 class IdentifyOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The table that was written.
-    table
-        Its rows.
-    errors
-        One for each axis of a run that could not be read.
-    """
+    """What `run` did."""
 
     path: Path
+    """The table that was written."""
     table: pa.Table
+    """Its rows."""
     errors: tuple[OpamcError, ...]
+    """One for each axis of a run that could not be read."""
 
     def cycles(self) -> dict[tuple[str, int], tuple[int, int]]:
         """Return the numbers of cycles and of unidentified segments by (run, axis)."""

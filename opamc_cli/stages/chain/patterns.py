@@ -30,24 +30,16 @@ FILES = (files.PATTERNS, *(witness.FILE_NAME for witness in WITNESSES))
 
 @dataclass(frozen=True)
 class PatternsOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The pattern table; those of the witnesses lie beside it.
-    table
-        The patterns' rows.
-    errors
-        One for each axis of a run that could not be read.
-    notes
-        Which delays are not those of (4-2), and why.
-    """
+    """What `run` did."""
 
     path: Path
+    """The pattern table; those of the witnesses lie beside it."""
     table: pa.Table
+    """The patterns' rows."""
     errors: tuple[OpamcError, ...]
+    """One for each axis of a run that could not be read."""
     notes: tuple[str, ...]
+    """Which delays are not those of (4-2), and why."""
 
     def by_motion(self) -> list[dict[str, Any]]:
         """Return delay, patterns and segments by axis, motion and order."""

@@ -33,24 +33,17 @@ ALL_MOTIONS = -1
 
 @dataclass(frozen=True)
 class ScoreOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    scores_path, features_path
-        The tables that were written.
-    scores, features
-        Their rows.
-    notes
-        What is worth knowing: conditions that differ, motions that one side lacks, orders with
-        more possible patterns than a segment holds.
-    """
+    """What `run` did."""
 
     scores_path: Path
     features_path: Path
+    """With `scores_path`: the tables that were written."""
     scores: pa.Table
     features: pa.Table
+    """With `scores`: their rows."""
     notes: tuple[str, ...]
+    """What is worth knowing: conditions that differ, motions that one side lacks, orders with more
+    possible patterns than a segment holds."""
 
 
 def run(

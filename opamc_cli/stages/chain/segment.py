@@ -29,24 +29,16 @@ SLOWEST_LOG_HZ = 10.0
 
 @dataclass(frozen=True)
 class SegmentOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The table that was written.
-    table
-        Its rows.
-    notes
-        One sentence for each channel that is doubtful but was used, or axis that stands still.
-    errors
-        One for each run, or axis of a run, that could not be used.
-    """
+    """What `run` did."""
 
     path: Path
+    """The table that was written."""
     table: pa.Table
+    """Its rows."""
     notes: tuple[str, ...]
+    """One sentence for each channel that is doubtful but was used, or axis that stands still."""
     errors: tuple[OpamcError, ...]
+    """One for each run, or axis of a run, that could not be used."""
 
     def by_axis(self) -> list[dict[str, Any]]:
         """Return segments, time in motion and largest frequency by run, axis and kind."""

@@ -17,27 +17,20 @@ FILES = (files.SEGMENTS, files.MOTIONS, *patterns.FILES)
 
 @dataclass(frozen=True)
 class ChainOutcome:
-    """Tables that the chain wrote, and what could not be used.
-
-    Attributes
-    ----------
-    segments, motions, patterns
-        Paths of the tables; those of the witnesses lie beside the patterns.
-    runs_done
-        Names of the runs that went through.
-    errors
-        One for each run, or axis of a run, that could not be used.
-    notes
-        What is worth knowing besides: doubtful channels, segments that fit no motion of the
-        reference.
-    """
+    """Tables that the chain wrote, and what could not be used."""
 
     segments: Path
     motions: Path
     patterns: Path
+    """With `segments`, `motions`: paths of the tables; those of the witnesses lie beside the
+    patterns."""
     runs_done: tuple[str, ...]
+    """Names of the runs that went through."""
     errors: tuple[OpamcError, ...]
+    """One for each run, or axis of a run, that could not be used."""
     notes: tuple[str, ...]
+    """What is worth knowing besides: doubtful channels, segments that fit no motion of the
+    reference."""
 
 
 def run_chain(

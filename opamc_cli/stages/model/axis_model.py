@@ -27,27 +27,18 @@ from opamc_cli.storage.runs import Run
 
 @dataclass(frozen=True)
 class AxisModel:
-    """A declared model laid on one axis's recordings.
-
-    Attributes
-    ----------
-    axis : int
-        Counted from 1.
-    fit : Fit
-        The declared model, fitted to the open data; parameters that were not given are found.
-    declared : tuple of (Effect, DeclaredEffect)
-        Model as declared.
-    library : Library
-        Effects that may be added.
-    unit : str
-        Of the current: "A", or "Nm" where a torque stands for it.
-    """
+    """A declared model laid on one axis's recordings."""
 
     axis: int
+    """Counted from 1."""
     fit: Fit
+    """The declared model, fitted to the open data; parameters that were not given are found."""
     declared: tuple[tuple[Effect, DeclaredEffect], ...]
+    """Model as declared."""
     library: Library
+    """Effects that may be added."""
     unit: str
+    """Of the current: "A", or "Nm" where a torque stands for it."""
 
     @property
     def session(self) -> Session:

@@ -15,21 +15,14 @@ from opamc_cli.storage.sources import RunSource
 
 @dataclass(frozen=True)
 class IdentifiedPart:
-    """The identified segments of one axis of one run.
-
-    Attributes
-    ----------
-    source
-        Where their samples are.
-    axis
-        Counted from 1.
-    rows
-        Rows of the motion table, in its order.
-    """
+    """The identified segments of one axis of one run."""
 
     source: RunSource
+    """Where their samples are."""
     axis: int
+    """Counted from 1."""
     rows: tuple[dict[str, Any], ...]
+    """Rows of the motion table, in its order."""
 
     def courses(
         self, config: PatternsConfig

@@ -53,35 +53,24 @@ MAP_VERSION = 1
 
 @dataclass(frozen=True)
 class Ingested:
-    """One recording that became a run.
-
-    Attributes
-    ----------
-    source, run
-        What was read, and the file that was written.
-    sampling_rate_hz, n_samples
-        Of the run.
-    missing
-        Values that are NaN, by column; columns without are left out.
-    stamps
-        What was found in the time stamps; None where the map names none, or nothing was done.
-    sources
-        The recording's channel by run column.
-    skipped
-        The run was there already, made from the same recording by the same map.
-    replaced
-        The run was there already, made from another recording or by another map.
-    """
+    """One recording that became a run."""
 
     source: str
     run: Path
+    """With `source`: what was read, and the file that was written."""
     sampling_rate_hz: float
     n_samples: int
+    """With `sampling_rate_hz`: of the run."""
     missing: Mapping[str, int]
+    """Values that are NaN, by column; columns without are left out."""
     stamps: StampAccount | None
+    """What was found in the time stamps; None where the map names none, or nothing was done."""
     sources: Mapping[str, Name] = field(default_factory=dict)
+    """The recording's channel by run column."""
     skipped: bool = False
+    """The run was there already, made from the same recording by the same map."""
     replaced: bool = False
+    """The run was there already, made from another recording or by another map."""
 
 
 @dataclass(frozen=True)

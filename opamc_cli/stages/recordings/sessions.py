@@ -11,18 +11,12 @@ BY_SESSION, BY_NIGHT, BY_FOLDER, BY_FILE = "session", "night", "folder", "file"
 
 @dataclass(frozen=True)
 class Sessions:
-    """The recording sessions of one side of a diagnosis.
-
-    Attributes
-    ----------
-    of_run
-        Session by run name.
-    told_by
-        How they were told apart, in the order of preference: "session", "night", "folder", "file".
-    """
+    """The recording sessions of one side of a diagnosis."""
 
     of_run: Mapping[str, str]
+    """Session by run name."""
     told_by: tuple[str, ...]
+    """How they were told apart, by preference: "session", "night", "folder", "file"."""
 
     def __len__(self) -> int:
         """Return the number of sessions."""

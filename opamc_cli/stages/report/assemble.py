@@ -33,21 +33,14 @@ class Section:
 
 @dataclass(frozen=True)
 class ReportOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The page that was written.
-    inputs
-        What it was made from.
-    omitted
-        One line for each part that could not be drawn.
-    """
+    """What `run` did."""
 
     path: Path
+    """The page that was written."""
     inputs: ReportInputs
+    """What it was made from."""
     omitted: tuple[str, ...]
+    """One line for each part that could not be drawn."""
 
 
 def run(

@@ -14,21 +14,14 @@ SEVERITY = ("insufficient-data", "healthy", "changed", "fault")
 
 @dataclass(frozen=True)
 class Focus:
-    """What the report looks at most closely.
-
-    Attributes
-    ----------
-    axis
-        The axis that is worst off.
-    motion
-        The motion of each axis whose divergence rose most.
-    order
-        The order that each axis was decided on.
-    """
+    """What the report looks at most closely."""
 
     axis: int
+    """The axis that is worst off."""
     motion: Mapping[int, int]
+    """The motion of each axis whose divergence rose most."""
     order: Mapping[int, int]
+    """The order that each axis was decided on."""
 
 
 def choose_focus(inputs: ReportInputs) -> Focus:

@@ -10,23 +10,16 @@ from opamc_cli.stages.report.results.inputs import ReportInputs, time_order
 
 @dataclass(frozen=True)
 class Onset:
-    """How many target segments lie above the baseline's highest of the same motion.
-
-    Attributes
-    ----------
-    n_above, n_target
-        Segments above, and all.
-    first_run, first_cycle
-        Where the first one lies; None where none does.
-    first_started_at
-        When that run began, if it says so.
-    """
+    """How many target segments lie above the baseline's highest of the same motion."""
 
     n_above: int
     n_target: int
+    """With `n_above`: segments above, and all."""
     first_run: str | None
     first_cycle: int | None
+    """With `first_run`: where the first one lies; None where none does."""
     first_started_at: str | None
+    """When that run began, if it says so."""
 
 
 def find_onset(inputs: ReportInputs, axis: int, order: int) -> Onset:

@@ -26,29 +26,20 @@ from opamc_cli.storage.tables import read_table, table_input, write_table
 
 @dataclass(frozen=True)
 class SelectionOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The table that was written.
-    table
-        Self-consistency by axis, order and γ, and how many patterns of the shortest motion fall
-        on each of the α! possible ones.
-    order, gamma
-        The setting whose self-consistency, averaged over axes, is largest.
-    warnings
-        One for each order with fewer patterns than possible ones.
-    errors
-        One for each axis of a run that could not be read.
-    """
+    """What `run` did."""
 
     path: Path
+    """The table that was written."""
     table: pa.Table
+    """Self-consistency by axis, order and γ, and how many patterns of the shortest motion fall on
+    each of the α! possible ones."""
     order: int
     gamma: float
+    """With `order`: the setting whose self-consistency, averaged over axes, is largest."""
     warnings: tuple[str, ...]
+    """One for each order with fewer patterns than possible ones."""
     errors: tuple[OpamcError, ...]
+    """One for each axis of a run that could not be read."""
 
 
 Counts = npt.NDArray[np.int64]

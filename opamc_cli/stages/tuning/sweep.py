@@ -35,21 +35,14 @@ Settings = Sequence[tuple[int, int]]
 
 @dataclass(frozen=True)
 class SweepOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    path
-        The table that was written.
-    table
-        Its rows: one per segment, order and delay.
-    errors
-        One for each axis of a run that could not be read.
-    """
+    """What `run` did."""
 
     path: Path
+    """The table that was written."""
     table: pa.Table
+    """Its rows: one per segment, order and delay."""
     errors: tuple[OpamcError, ...]
+    """One for each axis of a run that could not be read."""
 
     def best(self) -> list[dict[str, Any]]:
         """Return, by axis and order, the delay that separates target from baseline most.

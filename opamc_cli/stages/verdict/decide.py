@@ -25,18 +25,12 @@ FILES = (files.VERDICT, *score.FILES)
 
 @dataclass(frozen=True)
 class DecideOutcome:
-    """What `run` did.
-
-    Attributes
-    ----------
-    verdict
-        Content of verdict.json.
-    exit_code
-        What it ends with.
-    """
+    """What `run` did."""
 
     verdict: dict[str, Any]
+    """Content of verdict.json."""
     exit_code: ExitCode
+    """What it ends with."""
 
 
 def default_tables(folder: Path) -> tuple[Path, Path]:

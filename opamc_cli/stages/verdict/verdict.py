@@ -31,38 +31,25 @@ MAIN_SHARE = 0.5
 
 @dataclass(frozen=True)
 class VerdictOutcome:
-    """What `write` did.
-
-    Attributes
-    ----------
-    path
-        The file that was written.
-    verdict
-        Its content.
-    exit_code
-        What it ends with.
-    """
+    """What `write` did."""
 
     path: Path
+    """The file that was written."""
     verdict: dict[str, Any]
+    """Its content."""
     exit_code: ExitCode
+    """What it ends with."""
 
 
 @dataclass(frozen=True)
 class Decided:
-    """The decision about every joint, before its causes are known.
-
-    Attributes
-    ----------
-    sides
-        What was compared.
-    bundles, judgements
-        What is known of each axis, and what was made of it.
-    """
+    """The decision about every joint, before its causes are known."""
 
     sides: Sides
+    """What was compared."""
     bundles: Mapping[int, Bundle]
     judgements: Mapping[int, Judgement]
+    """With `bundles`: what is known of each axis, and what was made of it."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
         """Return the axes whose change asks for a cause."""

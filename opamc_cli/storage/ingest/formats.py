@@ -6,28 +6,19 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Format:
-    """One format of foreign recordings.
-
-    Attributes
-    ----------
-    shown
-        What users call it.
-    endings
-        Of its files.
-    reader
-        ``module:function`` in `readers`, imported only where the format is read; called with the
-        path, it is a context manager that yields a `Source`.
-    extra
-        Of the package, which brings the library that it needs.
-    laid_out
-        The map says how a text is laid out: the reader takes the map, too.
-    """
+    """One format of foreign recordings."""
 
     shown: str
+    """What users call it."""
     endings: tuple[str, ...]
+    """Of its files."""
     reader: str
+    """``module:function`` in `readers`, imported only where the format is read; called with the
+    path, it is a context manager that yields a `Source`."""
     extra: str | None = None
+    """Of the package, which brings the library that it needs."""
     laid_out: bool = False
+    """The map says how a text is laid out: the reader takes the map, too."""
 
 
 FORMATS = {

@@ -20,18 +20,12 @@ REMOTE_MARK = "://"
 
 @dataclass(frozen=True)
 class Recording:
-    """A foreign recording and what its run will be called.
-
-    Attributes
-    ----------
-    source
-        Its path, or its address in an object store, such as ``s3://bucket/log.csv``.
-    name
-        The path of its run below the output folder, without ending.
-    """
+    """A foreign recording and what its run will be called."""
 
     source: str
+    """Its path, or its address in an object store, such as ``s3://bucket/log.csv``."""
     name: str
+    """The path of its run below the output folder, without ending."""
 
 
 def find_recordings(arguments: Sequence[str], any_ending: bool = False) -> list[Recording]:

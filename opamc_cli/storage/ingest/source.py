@@ -24,46 +24,30 @@ BLOCK_ROWS = 1 << 16
 
 @dataclass(frozen=True)
 class Selection:
-    """One channel to be read.
-
-    Attributes
-    ----------
-    source
-        Its number or name in the file.
-    index
-        Column of a two-dimensional dataset.
-    dates
-        It holds dates and times as text.
-    """
+    """One channel to be read."""
 
     source: Name
+    """Its number or name in the file."""
     index: int | None = None
+    """Column of a two-dimensional dataset."""
     dates: bool = False
+    """It holds dates and times as text."""
 
 
 @dataclass(frozen=True)
 class Listed:
-    """A channel that a recording offers.
-
-    Attributes
-    ----------
-    name
-        What a map calls it.
-    width
-        Columns of a two-dimensional one, which the map picks by `index`; None: it has one.
-    unit
-        As the file declares it, None where it does not.
-    dates
-        It holds dates and times.
-    labels
-        What each column of a two-dimensional one is, such as the names of joints.
-    """
+    """A channel that a recording offers."""
 
     name: Name
+    """What a map calls it."""
     width: int | None = None
+    """Columns of a two-dimensional one, which the map picks by `index`; None: it has one."""
     unit: str | None = None
+    """As the file declares it, None where it does not."""
     dates: bool = False
+    """It holds dates and times."""
     labels: tuple[str, ...] = ()
+    """What each column of a two-dimensional one is, such as the names of joints."""
 
 
 class Source(Protocol):

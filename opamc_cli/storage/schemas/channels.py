@@ -20,24 +20,16 @@ class Conversion:
 
 @dataclass(frozen=True)
 class Channel:
-    """A channel of an axis beside its currents.
-
-    Attributes
-    ----------
-    field
-        What `Recording` calls it.
-    units
-        How it is declared in foreign recordings; the run format's own unit first.
-    words
-        Of names of channels that mean it.
-    vague
-        Other names hold its words, too: it is thought of last.
-    """
+    """A channel of an axis beside its currents."""
 
     field: str
+    """What `Recording` calls it."""
     units: Mapping[str, Conversion]
+    """How it is declared in foreign recordings; the run format's own unit first."""
     words: tuple[str, ...]
+    """Of names of channels that mean it."""
     vague: bool = False
+    """Other names hold its words, too: it is thought of last."""
 
 
 PHASES = ("a", "b", "c")

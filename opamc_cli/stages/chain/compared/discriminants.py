@@ -22,21 +22,14 @@ CONDITIONS = ("f_max_hz",)
 
 @dataclass(frozen=True)
 class LatentModels:
-    """Discriminants of (Δμ, Δσ², KS), one for each order.
-
-    Attributes
-    ----------
-    path
-        The file they came from or go to.
-    rows
-        Labelled training rows: features, order, conditions, `fault`, and `source`.
-    by_order
-        Trained discriminants; orders that lack one of the two classes have none.
-    """
+    """Discriminants of (Δμ, Δσ², KS), one for each order."""
 
     path: Path
+    """The file they came from or go to."""
     rows: tuple[Mapping[str, Any], ...]
+    """Labelled training rows: features, order, conditions, `fault`, and `source`."""
     by_order: Mapping[int, LinearDiscriminant]
+    """Trained discriminants; orders that lack one of the two classes have none."""
 
     def project(self, row: Mapping[str, Any]) -> float | None:
         """Project a row of features; None if a feature is unknown or the order untrained.

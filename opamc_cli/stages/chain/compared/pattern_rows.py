@@ -13,21 +13,14 @@ from opamc_cli.errors import InputError
 
 @dataclass(frozen=True)
 class PatternRows:
-    """Identified rows of a pattern table that share axis, motion, order and delay.
-
-    Attributes
-    ----------
-    rows : dict of str to ndarray
-        The table's columns but `counts`.
-    counts : ndarray, shape (S, order!)
-        Pattern counts of each segment.
-    sessions : ndarray, shape (S,)
-        Name of the recording session of each.
-    """
+    """Identified rows of a pattern table that share axis, motion, order and delay."""
 
     rows: Mapping[str, npt.NDArray[Any]]
+    """The table's columns but `counts`."""
     counts: npt.NDArray[np.float64]
+    """Pattern counts of each segment; shape (S, order!)."""
     sessions: npt.NDArray[Any]
+    """Name of the recording session of each; shape (S,)."""
 
     @property
     def runs(self) -> npt.NDArray[Any]:

@@ -17,24 +17,16 @@ from opamc_cli.storage.tables import read_table
 
 @dataclass(frozen=True)
 class Side:
-    """Tables of the baseline or of the target, as stage `patterns` wrote them.
-
-    Attributes
-    ----------
-    path
-        The pattern table.
-    sources
-        Recordings that it was made from.
-    patterns
-        Its rows.
-    witnesses
-        Rows of the tables beside it, by file name; those that are there.
-    """
+    """Tables of the baseline or of the target, as stage `patterns` wrote them."""
 
     path: Path
+    """The pattern table."""
     sources: tuple[RunSource, ...]
+    """Recordings that it was made from."""
     patterns: pa.Table
+    """Its rows."""
     witnesses: Mapping[str, pa.Table]
+    """Rows of the tables beside it, by file name; those that are there."""
 
 
 def read_side(patterns: Path) -> Side:
@@ -64,19 +56,13 @@ def read_side(patterns: Path) -> Side:
 
 @dataclass(frozen=True)
 class Sides:
-    """Baseline and target, and how their recordings make sessions.
-
-    Attributes
-    ----------
-    baseline, target
-        Tables of either side.
-    day_starts_at_h
-        Hour of the day, UTC, at which a night ends.
-    """
+    """Baseline and target, and how their recordings make sessions."""
 
     baseline: Side
     target: Side
+    """With `baseline`: tables of either side."""
     day_starts_at_h: float = 12.0
+    """Hour of the day, UTC, at which a night ends."""
 
     @cached_property
     def sessions(self) -> tuple[Sessions, Sessions]:

@@ -63,25 +63,17 @@ Floats = npt.NDArray[np.floating]
 
 @dataclass(frozen=True)
 class _Probe:
-    """What a look at a part of the run tells.
-
-    Attributes
-    ----------
-    noise_a
-        Standard deviation of the noise in each component of the current, A.
-    floor_a
-        Modulus below which the carrier's angle is noise, A.
-    offset_a
-        What the sensors add to the current vector, A; 0 for one phase. Left in, it stands still
-        where torque passes zero, and looks like a robot that stands.
-    notes
-        One sentence for each clipped phase.
-    """
+    """What a look at a part of the run tells."""
 
     noise_a: float
+    """Standard deviation of the noise in each component of the current, A."""
     floor_a: float
+    """Modulus below which the carrier's angle is noise, A."""
     offset_a: complex
+    """What the sensors add to the current vector, A; 0 for one phase. Left in, it stands still
+    where torque passes zero, and looks like a robot that stands."""
     notes: tuple[str, ...]
+    """One sentence for each clipped phase."""
 
 
 def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) -> AxisSegments:

@@ -27,24 +27,16 @@ class Segment:
 
 @dataclass(frozen=True)
 class AxisSegments:
-    """What was found on one axis of one run.
-
-    Attributes
-    ----------
-    run
-        Name of the run.
-    rows
-        Rows of the segment table.
-    notes
-        One sentence for each doubtful channel.
-    stands
-        Why there is no row, or None.
-    """
+    """What was found on one axis of one run."""
 
     run: str
+    """Name of the run."""
     rows: tuple[dict[str, Any], ...]
+    """Rows of the segment table."""
     notes: tuple[str, ...] = ()
+    """One sentence for each doubtful channel."""
     stands: str | None = None
+    """Why there is no row, or None."""
 
 
 def make_rows(

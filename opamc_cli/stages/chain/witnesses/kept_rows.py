@@ -15,43 +15,28 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Names:
-    """Sessions of one axis.
-
-    Attributes
-    ----------
-    sessions
-        Of either side, in the order in which the decision numbers them.
-    of_side
-        Session by run, of either side.
-    """
+    """Sessions of one axis."""
 
     sessions: tuple[Sequence[str], Sequence[str]]
+    """Of either side, in the order in which the decision numbers them."""
     of_side: tuple[Sessions, Sessions]
+    """Session by run, of either side."""
 
 
 @dataclass(frozen=True)
 class MotionRows:
-    """One motion's rows of both sides.
-
-    Attributes
-    ----------
-    key
-        The motion, then the table's columns of shape.
-    values
-        Shape (C, F): one row per cycle without unknown numbers, sessions in order.
-    session
-        Shape (C,): number of each row's session, baseline first.
-    n_sessions
-        How many there are on both sides.
-    first
-        Columns of the first row.
-    """
+    """One motion's rows of both sides."""
 
     key: tuple[int, ...]
+    """The motion, then the table's columns of shape."""
     values: Floats
+    """Shape (C, F): one row per cycle without unknown numbers, sessions in order."""
     session: npt.NDArray[np.int64]
+    """Shape (C,): number of each row's session, baseline first."""
     n_sessions: int
+    """How many there are on both sides."""
     first: dict[str, Any]
+    """Columns of the first row."""
 
     def means(self) -> tuple[Floats, Floats]:
         """Return each session's mean, NaN without any row, and the number of rows behind it."""

@@ -58,25 +58,17 @@ STYLE: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class Figure:
-    """A finished figure.
-
-    Attributes
-    ----------
-    name
-        Short name, the figure's id on the page.
-    title, caption
-        What is seen and how to read it.
-    alt
-        What it shows, for those who do not see it.
-    svg
-        Inline SVG element.
-    """
+    """A finished figure."""
 
     name: str
+    """Short name, the figure's id on the page."""
     title: str
     caption: str
+    """With `title`: what is seen and how to read it."""
     alt: str
+    """What it shows, for those who do not see it."""
     svg: str
+    """Inline SVG element."""
 
 
 def style() -> AbstractContextManager[None]:

@@ -26,43 +26,28 @@ class NothingToDrawError(Exception):
 
 @dataclass(frozen=True)
 class SourceFile:
-    """A file that the report was made from.
-
-    Attributes
-    ----------
-    name
-        Path below the output folder.
-    sha256
-        Of its content.
-    record
-        Its provenance, where it is a stage table.
-    """
+    """A file that the report was made from."""
 
     name: str
+    """Path below the output folder."""
     sha256: str
+    """Of its content."""
     record: Mapping[str, Any] | None
+    """Its provenance, where it is a stage table."""
 
 
 @dataclass(frozen=True)
 class RoleTables:
-    """The tables of the baseline's or the target's runs; None where there is none.
-
-    Attributes
-    ----------
-    motions
-        Identified segments; of `segment` alone where nothing was identified yet.
-    patterns
-        Ordinal counts.
-    sources
-        The runs, in time order as far as they say when they began.
-    config
-        Configuration that the segments were found with.
-    """
+    """The tables of the baseline's or the target's runs; None where there is none."""
 
     motions: Columns | None
+    """Identified segments; of `segment` alone where nothing was identified yet."""
     patterns: Columns | None
+    """Ordinal counts."""
     sources: tuple[RunSource, ...]
+    """The runs, in time order as far as they say when they began."""
     config: Mapping[str, Any]
+    """Configuration that the segments were found with."""
 
     def run_rank(self) -> dict[str, int]:
         """Return the place of every run in time order."""
@@ -88,30 +73,21 @@ class RoleTables:
 
 @dataclass(frozen=True)
 class ReportInputs:
-    """Everything that a report shows, read once.
-
-    Attributes
-    ----------
-    scores, features
-        Tables of the stage `score`; without columns where there are none.
-    verdict
-        verdict.json, or None.
-    roles
-        Tables of the baseline and of the target.
-    loop, residuals, spectrum
-        What `opamc model close` left, or None.
-    files
-        Every file that was read.
-    """
+    """Everything that a report shows, read once."""
 
     scores: Columns
     features: Columns
+    """With `scores`: tables of the stage `score`; without columns where there are none."""
     verdict: Mapping[str, Any] | None
+    """verdict.json, or None."""
     roles: Mapping[str, RoleTables]
+    """Tables of the baseline and of the target."""
     loop: Mapping[str, Any] | None
     residuals: Columns | None
     spectrum: Columns | None
+    """With `loop`, `residuals`: what `opamc model close` left, or None."""
     files: tuple[SourceFile, ...] = field(default=())
+    """Every file that was read."""
 
     @property
     def axes(self) -> list[int]:

@@ -24,19 +24,13 @@ from opamc_cli.storage.tables import read_table
 
 @dataclass
 class Agreement:
-    """What is known so far of both sides: first the baseline's runs, then the target's.
-
-    Attributes
-    ----------
-    config
-        When segments are a cycle.
-    measured, found
-        By role.
-    """
+    """What is known so far of both sides: first the baseline's runs, then the target's."""
 
     config: IdentifyConfig
+    """When segments are a cycle."""
     measured: dict[str, Sequence[Measured]] = field(default_factory=dict)
     found: dict[str, Sequence[Finding]] = field(default_factory=dict)
+    """With `measured`: by role."""
     _reference: Reference | None = None
 
     def check(

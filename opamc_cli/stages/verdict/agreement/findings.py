@@ -39,22 +39,14 @@ CLIPPED_SHARE = 0.01
 
 @dataclass(frozen=True)
 class Finding:
-    """Why one axis of one run is not compared.
-
-    Attributes
-    ----------
-    run, axis
-        Which.
-    why
-        A clause such as "axis3_b keeps one value".
-    at_rest
-        Whether it is no more than that the axis rests, as most do where axes move in turn.
-    """
+    """Why one axis of one run is not compared."""
 
     run: str
     axis: int
     why: str
+    """A clause such as "axis3_b keeps one value"."""
     at_rest: bool = False
+    """Whether it is no more than that the axis rests, as most do where axes move in turn."""
 
 
 @dataclass(frozen=True)

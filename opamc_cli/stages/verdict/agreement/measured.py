@@ -32,42 +32,28 @@ Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Measured:
-    """One axis of one run.
-
-    Attributes
-    ----------
-    run, path, axis
-        Which.
-    signal
-        Columns that the diagnosis uses.
-    moves
-        Whether a motion was found; otherwise the rest is of stretches anywhere in the run.
-    size
-        Root mean square of each kind of channel about its mean, in the channel's unit.
-    imbalance
-        Root mean square of the sum of three phases over that of the phases; None without three.
-    clipped
-        Share of clipped samples by column.
-    frozen
-        Column that keeps one value while another swings, and from when on in seconds, or None.
-    leaning
-        Of a reported current: share of it that has the sign of the speed, less what has the other;
-        None without one.
-    reversing
-        Of a reported current: share of the samples that have the rarer of both signs.
-    """
+    """One axis of one run."""
 
     run: str
     path: Path
     axis: int
     signal: tuple[str, ...]
+    """Columns that the diagnosis uses."""
     moves: bool
+    """Whether a motion was found; otherwise the rest is of stretches anywhere in the run."""
     size: Mapping[str, float]
+    """Root mean square of each kind of channel about its mean, in the channel's unit."""
     imbalance: float | None
+    """Root mean square of the sum of three phases over that of the phases; None without three."""
     clipped: Mapping[str, float]
+    """Share of clipped samples by column."""
     frozen: tuple[str, float] | None
+    """Column that keeps one value while another swings, and from when on in seconds, or None."""
     leaning: float | None = None
+    """Of a reported current: share of it that has the sign of the speed, less what has the other;
+    None without one."""
     reversing: float | None = None
+    """Of a reported current: share of the samples that have the rarer of both signs."""
 
 
 @dataclass(frozen=True)

@@ -14,24 +14,16 @@ from opamc_cli.stages.verdict.agreement.measured import Measured
 
 @dataclass(frozen=True)
 class Side:
-    """Baseline or target, as far as the comparison needs it.
-
-    Attributes
-    ----------
-    role
-        "baseline" or "target".
-    measured
-        Every axis of every run.
-    findings
-        What is left out of the comparison.
-    motions
-        Rows of the motion table.
-    """
+    """Baseline or target, as far as the comparison needs it."""
 
     role: str
+    """"baseline" or "target"."""
     measured: Sequence[Measured]
+    """Every axis of every run."""
     findings: Sequence[Finding]
+    """What is left out of the comparison."""
     motions: pa.Table
+    """Rows of the motion table."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""
@@ -45,18 +37,12 @@ class Side:
 
 @dataclass(frozen=True)
 class Unjudged:
-    """What is left out, and why.
-
-    Attributes
-    ----------
-    axes
-        Sentences for each axis of which nothing is left on one side.
-    errors
-        One for each axis of a run that was left out while others serve.
-    """
+    """What is left out, and why."""
 
     axes: Mapping[int, tuple[str, ...]]
+    """Sentences for each axis of which nothing is left on one side."""
     errors: tuple[OpamcError, ...]
+    """One for each axis of a run that was left out while others serve."""
 
 
 def unjudged(baseline: Side, target: Side) -> Unjudged:

@@ -47,31 +47,21 @@ AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
 
 @dataclass(frozen=True)
 class Meant:
-    """What a channel seems to be.
-
-    Attributes
-    ----------
-    quantity
-        One of `WORDS`, or phase "a", "b", "c".
-    number
-        The number in its name that counts axes, None where it has none.
-    pattern
-        Its name with ``#`` for that number.
-    source, index
-        What a map calls it.
-    measured
-        It is not a controller's wish.
-    unit
-        As the file declares it.
-    """
+    """What a channel seems to be."""
 
     quantity: str
+    """One of `WORDS`, or phase "a", "b", "c"."""
     number: int | None
+    """The number in its name that counts axes, None where it has none."""
     pattern: str
+    """Its name with ``#`` for that number."""
     source: Name
     index: int | None
+    """With `source`: what a map calls it."""
     measured: bool
+    """It is not a controller's wish."""
     unit: str | None
+    """As the file declares it."""
 
 
 def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:

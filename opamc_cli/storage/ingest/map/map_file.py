@@ -77,51 +77,34 @@ class MetadataMap(_Strict):
 
 
 class IngestMap(_Strict):
-    """The map file.
-
-    Attributes
-    ----------
-    format
-        None: by the file's ending.
-    separator
-        One or more characters, "tab" or "whitespace" (runs of blanks and tabs).
-    decimal
-        Decimal mark.
-    header
-        Whether a line with column names stands before the data.
-    encoding
-        Of the text.
-    skip_rows
-        Lines before the header (or before the data, without one).
-    units_rows
-        Lines between header and data.
-    axes
-        For how many axes a line with `{n}` stands; None: for as many as the file has.
-    columns
-        Run column by name, such as ``axis1_a``, or for all axes, ``axis{n}_a``.
-    sampling_rate_hz
-        Samples per second, by declaration. Without `time` the rows are taken as evenly spaced.
-    resample_hz
-        Rate of the run, whatever the clock says; None: the declared rate, or else the measured.
-    time
-        Time stamps.
-    metadata
-        What the run says of itself.
-    """
+    """The map file."""
 
     format: Format | None = None
+    """None: by the file's ending."""
     separator: str = Field(",", min_length=1, max_length=100)
+    """One or more characters, "tab" or "whitespace" (runs of blanks and tabs)."""
     decimal: Literal[".", ","] = "."
+    """Decimal mark."""
     header: bool = True
+    """Whether a line with column names stands before the data."""
     encoding: str = "utf-8"
+    """Of the text."""
     skip_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
+    """Lines before the header (or before the data, without one)."""
     units_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
+    """Lines between header and data."""
     axes: Annotated[int, Field(ge=1, le=32)] | None = None
+    """For how many axes a line with `{n}` stands; None: for as many as the file has."""
     columns: dict[str, ColumnMap] = Field(min_length=1)
+    """Run column by name, such as ``axis1_a``, or for all axes, ``axis{n}_a``."""
     sampling_rate_hz: Positive | RateMap | None = None
+    """Samples per second, by declaration. Without `time` the rows are taken as evenly spaced."""
     resample_hz: Positive | None = None
+    """Rate of the run, whatever the clock says; None: the declared rate, or else the measured."""
     time: TimeMap | None = None
+    """Time stamps."""
     metadata: MetadataMap = MetadataMap()
+    """What the run says of itself."""
 
 
 def for_axes(

@@ -41,64 +41,44 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True)
 class StampAccount:
-    """What was found in the time stamps.
-
-    Attributes
-    ----------
-    even
-        The samples are evenly spaced.
-    resampled
-        They were put on another grid all the same, or because they are not.
-    measured_rate_hz
-        What the stamps say.
-    jitter_s
-        Largest deviation of a step from the measured period, where no sample is missing.
-    n_bridged
-        Longer steps that are interpolated across: a sample is missing.
-    n_gaps, longest_gap_s
-        Steps that are filled with NaN instead of values.
-    n_duplicates, n_backward, n_unreadable
-        Rows dropped: a stamp for the second time, before an earlier one, or none.
-    """
+    """What was found in the time stamps."""
 
     even: bool
+    """The samples are evenly spaced."""
     resampled: bool
+    """They were put on another grid all the same, or because they are not."""
     measured_rate_hz: float
+    """What the stamps say."""
     jitter_s: float
+    """Largest deviation of a step from the measured period, where no sample is missing."""
     n_bridged: int
+    """Longer steps that are interpolated across: a sample is missing."""
     n_gaps: int
     longest_gap_s: float
+    """With `n_gaps`: steps that are filled with NaN instead of values."""
     n_duplicates: int
     n_backward: int
     n_unreadable: int
+    """With `n_duplicates`, `n_backward`: rows dropped: a stamp for the second time, before an
+    earlier one, or none."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """The uniform grid that the samples are put on.
-
-    Attributes
-    ----------
-    sampling_rate_hz
-        Of the grid.
-    n_samples
-        Of the grid.
-    start_s
-        Of the grid, on the stamps' scale.
-    kept
-        Rows that are used, None for all.
-    max_gap_s
-        Longest step across which values are interpolated.
-    account
-        What was found.
-    """
+    """The uniform grid that the samples are put on."""
 
     sampling_rate_hz: float
+    """Of the grid."""
     n_samples: int
+    """Of the grid."""
     start_s: float
+    """Of the grid, on the stamps' scale."""
     kept: npt.NDArray[np.bool_] | None
+    """Rows that are used, None for all."""
     max_gap_s: float
+    """Longest step across which values are interpolated."""
     account: StampAccount
+    """What was found."""
 
 
 def examine(
