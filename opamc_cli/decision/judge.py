@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.divergence.jensen_shannon import chance_divergence, jensen_shannon
+from opamc_cli.decision.significance.deviation import MAD_TO_SIGMA
 from opamc_cli.decision.significance.multiplicity import harmonic_mean, holm
 from opamc_cli.decision.significance.permutation import relabelled_p_value, relabellings
 from opamc_cli.decision.significance.spread import (
     BETWEEN_SESSIONS,
-    MAD_TO_SIGMA,
     Spread,
     moderated_spread,
     spliced_p_value,

@@ -124,7 +124,7 @@ def _diagnose(
     _check_before(baseline, target)
     if config.joint.library:
         _cause().library_of(config.joint)  # a mistake in it is better told now than at the end
-    repeats, left_out = repeated(baseline, target)
+    repeats, left_out = repeated(baseline, target, kept)
     agreement = Agreement(config.identify)
     normal = run_chain(
         baseline,

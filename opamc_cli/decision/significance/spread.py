@@ -8,9 +8,6 @@ from scipy.special import digamma, stdtr
 
 FloatArray = NDArray[np.float64]
 
-MAD_TO_SIGMA = 1.4826
-"""Standard deviation of a normal variable over its median absolute deviation."""
-
 
 @dataclass(frozen=True)
 class Spread:

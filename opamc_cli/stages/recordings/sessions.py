@@ -3,8 +3,10 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import MAXYEAR, MINYEAR, UTC, date, datetime, timedelta
+from typing import TYPE_CHECKING
 
-from opamc_cli.storage.sources import RunSource
+if TYPE_CHECKING:  # with it come the tables, which a look at a cell does without
+    from opamc_cli.storage.sources import RunSource
 
 BY_SESSION, BY_NIGHT, BY_FOLDER, BY_FILE = "session", "night", "folder", "file"
 
@@ -24,7 +26,7 @@ class Sessions:
 
 
 def sessions_of(
-    sources: Sequence[RunSource], day_starts_at_h: float, by_folder: bool = False
+    sources: "Sequence[RunSource]", day_starts_at_h: float, by_folder: bool = False
 ) -> Sessions:
     """Group recordings into sessions.
 
@@ -62,7 +64,7 @@ def sessions_of(
     )
 
 
-def lie_in_folders(baseline: Sequence[RunSource]) -> bool:
+def lie_in_folders(baseline: "Sequence[RunSource]") -> bool:
     """Tell whether folders are sessions: one folder for all is only where the baseline lies."""
     return len({source.path.parent for source in baseline}) > 1
 

@@ -1,6 +1,5 @@
 """A Dask cluster in the place of this machine's processes: the same function, the same results."""
 
-import asyncio
 import importlib
 import time
 from collections.abc import Iterator, Sequence
@@ -124,7 +123,7 @@ def _end_overdue(
     client: Any, begun: dict[Any, float], job_of: dict[Any, Any], seconds: float
 ) -> None:
     """Restart the workers of nights that take too long; Dask tells who computes what."""
-    with suppress(OSError, asyncio.TimeoutError):
+    with suppress(OSError):
         now = time.monotonic()
         for worker, keys in client.processing().items():
             for key in keys:

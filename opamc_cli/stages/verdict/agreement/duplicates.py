@@ -7,16 +7,24 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.errors import InputError, OpamcError
+from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.storage.runs import Run, find_runs
 
 
 def repeated(
-    baseline: Sequence[Path], target: Sequence[Path]
+    baseline: Sequence[Path], target: Sequence[Path], kept: KeptResults | None = None
 ) -> tuple[frozenset[Path], tuple[str, ...]]:
     """Return the runs to be left out, and one sentence for each.
 
     Of equal recordings, the target's is kept rather than the baseline's, and the first name of
     one side. A copy, a link, or the same samples written by another program are equal.
+
+    Parameters
+    ----------
+    baseline, target
+        Run files and folders of them.
+    kept
+        Where results of the same work on the baseline may lie.
 
     Raises
     ------
@@ -26,18 +34,25 @@ def repeated(
     seen: dict[str, tuple[str, Path]] = {}
     left_out: set[Path] = set()
     notes = []
-    for role, paths in (("target", target), ("baseline", baseline)):
+    sides = (
+        ("target", target, _fingerprint),
+        ("baseline", baseline, remembered(_fingerprint, kept)),
+    )
+    for role, paths, fingerprint in sides:
         runs = find_runs(paths)
         for _, path in runs:
-            key = _fingerprint(path)
+            try:
+                key = fingerprint(path)
+            except OpamcError:
+                continue  # reported with its reason when its turn comes
             if key is None:
                 continue
             if key not in seen:
                 seen[key] = role, path
                 continue
-            kept_role, kept = seen[key]
+            first_role, first = seen[key]
             left_out.add(path)
-            where = f"{role}'s {path} is the same recording as the {kept_role}'s {kept}"
+            where = f"{role}'s {path} is the same recording as the {first_role}'s {first}"
             notes.append(f"left out: the {where}")
         if runs and all(path in left_out for _, path in runs):
             msg = (
@@ -49,20 +64,17 @@ def repeated(
 
 
 def _fingerprint(path: Path) -> str | None:
-    """Hash the currents at the beginning of a run; None for one that cannot be told from others."""
-    try:
-        with Run(path) as run:
-            state = hashlib.sha256(f"{run.n_samples} {run.sampling_rate_hz}".encode())
-            moving = False
-            for axis in run.axes:
-                channels = run.channels(axis)
-                names = channels.phases or (str(channels.current),)
-                for name, values in run.read(names, 0, _COMPARED).items():
-                    known = values[np.isfinite(values)]
-                    moving = moving or (known.size > 1 and bool(np.ptp(known) > 0))
-                    state.update(name.encode() + values.astype(np.float32).tobytes())
-    except OpamcError:
-        return None  # reported with its reason when its turn comes
+    """Hash the currents at the beginning of a run; None if none of them moves."""
+    with Run(path) as run:
+        state = hashlib.sha256(f"{run.n_samples} {run.sampling_rate_hz}".encode())
+        moving = False
+        for axis in run.axes:
+            channels = run.channels(axis)
+            names = channels.phases or (str(channels.current),)
+            for name, values in run.read(names, 0, _COMPARED).items():
+                known = values[np.isfinite(values)]
+                moving = moving or (known.size > 1 and bool(np.ptp(known) > 0))
+                state.update(name.encode() + values.astype(np.float32).tobytes())
     # recordings of dead sensors are alike without being the same
     return state.hexdigest() if moving else None
 
