@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.divergence.jensen_shannon import chance_divergence, jensen_shannon
-from opamc_cli.decision.significance.deviation import MAD_TO_SIGMA
+from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
 from opamc_cli.decision.significance.multiplicity import harmonic_mean, holm
 from opamc_cli.decision.significance.permutation import relabelled_p_value, relabellings
 from opamc_cli.decision.significance.spread import (

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.deviation import MAD_TO_SIGMA
+from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
 
 FloatArray = NDArray[np.float64]
 

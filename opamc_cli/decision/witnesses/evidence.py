@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.deviation import MAD_TO_SIGMA
+from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
 from opamc_cli.decision.significance.spread import Spread
 
 FloatArray = NDArray[np.float64]

@@ -4,7 +4,6 @@ import math
 from itertools import product
 
 import numpy as np
-from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.effects.second_order import at_rest, discrete
@@ -159,6 +158,8 @@ def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> 
     list of arrays of shape (n,)
         For every filter, highest first, what a low-pass and a band-pass make of each wave.
     """
+    from scipy.signal import lfilter  # slow to load, and few ripples need a drive's answer
+
     found = []
     top_hz = parameters.get("top_hz") or _top_hz(track, parameters["order"])
     for k in range(_filters(top_hz, parameters["answer"])):

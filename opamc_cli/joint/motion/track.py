@@ -6,7 +6,8 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve, upfirdn
+
+from opamc_cli.signal.filters import convolved
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -262,8 +263,7 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
         part = values[start:stop]
         padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
         padded = np.pad(part, padding, mode="edge")
-        shape = (-1,) + (1,) * (part.ndim - 1)
-        smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
+        smooth[start:stop] = convolved(padded, kernel)
     return smooth
 
 
@@ -283,6 +283,8 @@ def averaged_blocks(
     factor : int
         Samples per block, at least 1.
     """
+    from scipy.signal import upfirdn  # slow to load, and few models have fast terms
+
     weights = np.convolve(kernel, np.full(factor, 1.0 / factor))
     half = kernel.size // 2
     # a whole number of blocks before the first sample that all weights reach

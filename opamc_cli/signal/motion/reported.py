@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.signal.filters import local_polynomial
 from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.motion.segmentation import hysteresis
 
@@ -58,9 +59,6 @@ def velocity_from_position(
     Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
     ends. NaN rule: missing angles are bridged by a straight line.
     """
-    # Importing it takes as long as all else together, and few runs lack the velocity.
-    from scipy.signal import savgol_filter
-
     angle = np.asarray(position_rad, dtype=np.float64)
     known = np.flatnonzero(np.isfinite(angle))
     if not known.size:
@@ -71,8 +69,7 @@ def velocity_from_position(
     window = min(wanted, angle.size - 1 + angle.size % 2)
     if window < 3:
         return np.zeros(angle.size)
-    velocity: NDArray[np.float64] = savgol_filter(angle, window, 2, deriv=1, delta=1 / fs_hz)
-    return velocity
+    return local_polynomial(angle, window, 2, 1, 1 / fs_hz)
 
 
 SLOWEST_WINDOW_S = 0.2

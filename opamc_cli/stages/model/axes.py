@@ -1,8 +1,7 @@
 """One step of a model's work on every axis of some runs, the axes side by side."""
 
-import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from threadpoolctl import threadpool_limits
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.stages.model.axis_model import declared_effects, library_of
+from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.processes.parallel import Watch, map_items
 from opamc_cli.stages.recordings.axis_recording import axes_of
 from opamc_cli.storage.runs import Run
@@ -20,8 +20,6 @@ from opamc_cli.storage.runs import Run
 Result = TypeVar("Result")
 Runs = Sequence[tuple[str, Path]]
 OnAxis = Callable[[JointModelConfig, Sequence[Run], int], Result]
-
-PACKAGE = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True)
@@ -31,10 +29,6 @@ class Outcome:
     results: tuple[dict[str, Any], ...]
     written: tuple[Path, ...]
     errors: tuple[OpamcError, ...]
-
-
-class UserEffectError(ConfigError):
-    """A mistake in a user's own effect, with its file and line."""
 
 
 def on_each_axis(
@@ -95,29 +89,3 @@ def _on_axis(work: OnAxis[Result], model: JointModelConfig, paths: Runs, axis: i
     with ExitStack() as stack, threadpool_limits(1), users_effects_named():
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]
         return work(model, runs, axis)
-
-
-@contextmanager
-def users_effects_named() -> Iterator[None]:
-    """Make a sentence, with file and line, of an error that arises in a user's own effect."""
-    try:
-        yield
-    except OpamcError:
-        raise
-    except Exception as error:
-        where = _in_a_users_effect(error)
-        if where is None:
-            raise
-        what = f"{type(error).__name__}: {error}".rstrip(": ")
-        msg = f"{where}: this effect cannot be used ({what}); correct it"
-        raise UserEffectError(msg) from error
-
-
-def _in_a_users_effect(error: BaseException) -> str | None:
-    """Return file and line where an error arose in a user's effect, None where in none."""
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        own = frame.filename.endswith(".py") and Path(frame.filename).is_relative_to(PACKAGE)
-        installed = "site-packages" in frame.filename or "/lib/python" in frame.filename
-        if not own and not installed and Path(frame.filename).is_file():
-            return f"{frame.filename}:{frame.lineno}"
-    return None

@@ -12,7 +12,7 @@ from opamc_cli.joint.change.explain import Cause, Change, explain_change
 from opamc_cli.joint.effects.library import Library, built_in_library, load_user_effects
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.stages.model.axes import users_effects_named
+from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.storage.sources import RunSource
 
