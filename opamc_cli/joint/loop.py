@@ -12,7 +12,7 @@ from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
-from opamc_cli.joint.name.search import Pool, Trial, beam, trials
+from opamc_cli.joint.name.search import Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
@@ -103,7 +103,7 @@ class Loop:
         The declared and the extended model, fitted to the open groups.
     steps : tuple of Step
         Effects added, largest first; functions without a name are among them.
-    tried : tuple of (int, Trial)
+    tried : tuple of (int, Tried)
         What was asked beside the final model, with the step in whose place it was tried.
     rejected, untestable : tuples
         What was not added, and what could not be tried.
@@ -128,7 +128,7 @@ class Loop:
     before: Fit
     after: Fit
     steps: tuple[Step, ...]
-    tried: tuple[tuple[int, Trial], ...]
+    tried: tuple[tuple[int, Tried], ...]
     rejected: tuple[Rejected, ...]
     untestable: tuple[Untestable, ...]
     ceiling: Ceiling
@@ -179,9 +179,8 @@ def close_loop(
         if final.terms[place].effect.unnamed:
             only_named = without(only_named, place)
     steps = _steps(start, final, named, shares, seed)
-    tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial, *one.others)]
-    last = trials(best, pool)
-    tried += [(len(named), trial) for trial in last]
+    tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
+    tried += [(len(named), trial.told) for trial in trials(best, pool)]
     # Only now, and only once, are the sealed groups looked at.
     return _opened(before, only_named.fit, final.fit, explained.fit, steps, tried, library)
 
@@ -243,7 +242,7 @@ def _opened(
     after: Fit,
     explained: Fit,
     steps: list[Step],
-    tried: list[tuple[int, Trial]],
+    tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
     found = ceiling(before, explained)
@@ -304,7 +303,7 @@ def _refused(step: Step) -> Rejected:
 
 
 def _rejected(
-    tried: list[tuple[int, Trial]], steps: list[Step], refused: list[Rejected]
+    tried: list[tuple[int, Tried]], steps: list[Step], refused: list[Rejected]
 ) -> tuple[Rejected, ...]:
     added = {step.term.effect.name for step in steps} | {one.effect for one in refused}
     found: dict[str, Rejected] = {}

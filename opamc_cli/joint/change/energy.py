@@ -114,7 +114,7 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
             rows = start + np.flatnonzero(unit.fine_rows[start:stop])
             angle = unit.fine.machine_angle_rad[rows]
             knots = np.linspace(float(angle.min()), float(angle.max()), KNOTS)
-            weights = hats(angle, knots)
+            weights = np.stack([np.interp(angle, knots, one) for one in np.eye(KNOTS)], axis=1)
             values = residual[rows]
             for order in orders:
                 waves = np.exp(1j * order * angle)
@@ -126,31 +126,3 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
                 total += float(moment @ np.linalg.lstsq(gram, moment, rcond=1e-9)[0])
         held[unit.after].append(total / count)
     return max(float(np.median(held[True]) - np.median(held[False])), 0.0)
-
-
-def hats(values: Floats, knots: Floats) -> Floats:
-    """Linear interpolation weights of values on knots.
-
-    Parameters
-    ----------
-    values : array of shape (n,)
-        Covariate.
-    knots : array of shape (k,)
-        Ascending; values beyond the ends take the end's weight.
-
-    Returns
-    -------
-    array of shape (n, k)
-        Rows sum to one.
-    """
-    weights = np.zeros((values.size, knots.size))
-    if knots.size == 1:
-        weights[:, 0] = 1.0
-        return weights
-    inside = np.clip(values, knots[0], knots[-1])
-    left = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
-    share = (inside - knots[left]) / (knots[left + 1] - knots[left])
-    rows = np.arange(values.size)
-    weights[rows, left] = 1 - share
-    weights[rows, left + 1] = share
-    return weights

@@ -12,10 +12,9 @@ from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.noise.spectra import LOWEST_ORDER, highest_order
+from opamc_cli.joint.noise.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
 from opamc_cli.joint.noise.whitening import autoregression, settled, whitened
 
-OVERSAMPLING = 4
 MOST_BINS = 2**19
 BINS_PER_WAVE = 16
 SHORTEST_STROKE = 0.4
@@ -256,8 +255,11 @@ def _line(
     spectra: OrderSpectra, peak: int, guard: int, growth: float, excess: float, p_value: float
 ) -> Line:
     near = slice(max(peak - guard, 0), peak + guard + 1)
-    after = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.after])
-    before = np.array([_peak(spectra.orders[near], row[near]) for row in spectra.before])
+    orders = spectra.orders[near]
+    after, before = (
+        np.array([vertex(orders, row[near], int(np.argmax(row[near]))) for row in rows])
+        for rows in (spectra.after, spectra.before)
+    )
     # The baseline has a line here if its units agree where it is.
     scatter = float(np.std(before, ddof=1)) if before.size > 1 else np.inf
     has_line = scatter < 0.25 * spectra.resolution
@@ -272,13 +274,3 @@ def _line(
         excess=excess,
         p_value=p_value,
     )
-
-
-def _peak(orders: Floats, power: Floats) -> float:
-    best = int(np.argmax(power))
-    shift = 0.0
-    if 0 < best < power.size - 1:
-        left, middle, right = power[best - 1 : best + 2]
-        curvature = left - 2 * middle + right
-        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
-    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))

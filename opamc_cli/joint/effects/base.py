@@ -56,6 +56,8 @@ class Effect:
     """True where the effect is load: what gravity, inertia and springs ask of the motor."""
     follows_load: bool = False
     """True where the regressors are in proportion to the load's magnitude."""
+    resists: bool = False
+    """True for friction: its first coefficient is above 0, or it would drive the joint."""
     per: tuple[str, ...] | None = None
     """Unit of each regressor, "" for a bare number and "current" for one in the current's own; the
     last one is that of all further ones. A coefficient is the current's unit by it."""
@@ -121,7 +123,7 @@ class Effect:
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Tell whether coefficients have the sign that physics gives this effect."""
-        return True
+        return not self.resists or bool(coefficients[0] > 0)
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Parameters moved to a value with a meaning where the data cannot tell the difference."""

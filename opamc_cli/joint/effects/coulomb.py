@@ -12,12 +12,9 @@ class Coulomb(Effect):
     per = ("",)
     meaning = "dry friction of bearings and seals: check the preload"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction of motion."""
         return stack(track.direction)
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)

@@ -1,11 +1,10 @@
 """A joint that winds up and rings."""
 
 import numpy as np
-from numba import njit
 
-from opamc_cli.joint.effects.base import Effect, Parameters, geometric
-from opamc_cli.joint.effects.second_order import discrete
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
+from opamc_cli.joint.effects.second_order import answers
+from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
 
 class Elasticity(Effect):
@@ -41,24 +40,12 @@ class Elasticity(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
-        w = 2 * np.pi * parameters["resonance_hz"]
-        damping = parameters["damping"]
         full = track.full or track
-        # The bilinear transform bends frequencies; start from the bent one.
-        w = 2 * full.rate_hz * np.tan(w / (2 * full.rate_hz))
-        below = (1.0, 2 * damping * w, w * w)
-        load, poles = discrete((-1.0, -2 * damping * w, 0.0), below, full.rate_hz)
-        rate, _ = discrete((0.0, w, 0.0), below, full.rate_hz)
+        w = 2 * np.pi * parameters["resonance_hz"]
+        acceleration = full.acceleration
+        load, rate = answers([acceleration], w, parameters["damping"], full.rate_hz, full.bounds)
         factor = round(full.rate_hz / track.rate_hz)
-        means = np.empty((2, track.size))
-        begin = 0
-        for start, stop in full.bounds:
-            end = begin + (stop - start) // factor
-            _filter_and_average(
-                full.acceleration[start:stop], load, rate, poles, factor, means[:, begin:end]
-            )
-            begin = end
-        return means.T
+        return stack(*(block_mean(one, full.bounds, factor) for one in (load - acceleration, rate)))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
@@ -70,34 +57,3 @@ def _highest(track: Track) -> float:
     if track.full is None:
         return min(60.0, track.rate_hz / 3)
     return min(60.0, 0.45 * track.rate_hz, track.full.rate_hz / 3)
-
-
-@njit(cache=True, nogil=True)
-def _filter_and_average(
-    values: Floats, first: Floats, second: Floats, poles: Floats, factor: int, means: Floats
-) -> None:
-    """Put a signal through two filters with the same poles, and average the outcomes over blocks.
-
-    Parameters
-    ----------
-    values : array of shape (n,)
-        As if the first had lasted for ever: no ringing from the start.
-    first, second, poles : arrays of shape (3,)
-        Coefficients of 1, 1/z and 1/z^2; `poles` begins with 1.
-    factor : int
-        Samples per block.
-    means : array of shape (2, n // factor)
-        Filled with the means of both outcomes.
-    """
-    last = values[0] / (1.0 + poles[1] + poles[2])
-    before = last
-    for block in range(means.shape[1]):
-        one = two = 0.0
-        for i in range(block * factor, (block + 1) * factor):
-            state = values[i] - poles[1] * last - poles[2] * before
-            one += first[0] * state + first[1] * last + first[2] * before
-            two += second[0] * state + second[1] * last + second[2] * before
-            before = last
-            last = state
-        means[0, block] = one / factor
-        means[1, block] = two / factor

@@ -20,6 +20,7 @@ class Hysteresis(Effect):
     searches = ("length_rad",)
     meaning = "torque lags behind after reversals: check gear preload and backlash"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
@@ -38,10 +39,6 @@ class Hysteresis(Effect):
         for start, stop in track.bounds:
             state[start:stop] = dahl_state(track.position_rad[start:stop], parameters["length_rad"])
         return stack(state)
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)
 
     @staticmethod
     def _span(track: Track) -> float:

@@ -19,6 +19,7 @@ class LoadFriction(Effect):
     per = ("current",)
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
     needs = ("position",)
+    resists = True
     searches = ("inertia_share",)
     follows_load = True
 
@@ -36,10 +37,6 @@ class LoadFriction(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the magnitude of the fitted load current that passes the gear."""
         return stack(track.direction * np.abs(_passing(track, parameters)))
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)
 
 
 def _passing(track: Track, parameters: Parameters) -> Floats:

@@ -15,6 +15,7 @@ class PositionDrag(Effect):
     searches = ("place_rad", "width_rad", "flatness")
     meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
@@ -40,10 +41,6 @@ class PositionDrag(Effect):
         """Direction times a bell over the angle."""
         away = np.abs(track.position_rad - parameters["place_rad"]) / parameters["width_rad"]
         return stack(track.direction * np.exp(-0.5 * away ** parameters["flatness"]))
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)
 
     @staticmethod
     def _travel(track: Track) -> tuple[float, float]:

@@ -14,12 +14,9 @@ class QuadraticFriction(Effect):
     per = ("rad²/s²",)
     meaning = "churning losses: too much grease"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Signed square of the speed."""
         return stack(track.velocity * np.abs(track.velocity))
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Drag resists."""
-        return bool(coefficients[0] > 0)

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.effects.second_order import at_rest, discrete
+from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.noise.spectra import highest_order, order_lines, order_resolution
 
@@ -164,18 +164,7 @@ def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> 
     top_hz = parameters.get("top_hz") or _top_hz(track, parameters["order"])
     for k in range(_filters(top_hz, parameters["answer"])):
         w = 2 * np.pi * top_hz / 2.0 ** (k / parameters["answer"])
-        # The bilinear transform bends frequencies; start from the bent one.
-        w = 2 * track.rate_hz * np.tan(w / (2 * track.rate_hz))
-        below = (1.0, 2 * DAMPING * w, w * w)
-        for above in ((0.0, 0.0, w * w), (0.0, w, 0.0)):
-            zeros, poles = discrete(above, below, track.rate_hz)
-            for wave in waves:
-                filtered = np.empty(track.size)
-                for start, stop in track.bounds:
-                    part = wave[start:stop]
-                    rest = at_rest(zeros, poles) * part[0]
-                    filtered[start:stop] = lfilter(zeros, poles, part, zi=rest)[0]
-                found.append(filtered)
+        found += answers(waves, w, DAMPING, track.rate_hz, track.bounds)
     return found
 
 

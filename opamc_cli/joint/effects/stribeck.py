@@ -20,6 +20,7 @@ class Stribeck(Effect):
     searches = ("stribeck_speed",)
     meaning = "mixed lubrication at low speed: check the grease film"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
@@ -39,7 +40,3 @@ class Stribeck(Effect):
         """Direction times the fall with speed."""
         ratio = np.abs(track.velocity) / parameters["stribeck_speed"]
         return stack(track.direction * np.exp(-(ratio ** parameters["exponent"])))
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction is higher, not lower, where the film is thin."""
-        return bool(coefficients[0] > 0)

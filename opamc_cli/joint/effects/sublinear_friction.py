@@ -15,6 +15,7 @@ class SublinearFriction(Effect):
     searches = ("exponent",)
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
@@ -29,7 +30,3 @@ class SublinearFriction(Effect):
         """Signed power of the speed, relative to the top speed."""
         ratio = np.abs(track.velocity) / track.speed_scale
         return stack(track.direction * ratio ** parameters["exponent"])
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)

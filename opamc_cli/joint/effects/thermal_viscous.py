@@ -19,6 +19,7 @@ class ThermalViscous(Effect):
     searches = ("rate_per_c",)
     meaning = "grease is stiffer when cold: not a fault"
     needs = ("position", "temperature")
+    resists = True
     from_motion = True
 
     def untestable(self, track: Track) -> str | None:
@@ -44,7 +45,3 @@ class ThermalViscous(Effect):
         rate = parameters["rate_per_c"]
         viscosity = np.expm1(-rate * (track.temperature_c - track.middle_temperature_c)) / rate
         return stack(track.velocity * viscosity)
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Colder is stiffer."""
-        return bool(coefficients[0] > 0)

@@ -12,12 +12,9 @@ class Viscous(Effect):
     per = ("rad/s",)
     meaning = "lubricant friction: check grease amount and grade"
     needs = ("position",)
+    resists = True
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Speed."""
         return stack(track.velocity)
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists."""
-        return bool(coefficients[0] > 0)

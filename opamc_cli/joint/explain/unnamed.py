@@ -3,10 +3,9 @@
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.effects.second_order import at_rest, discrete
+from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
@@ -83,16 +82,11 @@ class Response(Effect):
         highest = min(60.0, full.rate_hz / 3)
         columns = []
         for frequency in geometric(1.5, highest, int(parameters["filters"])):
-            w = 2 * full.rate_hz * np.tan(np.pi * frequency / full.rate_hz)
-            below = (1.0, 2 * RESPONSE_DAMPING * w, w * w)
-            for above in ((0.0, 0.0, w * w), (0.0, w, 0.0)):
-                zeros, poles = discrete(above, below, full.rate_hz)
-                filtered = np.empty(full.size)
-                for start, stop in full.bounds:
-                    part = full.acceleration[start:stop]
-                    rest = at_rest(zeros, poles) * part[0]
-                    filtered[start:stop] = lfilter(zeros, poles, part, zi=rest)[0]
-                columns.append(block_mean(filtered, full.bounds, factor))
+            w = 2 * np.pi * frequency
+            for answer in answers(
+                [full.acceleration], w, RESPONSE_DAMPING, full.rate_hz, full.bounds
+            ):
+                columns.append(block_mean(answer, full.bounds, factor))
         return stack(*columns)
 
 

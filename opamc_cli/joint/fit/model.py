@@ -255,8 +255,9 @@ class Fit:
     residual_a: Floats
     sums: Sums
 
+    @cached_property
     def coarse_sums(self) -> tuple[Sums, list[Floats]]:
-        """Sum products of the slow terms on the coarse grid; return their regressors beside them.
+        """Products of the slow terms on the coarse grid, and their regressors beside them.
 
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
@@ -291,6 +292,13 @@ class Fit:
         beside = [] if blur is None else [blur]
         error: Floats = session.sums_of([*blocks, *beside], True).held_out()
         return error
+
+    def forget(self) -> None:
+        """Drop what is computed again where it is asked for: a search keeps many fits."""
+        self.session.fine.track.forget()
+        self.session.coarse.track.forget()
+        self.__dict__.pop("coarse_sums", None)
+        self.sums.forget()
 
     def fast_part(self, fine: bool) -> Floats:
         """Compute the current of the fast terms on one of the grids."""

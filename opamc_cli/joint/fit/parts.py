@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
 
-from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 FEWEST_UNITS = 8
@@ -49,8 +50,13 @@ class Parts:
         half: Ints = 2 * self.unit + (2 * (np.arange(self.unit.size) - first) >= size)
         return np.unique(half, return_inverse=True)[1]
 
-    def elsewhere(self, units: Floats) -> Floats:
-        """Sum over all units but each one, of values of shape (units, ...)."""
+    def by_unit(self, values: Floats) -> Floats:
+        """Sum parts' values, shape (p, ...), over each unit."""
+        return _summed(values, self.unit)
+
+    def elsewhere(self, values: Floats) -> Floats:
+        """Sum parts' values, shape (p, ...), over all units but each one."""
+        units = self.by_unit(values)
         rest: Floats = units.sum(axis=0) - units
         return rest
 
@@ -130,7 +136,7 @@ class Sums:
         halves = self.parts.halves
         count = int(halves.max()) + 1
         gram, moment, power = (
-            _summed(values, halves, count) for values in (self.gram, self.moment, self.power)
+            _summed(values, halves) for values in (self.gram, self.moment, self.power)
         )
         number = np.maximum(gram[:, -1, -1], 1.0)
         total, mean = gram[:, :-1, -1], moment[:, -1] / number
@@ -173,27 +179,34 @@ class Sums:
         rest = self.columns(left)
         return Sums(rest.gram, moment[:, left], power, self.parts)
 
+    @cached_property
+    def inverses(self) -> Floats:
+        """Pseudo-inverse of the products outside each unit, shape (units, k, k)."""
+        return inverse(self.parts.elsewhere(self.gram))
+
+    @cached_property
+    def coefficients(self) -> Floats:
+        """Fit to all units but each one, shape (units, k)."""
+        moment = self.parts.elsewhere(self.moment)
+        found: Floats = np.einsum("uij,uj->ui", self.inverses, moment)
+        return found
+
+    def forget(self) -> None:
+        """Drop the inverses; they are computed again where they are asked for."""
+        self.__dict__.pop("inverses", None)
+
     def held_out(self) -> Floats:
         """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
-        parts = self.parts
-        units = parts.units
-        width = self.moment.shape[1]
-        if width == 0:
+        if self.moment.shape[1] == 0:
             return self.power
-        gram = np.zeros((units, width, width))
-        moment = np.zeros((units, width))
-        np.add.at(gram, parts.unit, self.gram)
-        np.add.at(moment, parts.unit, self.moment)
-        rest = parts.elsewhere(gram)
-        coefficients = solve(rest, parts.elsewhere(moment))[parts.unit]
+        coefficients = self.coefficients[self.parts.unit]
         linear = np.einsum("pi,pi->p", coefficients, self.moment)
-        quadratic = np.einsum("pi,pij,pj->p", coefficients, self.gram, coefficients)
+        quadratic = np.einsum("pi,pij,pj->p", coefficients, self.gram, coefficients, optimize=True)
         error: Floats = np.maximum(self.power - 2 * linear + quadratic, 0.0)
         return error
 
 
-def _summed(values: Floats, places: Ints, count: int) -> Floats:
-    """Sum parts' values at their places."""
-    summed = np.zeros((count, *values.shape[1:]))
-    np.add.at(summed, places, values)
+def _summed(values: Floats, places: Ints) -> Floats:
+    """Sum parts' values over each place; places ascend from 0, and none is left out."""
+    summed: Floats = np.add.reduceat(values, np.flatnonzero(np.diff(places, prepend=-1)), axis=0)
     return summed

@@ -10,7 +10,7 @@ from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
 MOST_BYTES = 250e6
-"""Regressors that are kept; a session has 1 GB for everything."""
+"""Regressors that are kept, with their rows in parts; a session has 1 GB for everything."""
 
 
 class RegressorCache:
@@ -68,9 +68,9 @@ class RegressorCache:
             ]
             if not missing:
                 continue
-            mine = self._rows(block, parts, fine)
+            mine = self.rows(block, parts, fine)
             for other in missing:
-                product = parts.products(self._rows(other, parts, fine), mine)
+                product = parts.products(self.rows(other, parts, fine), mine)
                 self._products[id(other), id(block), fine] = product
                 self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
         own = [
@@ -84,19 +84,25 @@ class RegressorCache:
         power = self._products[id(target), id(target), fine][:, 0, 0]
         return Sums(gram, moment, power, parts)
 
-    def _rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
+    def rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
+        """Return the parts' rows of a regressor array."""
         key = (id(block), fine)
         if key not in self._taken:
             # The block itself is kept beside its rows, so that its identity stays its own.
             self._taken[key] = (block, parts.taken(block))
         return self._taken[key][1]
 
+    @property
+    def _held(self) -> int:
+        blocks = sum(block.nbytes for block in self._columns.values())
+        return blocks + sum(rows.nbytes for _, rows in self._taken.values())
+
     def _forget_strangers(self, blocks: Sequence[Floats]) -> None:
         """Keep the memory bounded: what was used longest ago goes first."""
-        held = sum(block.nbytes for block in self._columns.values())
-        while held > MOST_BYTES and len(self._columns) > 1:
+        while self._held > MOST_BYTES and len(self._columns) > 1:
             _, block = self._columns.popitem(last=False)
-            held -= block.nbytes
+            for fine in (True, False):
+                self._taken.pop((id(block), fine), None)
         wanted = {id(block) for block in (*self._columns.values(), *blocks)}
         wanted |= {id(value) for value in self.shared.values()}
         for key in [key for key in self._taken if key[0] not in wanted]:

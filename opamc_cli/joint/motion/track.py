@@ -184,6 +184,14 @@ class Track:
         full = self.full or self
         return block_mean(self.static_columns, full.bounds, round(full.rate_hz / self.rate_hz))
 
+    def forget(self) -> None:
+        """Drop what follows from the static terms; it is computed again where it is asked for.
+
+        A search keeps hundreds of fits, each with its own.
+        """
+        for name in ("static_columns", "static_sums", "static_means"):
+            self.__dict__.pop(name, None)
+
     def with_model(
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":

@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import Session, Term
-from opamc_cli.joint.fit.parts import Parts, Sums
+from opamc_cli.joint.fit.model import COARSE_SAMPLES, Session, Term
+from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain, price_of
@@ -99,7 +99,7 @@ def best_form(session: Session, beside: "Beside", full: Term, reference: float) 
     """Choose among the smaller forms of an effect the one that is worth its price."""
     effect = full.effect
     (batch,) = batches_of(session, [full], fine=True)
-    cross = beside.parts.products(beside.columns, batch.columns)[:, None]
+    cross = beside.products(batch.columns)[:, None]
     best = None
     forms = [(full, tuple(range(batch.width)))]
     for form, keep in effect.variants(full.parameters):
@@ -124,35 +124,32 @@ class Beside:
         self.parts: Parts = session.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
-        if self.fine:
-            blocks = [session.columns(term, True) for term in chain.fit.terms]
-            self.sums: Sums = session.sums_of(blocks, True)
-        else:
-            self.sums, blocks = chain.fit.coarse_sums()
+        if not self.fine:
+            self.sums, blocks = chain.fit.coarse_sums
             self.fast_part = self.parts.taken(chain.fit.fast_part(False))
-        rows = [self.parts.taken(block) for block in blocks]
-        self.columns = np.concatenate([np.zeros((self.parts.rows.size, 0)), *rows], axis=1)
+        else:
+            blocks = [session.columns(term, True) for term in chain.fit.terms]
+            follows = not all(term.is_constant for term in chain.fit.terms)
+            self.sums = session.sums_of(blocks, True) if follows else chain.fit.sums
+        self.blocks = [session.cache.rows(block, self.parts, self.fine) for block in blocks]
         current = session.grid_of(self.fine).track.current_a
         self.current = self.parts.taken(current)
         if self.fast_part is not None:
             self.current = self.current - self.fast_part
+        self.step = max(self.current.size // COARSE_SAMPLES, 1)
         self.weight = 1.0 if self.fine else float(session.factor)
-        units, width = self.parts.units, self.columns.shape[1]
-        gram = np.zeros((units, width, width))
-        moment = np.zeros((units, width))
-        np.add.at(gram, self.parts.unit, self.sums.gram)
-        np.add.at(moment, self.parts.unit, self.sums.moment)
-        self.inverse = inverse(self.parts.elsewhere(gram))
-        self.rest_moment = self.parts.elsewhere(moment)
-        self.alone = np.einsum("uij,uj->ui", self.inverse, self.rest_moment)
         self.before = self.sums.held_out()
+
+    def products(self, columns: Floats) -> Floats:
+        """Products of the chain's regressors with others over each part, shape (p, b, k)."""
+        none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
+        return np.concatenate([none, *(self.parts.products(b, columns) for b in self.blocks)], 1)
 
     def drops(self, batch: Batch) -> Floats:
         """Held-out sum of squares that each guess takes away beside the chain; shape (K,)."""
         count, width = len(batch.terms), batch.width
-        base = self.columns.shape[1]
-        cross = self.parts.products(self.columns, batch.columns)
-        cross = cross.reshape(-1, base, count, width).transpose(0, 2, 1, 3)
+        cross = self.products(batch.columns)
+        cross = cross.reshape(*cross.shape[:2], count, width).transpose(0, 2, 1, 3)
         moment = batch.moment
         if self.fast_part is not None:
             fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
@@ -163,18 +160,20 @@ class Beside:
         self, cross: Floats, own: Floats, moment: Floats, *, whole: bool = False
     ) -> Floats:
         """Likewise, from products: cross (p, K, b, w), own (p, K, w, w), moment (p, K, w)."""
-        unit = self.parts.unit
-        rest_cross, rest_own, rest_moment = (self._rest(one) for one in (cross, own, moment))
-        projected = self.inverse[:, None] @ rest_cross
+        unit, alone = self.parts.unit, self.sums.coefficients
+        rest_cross, rest_own, rest_moment = (
+            self.parts.elsewhere(one) for one in (cross, own, moment)
+        )
+        projected = self.sums.inverses[:, None] @ rest_cross
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
         width = own.shape[-1]
         # What nothing outside a unit excites has no coefficient there.
         floor = RIDGE * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
         left = left + floor[..., None] * np.eye(width)
-        asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, self.alone)
+        asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, alone)
         gamma = np.ones_like(asked) if whole else np.linalg.solve(left, asked[..., None])[..., 0]
-        beta = self.alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
+        beta = alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
         gamma, beta = gamma[unit], beta[unit]
         sums = self.sums
         error = (
@@ -188,27 +187,31 @@ class Beside:
         drop: Floats = self.weight * (self.before[:, None] - error)[self.counted].sum(axis=0)
         return drop
 
-    def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
-        """Sum of squares that columns on the parts' rows take away beside the chain, when fitted.
+    def refined_rows(self, values: Floats) -> Floats:
+        """Take every so-many-th of the parts' rows of an array on the grid, for `fitted_drop`."""
+        taken: Floats = values[self.parts.rows[:: self.step]]
+        return taken
 
-        Smooth in the effect's parameters, so that these can be refined. Those of a `whole` effect
-        are not fitted: they are one.
+    def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
+        """Sum of squares that columns on the refined rows take away beside the chain, when fitted.
+
+        Smooth in the effect's parameters, so that these can be refined; by as many rows as the
+        coarse grid has, which tell a parameter as well as all. Those of a `whole` effect are not
+        fitted: they are one.
         """
-        gram, moment = self._whole
-        cross = self.columns.T @ columns
+        beside, gram, moment, current = self._refining
+        cross = beside.T @ columns
         projected = gram @ cross
         left = columns.T @ columns - cross.T @ projected
         left += RIDGE * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
-        asked = columns.T @ self.current - projected.T @ moment
+        asked = columns.T @ current - projected.T @ moment
         if whole:
-            return float(self.weight * (2 * asked.sum() - left.sum()))
-        return float(self.weight * asked @ np.linalg.solve(left, asked))
+            return float(2 * asked.sum() - left.sum())
+        return float(asked @ np.linalg.solve(left, asked))
 
     @cached_property
-    def _whole(self) -> tuple[Floats, Floats]:
-        return inverse(self.sums.gram.sum(axis=0)[None])[0], self.sums.moment.sum(axis=0)
-
-    def _rest(self, parts: Floats) -> Floats:
-        units = np.zeros((self.parts.units, *parts.shape[1:]))
-        np.add.at(units, self.parts.unit, parts)
-        return self.parts.elsewhere(units)
+    def _refining(self) -> tuple[Floats, Floats, Floats, Floats]:
+        current = self.current[:: self.step]
+        blocks = [block[:: self.step] for block in self.blocks]
+        beside = np.concatenate([np.zeros((current.size, 0)), *blocks], axis=1)
+        return beside, inverse((beside.T @ beside)[None])[0], beside.T @ current, current

@@ -120,10 +120,11 @@ def chain_of(fit: Fit, added: int) -> Chain:
     error = fit.sums.held_out()[fine.judged]
     samples = float(sum(b - a for (a, b), j in zip(fine.slices, fine.judged, strict=True) if j))
     if not fine.judged.all() and not coarse.judged.all() and session.coarse is not session.fine:
-        sums, _ = fit.coarse_sums()
+        sums, _ = fit.coarse_sums
         rest, count = _unclear(sums, coarse.judged)
         error = np.concatenate([error, session.factor * rest])
         samples += session.factor * count
+    fit.forget()
     return Chain(fit, added, error, samples)
 
 

@@ -46,7 +46,7 @@ def refined(session: Session, term: Term, beside: Beside) -> Term:
 
     def lost(values: Floats) -> float:
         trial = Term(term.effect, outwards(np.atleast_1d(values)), term.keep)
-        columns = beside.parts.taken(session.computed(trial, beside.fine))
+        columns = beside.refined_rows(session.computed(trial, beside.fine))
         return -beside.fitted_drop(columns, whole=term.effect.whole)
 
     start = np.array(

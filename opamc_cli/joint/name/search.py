@@ -70,6 +70,30 @@ class Pool:
 
 
 @dataclass(frozen=True)
+class Tried:
+    """What is told of a trial in the end, when its fit and its sums are gone.
+
+    Attributes
+    ----------
+    term : Term
+        The effect.
+    score : float
+        Of the chain with it less that of the chain without.
+    gain, t_value, p_value : float
+        As of the trial.
+    why_not : str or None
+        None where the effect may be added.
+    """
+
+    term: Term
+    score: float
+    gain: float
+    t_value: float
+    p_value: float
+    why_not: str | None
+
+
+@dataclass(frozen=True)
 class Trial:
     """A chain with one effect more, and why it is none, if it is not.
 
@@ -98,6 +122,12 @@ class Trial:
     def p_value(self) -> float:
         """Probability of such a t where the effect does nothing."""
         return p_value(self.t_value, self.chain.error.size)
+
+    @property
+    def told(self) -> Tried:
+        """What is told of it in the end."""
+        score = self.chain.score - self.parent.score
+        return Tried(self.term, score, self.gain, self.t_value, self.p_value, self.why_not)
 
 
 def guessed(effect: Effect, session: Session) -> list[Term]:
@@ -171,6 +201,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         trial = judged(term, float(beside.drops(batch)[0]), batch.width, reference)
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.drop > SAME * candidate.drop else candidate)
+    chain.fit.forget()
     return sorted(better, key=lambda candidate: candidate.score)
 
 
@@ -255,7 +286,7 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
     """
     width = 1 if "beam" in pool.without else width
     chains = [start]
-    reached = [start]
+    best = start
     known: set[Signature] = set()
     for _ in range(MOST_STEPS):
         following = [
@@ -267,5 +298,5 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
         if not following:
             break
         chains = sorted(following, key=lambda chain: chain.score)[:width]
-        reached += chains
-    return min(reached, key=lambda chain: chain.score)
+        best = min((best, *chains), key=lambda chain: chain.score)
+    return best

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import Chain, extended, without
-from opamc_cli.joint.name.search import Pool, Trial, objection, trials
+from opamc_cli.joint.name.search import Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
 from opamc_cli.joint.name.ties import ties_of
 
@@ -23,14 +23,14 @@ class Named:
     ----------
     trial : Trial
         What it takes off the error that all the others leave.
-    others : tuple of Trial
+    others : tuple of Tried
         What else was tried in its place.
     ties : tuple of str
         Effects that explain the data as well.
     """
 
     trial: Trial
-    others: tuple[Trial, ...]
+    others: tuple[Tried, ...]
     ties: tuple[str, ...]
 
     @property
@@ -107,7 +107,7 @@ def _asked_again(
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain, []
     ties = ties_of(best, term.effect.name, others)
-    return None, [Named(trial, tuple(others), ties)]
+    return None, [Named(trial, tuple(other.told for other in others), ties)]
 
 
 def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:

@@ -162,7 +162,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
             best = int(np.argmax(np.where(power >= threshold, weighed, 0.0)))
             if power[best] < threshold or weighed[best] <= 0:
                 break
-            peaks.append((_vertex(orders, power, best), float(power[best])))
+            peaks.append((vertex(orders, power, best), float(power[best])))
             _mask(weighed, best, guard)
     return peaks
 
@@ -171,7 +171,7 @@ def _mask(power: Floats, place: int, guard: int) -> None:
     power[max(place - guard, 0) : place + guard + 1] = 0
 
 
-def _vertex(orders: Floats, power: Floats, best: int) -> float:
+def vertex(orders: Floats, power: Floats, best: int) -> float:
     """Place of a peak by the parabola through it and its neighbours."""
     shift = 0.0
     if 0 < best < power.size - 1:

@@ -128,7 +128,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
             {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
         ],
     }
-    return entry, [candidate_row(axis, 0, trial, False) for trial in tried]
+    return entry, [candidate_row(axis, 0, trial.told, False) for trial in tried]
 
 
 @dataclass(frozen=True)

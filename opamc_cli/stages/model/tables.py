@@ -14,7 +14,7 @@ from opamc_cli.joint.fit.model import Fit, Session, Term
 from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
-from opamc_cli.joint.name.search import Trial
+from opamc_cli.joint.name.search import Tried
 from opamc_cli.joint.noise.spectra import order_resolution, order_spectrum
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
@@ -84,7 +84,7 @@ def _groups_entry(session: Session) -> dict[str, Any]:
     }
 
 
-def candidate_row(axis: int, number: int, trial: Trial, added: bool) -> dict[str, Any]:
+def candidate_row(axis: int, number: int, trial: Tried, added: bool) -> dict[str, Any]:
     """Row of candidates.parquet."""
     term = trial.term
     return {
@@ -93,7 +93,7 @@ def candidate_row(axis: int, number: int, trial: Trial, added: bool) -> dict[str
         "effect": term.effect.name,
         "domain": term.effect.domain,
         "parameters": json.dumps(shown_parameters(term), sort_keys=True),
-        "score": trial.chain.score - trial.parent.score,
+        "score": trial.score,
         "p_value": trial.p_value,
         "gain": trial.gain,
         "t_value": trial.t_value,

@@ -104,11 +104,9 @@ def test_the_fitted_drop_is_the_fall_of_the_sum_of_squares(slow_chain):
     session = slow_chain.fit.session
     beside = Beside(slow_chain, True)
     columns = beside.parts.taken(session.columns(Term(LIBRARY["spring"], {}), True))
-    both = np.concatenate([beside.columns, columns], axis=1)
-    left = [
-        np.linalg.lstsq(design, beside.current, rcond=1e-9)[1][0]
-        for design in (beside.columns, both)
-    ]
+    known = np.concatenate(beside.blocks, axis=1)
+    both = np.concatenate([known, columns], axis=1)
+    left = [np.linalg.lstsq(design, beside.current, rcond=1e-9)[1][0] for design in (known, both)]
     assert beside.fitted_drop(columns) == pytest.approx(left[0] - left[1], rel=1e-4)
 
 
