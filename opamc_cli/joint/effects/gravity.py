@@ -25,6 +25,7 @@ class Gravity(Effect):
     meaning = "weight of the links; not a fault in itself"
     needs = ("position",)
     carries_load = True
+    from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Travels of the joint from a few degrees to a whole turn, where nobody knows it."""

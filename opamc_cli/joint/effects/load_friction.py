@@ -6,6 +6,9 @@ from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Floats, Track
 
+MOST_ROWS = 10_000
+"""Samples by which the inertia's part of the load is told: the load has no noise."""
+
 
 class LoadFriction(Effect):
     """Meshing losses: dry friction in proportion to the load's magnitude.
@@ -46,9 +49,11 @@ def _passing(track: Track, parameters: Parameters) -> Floats:
 
 def _inertial(track: Track) -> Floats:
     """Part of the fitted load that follows the acceleration."""
-    place = track.position_rad
-    shapes = (track.acceleration, np.sin(place), np.cos(place), place, np.ones(track.size))
-    columns = stack(*shapes)[track.moving]
-    share = solve(columns.T @ columns, columns.T @ track.load_a[track.moving])
+    rows = np.flatnonzero(track.moving)
+    rows = rows[:: max(rows.size // MOST_ROWS, 1)]
+    place = track.position_rad[rows]
+    shapes = (track.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
+    columns = stack(*shapes)
+    share = solve(columns.T @ columns, columns.T @ track.load_a[rows])
     inertial: Floats = share[0] * track.acceleration
     return inertial

@@ -7,11 +7,9 @@ import numpy as np
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Track, excerpt
 
-MOST_SAMPLES = 250_000
-"""Above this many moving samples, evenly spread parts of the open groups stand for all."""
-
-TAKEN_SAMPLES = 100_000
-"""So many of all moving samples are taken (times the share of the open ones)."""
+MOST_SAMPLES = 100_000
+"""Of more moving samples evenly spread parts of the open groups stand for all: so many, times the
+share of the open ones. What is shorter is then never dearer."""
 
 FEWEST_GROUPS = 12
 """What happens at some time is consistent over groups only if there are some on both sides."""
@@ -46,7 +44,7 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
         where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
-    share = TAKEN_SAMPLES / max(int(np.count_nonzero(member)), 1)
+    share = MOST_SAMPLES / max(int(np.count_nonzero(member)), 1)
     sizes = np.bincount(track.group[member], minlength=len(grouping.names))
     count = min(max(int(len(groups) * share), FEWEST_GROUPS), len(groups))
     whole = grouping.kind == "cycles"

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track
+from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track
 
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
@@ -177,37 +178,42 @@ def motion_from_position(
     window = smoothing_window(position_rad, rate_hz, derivative=2)
     if smoothing is not None:
         window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
-    position = derivatives(position_rad, rate_hz, window, 0)
-    velocity = derivatives(position_rad, rate_hz, window, 1)
-    acceleration = derivatives(position_rad, rate_hz, window, 2)
+    motion = _smoothed(position_rad, rate_hz, window, 2)
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
-        speed = velocity_rad_s
-        # Of the speed itself, not of its changes: at constant speed those are nearly noise.
-        size = float(np.sqrt(np.mean(velocity**2)))
-        agrees = size > 0 and float(np.std(speed - velocity)) < 0.1 * size
-        own = window if asked else smoothing_window(speed, rate_hz, derivative=1)
+        size = float(np.sqrt(np.mean(motion.velocity**2)))
+        agrees = size > 0 and float(np.std(velocity_rad_s - motion.velocity)) < 0.1 * size
+        own = window if asked else smoothing_window(velocity_rad_s, rate_hz, derivative=1)
         if agrees and (asked or own < window):
-            acceleration = derivatives(speed, rate_hz, own, 1)
-            spread = float(np.std(acceleration))
-            return Motion(
-                position,
-                derivatives(speed, rate_hz, own, 0),
-                acceleration,
-                own,
-                measurement_noise(speed) * noise_gain(rate_hz, own, 0),
-                averaging_kernel(own, 1),
-                quiet_block(measurement_noise(speed), spread, rate_hz, own, 1),
-                blurred(speed, rate_hz, own, 1),
-                measurement_noise(speed) * taken_noise_gain(rate_hz, own, 1),
-            )
-    noise = measurement_noise(position_rad) * noise_gain(rate_hz, window, 1)
-    kernel = averaging_kernel(window, 2)
-    spread = float(np.std(acceleration))
-    quiet = quiet_block(measurement_noise(position_rad), spread, rate_hz, window, 2)
-    blur = blurred(position_rad, rate_hz, window, 2)
-    taken = measurement_noise(position_rad) * taken_noise_gain(rate_hz, window, 2)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
+            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1)
+            return replace(cleaner, position_rad=motion.position_rad)
+    return motion
+
+
+def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
+    """Position by the trapezoidal rule from zero, acceleration by a local polynomial."""
+    window = smoothing_window(velocity_rad_s, rate_hz, derivative=1)
+    motion = _smoothed(velocity_rad_s, rate_hz, window, 1)
+    steps = 0.5 * (motion.velocity[1:] + motion.velocity[:-1]) / rate_hz
+    return replace(motion, position_rad=np.concatenate([[0.0], np.cumsum(steps)]))
+
+
+def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Motion:
+    """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
+    values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
+    velocity, acceleration = values[-2:]
+    noise, spread = measurement_noise(path), float(np.std(acceleration))
+    return Motion(
+        position_rad=values[0],
+        velocity=velocity,
+        acceleration=acceleration,
+        window=window,
+        velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
+        kernel=averaging_kernel(window, derivative),
+        quiet=quiet_block(noise, spread, rate_hz, window, derivative),
+        blur=blurred(path, rate_hz, window, derivative),
+        taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
+    )
 
 
 def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) -> float | None:
@@ -239,22 +245,6 @@ def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) ->
     if power <= 0 or both**2 < SAME_MOTION**2 * power * float(speed[good] @ speed[good]):
         return None
     return both / power
-
-
-def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
-    """Position by the trapezoidal rule from zero, acceleration by a local polynomial."""
-    window = smoothing_window(velocity_rad_s, rate_hz, derivative=1)
-    velocity = derivatives(velocity_rad_s, rate_hz, window, 0)
-    acceleration = derivatives(velocity_rad_s, rate_hz, window, 1)
-    steps = 0.5 * (velocity[1:] + velocity[:-1]) / rate_hz
-    noise = measurement_noise(velocity_rad_s) * noise_gain(rate_hz, window, 0)
-    position = np.concatenate([[0.0], np.cumsum(steps)])
-    kernel = averaging_kernel(window, 1)
-    spread = float(np.std(acceleration))
-    quiet = quiet_block(measurement_noise(velocity_rad_s), spread, rate_hz, window, 1)
-    blur = blurred(velocity_rad_s, rate_hz, window, 1)
-    taken = measurement_noise(velocity_rad_s) * taken_noise_gain(rate_hz, window, 1)
-    return Motion(position, velocity, acceleration, window, noise, kernel, quiet, blur, taken)
 
 
 def direction_of(motion: Motion) -> Floats:
@@ -326,10 +316,6 @@ def build_track(
     """
     rate = recordings[0].rate_hz
     pieces = [_one(recording, joint, smoothing) for recording in recordings]
-    with_phases = all("phases" in piece.channels for piece in pieces)
-    with_angle = all(piece.electrical_rad is not None for piece in pieces)
-    with_temperature = all(piece.temperature_c is not None for piece in pieces)
-    channels = frozenset.intersection(*(piece.channels for piece in pieces))
     bounds = []
     offset = 0
     clock = 0.0
@@ -343,39 +329,21 @@ def build_track(
             clock = max(recording.started_s - first, clock)
         times.append(clock + np.arange(n) / rate)
         clock += n / rate
-
-    def join(name: str) -> Floats:
-        return np.concatenate([getattr(piece, name) for piece in pieces])
-
-    n = offset
+    joined: dict[str, Any] = {}
+    for name in SAMPLED:
+        values = [getattr(piece, name) for piece in pieces]
+        known = all(value is not None for value in values)
+        joined[name] = np.concatenate(values) if known else None
     alone = len(recordings) == 1
     common = all(recording.started_s is not None for recording in recordings)
-    return Track(
-        rate_hz=rate,
+    return replace(
+        pieces[0],
+        **joined | {"time_s": np.concatenate(times)},
         bounds=tuple(bounds),
-        time_s=np.concatenate(times),
-        run_time_s=join("run_time_s"),
-        current_a=join("current_a"),
-        position_rad=join("position_rad"),
-        velocity=join("velocity"),
-        acceleration=join("acceleration"),
-        machine_angle_rad=join("machine_angle_rad"),
-        angle_kind=pieces[0].angle_kind,
-        direction=join("direction"),
-        moving=np.concatenate([piece.moving for piece in pieces]),
-        clear=np.concatenate([piece.clear for piece in pieces]),
-        group=np.full(n, -1, dtype=np.int64),
-        load_a=np.zeros(n),
-        model_a=np.zeros(n),
-        joint=joint,
-        channels=channels,
-        temperature_c=join("temperature_c") if with_temperature else None,
-        current_d_a=join("current_d_a") if with_phases else None,
-        electrical_rad=join("electrical_rad") if with_angle else None,
+        channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
         quiet=max(piece.quiet for piece in pieces),
-        blur=join("blur") if all(piece.blur is not None for piece in pieces) else None,
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ SAMPLED = (
     "blur",
 )
 """Attributes of a track that have a value per sample, or are None."""
+NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
+"""Those of which a block has something else than the mean, or nothing."""
 
 
 @dataclass(frozen=True)
@@ -366,9 +368,6 @@ def coarsen(track: Track, factor: int) -> Track:
             full, position_rad=smooth(track.position_rad), velocity=smooth(track.velocity)
         )
 
-    def optional(values: Floats | None) -> Floats | None:
-        return None if values is None else mean(values)
-
     bounds = []
     offset = 0
     for start, stop in track.bounds:
@@ -380,27 +379,20 @@ def coarsen(track: Track, factor: int) -> Track:
     whole = group == np.round(group)
     moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
     period = track.period_samples
+    sampled = {name: getattr(full, name) for name in SAMPLED if name not in NOT_AVERAGED}
+    means: dict[str, Any] = {
+        name: mean(values) for name, values in sampled.items() if values is not None
+    }
     return replace(
         track,
         rate_hz=track.rate_hz / factor,
         bounds=tuple(bounds),
-        time_s=mean(track.time_s),
-        run_time_s=mean(track.run_time_s),
-        current_a=mean(full.current_a),
-        position_rad=mean(full.position_rad),
-        velocity=mean(full.velocity),
-        acceleration=mean(track.acceleration),
-        machine_angle_rad=mean(track.machine_angle_rad),
         direction=np.sign(mean(track.direction)),
         moving=moving,
         clear=clear,
         group=np.where(whole, group, -1).astype(np.int64),
-        load_a=mean(track.load_a),
-        model_a=mean(track.model_a),
-        temperature_c=optional(track.temperature_c),
-        current_d_a=optional(track.current_d_a),
-        electrical_rad=optional(track.electrical_rad),
         blur=None,
+        **means,
         full=full,
         period_samples=None if period is None else round(period / factor),
     )

@@ -185,7 +185,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         for term, drop in zip(batch.terms, slow.drops(batch), strict=True):
             if term.effect.name not in present:
                 note(judged(term, float(drop), batch.width, reference))
-    fast = Beside(chain, fine=True)
+    fast = Beside(chain, fine=True) if any(effect.fast for effect in free) else slow
     residual = np.where(session.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
         if effect.fast and not effect.untestable(session.fine.track):

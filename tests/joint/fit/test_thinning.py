@@ -21,7 +21,7 @@ LIMIT = 20_000
 
 @pytest.fixture
 def low_limit(monkeypatch):
-    monkeypatch.setattr(thinning, "TAKEN_SAMPLES", LIMIT)
+    monkeypatch.setattr(thinning, "MOST_SAMPLES", LIMIT)
     monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
 
 
@@ -90,7 +90,7 @@ def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells(monkeypatch):
     library = built_in_library()
     declared = tuple((library[name], None) for name in DECLARED)
     whole = close_loop(declared_fit(open_session(track, grouping), declared), library)
-    monkeypatch.setattr(thinning, "TAKEN_SAMPLES", LIMIT)
+    monkeypatch.setattr(thinning, "MOST_SAMPLES", LIMIT)
     monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
     part = close_loop(declared_fit(open_session(track, grouping), declared), library)
     assert [s.term.effect.name for s in part.steps] == [s.term.effect.name for s in whole.steps]
