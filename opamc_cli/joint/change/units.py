@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.fit.model import Term, currents
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
@@ -15,7 +15,6 @@ from opamc_cli.joint.motion.track import (
     Floats,
     Joint,
     Track,
-    averaged_blocks,
     block_mean,
     coarsen,
 )
@@ -57,14 +56,9 @@ class Unit:
         if fine:
             return term.columns(self.fine)[self.fine_rows]
         if term.key not in self._coarse_columns:
-            self._coarse_columns[term.key] = self._on_coarse(term)[self.coarse_rows]
+            whole = term.averaged(self.fine, self.coarse, self.factor)
+            self._coarse_columns[term.key] = whole[self.coarse_rows]
         return self._coarse_columns[term.key]
-
-    def _on_coarse(self, term: Term) -> Floats:
-        if not term.effect.fast:
-            return term.columns(self.coarse)
-        track = self.fine
-        return averaged_blocks(term.columns(track), track.bounds, track.kernel, self.factor)
 
     def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
         """Regressors of several terms side by side."""
@@ -78,15 +72,9 @@ class Unit:
 
     def with_model(self, terms: tuple[Term, ...], coefficients: Floats) -> "Unit":
         """Put the fitted load and the whole fitted current on both tracks."""
-        load, model = np.zeros(self.fine.size), np.zeros(self.fine.size)
-        first = 0
-        for term in terms:
-            columns = term.columns(self.fine)
-            part = columns @ coefficients[first : first + columns.shape[1]]
-            first += columns.shape[1]
-            model += part
-            if term.effect.carries_load:
-                load += part
+        blocks = [term.columns(self.fine) for term in terms]
+        parts = np.split(coefficients, np.cumsum([block.shape[1] for block in blocks])[:-1])
+        _, model, load = currents(terms, blocks, parts, self.fine.size)
         fine = self.fine.with_model(load, model, terms)
         return replace(self, fine=fine, coarse=self.coarse.with_model(load, model, terms))
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import MOST_ROUNDS, SETTLED, Term
+from opamc_cli.joint.fit.model import MOST_ROUNDS, SETTLED, Term, currents, static_terms
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 
 PLACED = ("motor-angle", "joint-angle")
@@ -71,18 +71,9 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
     circular = not all(term.is_constant for term in terms)
     total = np.zeros(track.size)
     for _ in range(MOST_ROUNDS if circular else 1):
-        before, total = total, np.zeros(track.size)
-        model, load = np.zeros(track.size), np.zeros(track.size)
-        static = []
-        for term, values in zip(terms, coefficients, strict=True):
-            part = term.columns(track) @ values
-            total += part
-            if term.effect.static and not term.effect.fast:
-                model += part
-                static.append(term)
-            if term.effect.carries_load:
-                load += part
+        before, blocks = total, (term.columns(track) for term in terms)
+        total, model, load = currents(terms, blocks, coefficients, track.size)
         if np.abs(total - before).max() <= SETTLED * max(np.abs(total).max(), 1e-12):
             break
-        track = track.with_model(load, model, tuple(static))
+        track = track.with_model(load, model, static_terms(terms))
     return Applied(track, track.current_a - total, judged)

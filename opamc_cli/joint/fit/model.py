@@ -1,5 +1,6 @@
 """A model of the current: terms, their regressors on both grids, and the joint fit."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -40,6 +41,12 @@ class Term:
         """Regressors on the track's grid, shape (n, m)."""
         columns = self.effect.columns(track, self.parameters)
         return columns if self.keep is None else columns[:, self.keep]
+
+    def averaged(self, fine: Track, coarse: Track, factor: int) -> Floats:
+        """Regressors on a coarse track; fast ones are averaged, not resampled."""
+        if not self.effect.fast:
+            return self.columns(coarse)
+        return averaged_blocks(self.columns(fine), fine.bounds, fine.kernel, factor)
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -136,11 +143,7 @@ class Session:
 
     def _columns(self, term: Term, fine: bool) -> Floats:
         track = self.fine.track
-        if fine:
-            return term.columns(track)
-        if term.effect.fast:
-            return averaged_blocks(term.columns(track), track.bounds, track.kernel, self.factor)
-        return term.columns(self.coarse.track)
+        return term.columns(track) if fine else term.averaged(track, self.coarse.track, self.factor)
 
     def sums(self, terms: "tuple[Term, ...]", fine: bool) -> Sums:
         """Products of the terms' regressors with one another and the current, over each part."""
@@ -397,8 +400,7 @@ def _with_newton_load(fitted: Fit) -> Session:
         jacobian = columns.copy()
         jacobian[:, carries] *= 1 + (columns[:, follows] @ solution[follows] / over)[:, None]
         solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
-    static = tuple(term for term in terms if term.effect.static and not term.effect.fast)
-    return session.with_model(best, track.model_a, static)
+    return session.with_model(best, track.model_a, static_terms(terms))
 
 
 def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
@@ -409,17 +411,36 @@ def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
     sums = session.sums_of(blocks, fine=True)
     solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
-    total = np.zeros(grid.track.size)
-    model = np.zeros(grid.track.size)
-    load = np.zeros(grid.track.size)
-    static = []
+    total, model, load = currents(terms, blocks, coefficients, current.size)
+    session = session.with_model(load, model, static_terms(terms))
+    return Fit(terms, coefficients, session, current - total, sums)
+
+
+def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Terms that make up the model which others shift, scale or ripple with."""
+    return tuple(term for term in terms if term.effect.static and not term.effect.fast)
+
+
+def currents(
+    terms: Sequence[Term], blocks: Iterable[Floats], coefficients: Sequence[Floats], size: int
+) -> tuple[Floats, Floats, Floats]:
+    """Add up the current of all terms, of the static ones, and of those that carry the load.
+
+    Parameters
+    ----------
+    terms : sequence of Term
+    blocks : iterable of arrays of shape (size, k)
+        Their regressors.
+    coefficients : sequence of arrays of shape (k,)
+    size : int
+        Samples.
+    """
+    total, model, load = np.zeros(size), np.zeros(size), np.zeros(size)
     for term, block, values in zip(terms, blocks, coefficients, strict=True):
         part = block @ values
         total += part
         if term.effect.static and not term.effect.fast:
             model += part
-            static.append(term)
         if term.effect.carries_load:
             load += part
-    session = session.with_model(load, model, tuple(static))
-    return Fit(terms, coefficients, session, current - total, sums)
+    return total, model, load
