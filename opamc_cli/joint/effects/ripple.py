@@ -158,8 +158,6 @@ def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> 
     list of arrays of shape (n,)
         For every filter, highest first, what a low-pass and a band-pass make of each wave.
     """
-    from scipy.signal import lfilter  # slow to load, and few ripples need a drive's answer
-
     found = []
     top_hz = parameters.get("top_hz") or _top_hz(track, parameters["order"])
     for k in range(_filters(top_hz, parameters["answer"])):
