@@ -18,6 +18,7 @@ from opamc_cli.decision.significance.spread import (
     moderated_spread,
     spliced_p_value,
     spread_among_siblings,
+    tail_of_one_influence,
     upper_tail,
 )
 from opamc_cli.decision.witnesses.evidence import (
@@ -245,7 +246,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     }
     p_values, p_alone, shifts, common = {}, {}, {}, {}
     for axis in axes:
-        heard, times = together, 1
+        heard = together
         step, own = together.lowest_step(axis), witnesses.get(axis, {})
         asked = sum(math.isfinite(p) for p in own.values())
         ranked = [own[name] for name in ranking.get(axis, {})]
@@ -253,14 +254,14 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         for name, kind in evidence.get(axis, {}).items():
             sure = asked * own[name]
             if not kind.ranks and sure < min(p_values[axis], policy.false_alarm_rate):
-                heard, times, p_values[axis] = alone_by_witness[name], asked, sure
+                heard, p_values[axis] = alone_by_witness[name], sure
         shifts[axis] = heard.shifts.get(axis, Shift(math.nan, math.nan, BETWEEN_SESSIONS))
         # who speaks for itself has to be odd among all siblings, not only among most
         others = common_log_ratio(heard.shifts, axis, largest=heard is not together)
         common[axis] = others if axis in evidence else 0.0
         p_alone[axis] = p_values[axis]
         if common[axis]:
-            p_alone[axis] = max(p_values[axis], times * heard.p_value(axis, common[axis]))
+            p_alone[axis] = max(p_values[axis], heard.p_value(axis, common[axis]))
     witnesses |= {axis: {PATTERNS: p_values[axis]} for axis in axes if axis not in evidence}
     adjusted = dict(zip(axes, holm([p_values[axis] for axis in axes]).tolist(), strict=True))
     alone = dict(zip(axes, holm([p_alone[axis] for axis in axes]).tolist(), strict=True))
@@ -324,9 +325,7 @@ class _Comparison:
         self._distances = {axis: one for axis, one in distances.items() if one.known}
         self._pooled: dict[int, FloatArray] = {}
         self._by_cycles: dict[int, float] = {}
-        # of several witnesses the first one's: those that rank differ little
-        self._expected = {axis: next(iter(one.values())).expected for axis, one in evidence.items()}
-        self.shifts = _session_shifts(self._distances, self._expected)
+        self.shifts = _session_shifts(self._distances)
         self.shifts |= {axis: one_session_shift(lone, axis) for axis in lone}
 
     def p_value(self, axis: int, taken_off: float = 0.0) -> float:
@@ -334,9 +333,16 @@ class _Comparison:
         if axis not in self.shifts:
             return math.nan
         shift = self.shifts[axis]
-        tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
         cells = self._cells[axis]
+        ranks = all(kind.ranks for kind in self._evidence.get(axis, {}).values())
+        if ranks:
+            tail = upper_tail(shift.log_ratio - taken_off, shift.spread)
+        else:
+            dof = len(self._distances[axis].own) - 1
+            tail = tail_of_one_influence(shift.log_ratio - taken_off, dof)
         if self._methods[axis] == "sessions":
+            if not ranks:
+                return tail
             one = self._distances[axis]
             # Of three sessions the odd one is half of what each other one is compared with: then
             # pairs place them better, who leave it out.
@@ -359,7 +365,7 @@ class _Comparison:
         values = self._pooled[axis].copy()
         values[0] *= math.exp(-taken_off)
         values = values[np.isfinite(values)]
-        relabelled = relabelled_p_value(values, n_baseline + n_target, self._expected[axis])
+        relabelled = relabelled_p_value(values, n_baseline + n_target)
         # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
         # observed one, the pairs' own tail may go below it, doubled for the second look.
         return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
@@ -461,7 +467,7 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     axis : int
         The joint in question.
     largest : bool
-        The largest of the siblings' shifts instead of their median.
+        The largest of the siblings' shifts instead of their median, as a log ratio.
 
     Returns
     -------
@@ -473,17 +479,16 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     others = [shift for key, shift in shifts.items() if key != axis]
     if axis not in shifts or len(others) < 2:
         return 0.0
+    if largest:
+        return max(0.0, *(shift.log_ratio for shift in others))
     # of two siblings the one that moved less: else one that fails would excuse the others
-    share = 1.0 if largest else 0.5
-    plain = float(np.quantile([shift.log_ratio for shift in others], share, method="lower"))
+    plain = float(np.quantile([shift.log_ratio for shift in others], 0.5, method="lower"))
     moved = [shift.log_ratio / shift.spread.scale for shift in others]
-    scaled = float(np.quantile(moved, share, method="lower"))
+    scaled = float(np.quantile(moved, 0.5, method="lower"))
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
-def _session_shifts(
-    distances: Mapping[int, SessionDistances], expected: Mapping[int, Spread]
-) -> dict[int, Shift]:
+def _session_shifts(distances: Mapping[int, SessionDistances]) -> dict[int, Shift]:
     variances = {
         axis: float(one.own.var(ddof=1)) if len(one.own) > 2 else math.nan
         for axis, one in distances.items()
@@ -497,7 +502,7 @@ def _session_shifts(
         siblings = [key for key in distances if key != axis]
         if len(one.own) > 2:
             others = [variances[key] for key in siblings]
-            unit = spread_among_siblings(variances[axis], others, len(one.own) - 1, expected[axis])
+            unit = spread_among_siblings(variances[axis], others, len(one.own) - 1)
         else:
             # Two sessions have the same divergence from each other: no spread can be had from
             # them. What the target's session did to the siblings stands in for it.

@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import digamma
+from scipy.stats import f as f_ratio
 from scipy.stats import t as student_t
 
 from opamc_cli.decision.significance.spread import (
@@ -14,6 +15,7 @@ from opamc_cli.decision.significance.spread import (
     moderated_spread,
     spliced_p_value,
     spread_among_siblings,
+    tail_of_one_influence,
     upper_tail,
 )
 
@@ -60,13 +62,6 @@ def test_the_tail_widens_with_fewer_degrees_of_freedom():
     assert upper_tail(0.0, Spread(1.0, 3.0)) == 0.5
 
 
-def test_what_is_expected_counts_for_one_value_where_the_sessions_say_little():
-    wide = spread_among_siblings(0.01, [], 2, Spread(1.2, 1.0))
-    usual = spread_among_siblings(0.01, [], 2)
-    assert wide.dof == usual.dof == 3
-    assert wide.scale / usual.scale == pytest.approx((1.2 / EXPECTED.scale) ** (1 / 3))
-
-
 def test_a_spread_among_siblings_is_the_mean_of_log_variances_by_their_freedom():
     """Its own, a tenth of what the siblings' median says, and what is usual elsewhere."""
 
@@ -101,3 +96,12 @@ def test_a_splice_shares_its_step_as_the_tail_does():
     assert spliced_p_value(reference, 0.5, spread, n_above=0) == pytest.approx(
         min(tails[0.5] / tails[1.5], 1) / 5
     )
+
+
+def test_the_tail_of_one_influence_is_that_of_its_squared_student_t():
+    for ratio, dof in ((0.3, 2), (9.0, 4), (400.0, 6)):
+        expected = 2 * student_t.sf(np.sqrt(ratio), dof)
+        assert tail_of_one_influence(np.log(ratio), dof) == pytest.approx(expected)
+    assert tail_of_one_influence(np.inf, 3) < 1e-60
+    # with more influences a large ratio is less probable, so that one is the safe side
+    assert f_ratio.sf(20.0, 2, 8) < tail_of_one_influence(np.log(20.0), 4)

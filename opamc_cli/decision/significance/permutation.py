@@ -6,12 +6,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.spread import (
-    EXPECTED,
-    Spread,
-    moderated_spread,
-    spliced_p_value,
-)
+from opamc_cli.decision.significance.spread import moderated_spread, spliced_p_value
 
 
 def relabellings(
@@ -51,9 +46,7 @@ def relabellings(
     return np.concatenate([observed[np.newaxis], others])
 
 
-def relabelled_p_value(
-    values: NDArray[np.float64], n_units: int, expected: Spread = EXPECTED
-) -> float:
+def relabelled_p_value(values: NDArray[np.float64], n_units: int) -> float:
     """P-value of the observed labelling among all of them.
 
     Parameters
@@ -63,8 +56,6 @@ def relabelled_p_value(
         the observed one first.
     n_units : int
         Number of units that were relabelled.
-    expected : Spread
-        Of the logarithms, where the labellings say little of it.
 
     Returns
     -------
@@ -84,6 +75,5 @@ def relabelled_p_value(
     if others.size < 2:
         return 1.0
     centre = float(others.mean())
-    dof = min(n_units - 2, others.size - 1)
-    spread = moderated_spread(float(others.var(ddof=1)), dof, expected)
+    spread = moderated_spread(float(others.var(ddof=1)), min(n_units - 2, others.size - 1))
     return spliced_p_value(others - centre, float(logs[0]) - centre, spread)

@@ -1,10 +1,11 @@
 """The baseline's own spread, from few sessions, and how unlikely a value beyond it is."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import digamma, stdtr
+from scipy.special import digamma, fdtrc, stdtr
 
 FloatArray = NDArray[np.float64]
 
@@ -74,9 +75,7 @@ SIBLING_SHARE = 0.1
 """Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread."""
 
 
-def spread_among_siblings(
-    variance: float, siblings: ArrayLike, dof: float, expected: Spread = EXPECTED
-) -> Spread:
+def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
     """Spread of one joint's healthy sessions, from its own and its siblings'.
 
     Parameters
@@ -87,18 +86,16 @@ def spread_among_siblings(
         Those of the other joints; NaN where unknown.
     dof : float
         Degrees of freedom of each, positive.
-    expected : Spread
-        Where nothing else is known.
 
     Returns
     -------
     Spread
         Of the joint's own, the siblings' median, which one odd sibling cannot move, and
-        `expected`.
+        `EXPECTED`.
     """
     values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
-    prior = expected
+    prior = EXPECTED
     if values.size:
         shared = SIBLING_SHARE * dof * values.size
         median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
@@ -124,6 +121,25 @@ def upper_tail(distance: float, spread: Spread) -> float:
         One-sided Student t probability, 0..1.
     """
     return float(stdtr(spread.dof, -distance / spread.scale))
+
+
+def tail_of_one_influence(log_ratio: float, dof: int) -> float:
+    """Probability of a squared distance where one influence makes all that sessions differ by.
+
+    Parameters
+    ----------
+    log_ratio : float
+        Log of the distance over that of a healthy session.
+    dof : int
+        Healthy sessions less one.
+
+    Returns
+    -------
+    float
+        That of a Student t whose square is the ratio. More influences make a large ratio less
+        probable still.
+    """
+    return float(fdtrc(1, dof, math.exp(min(log_ratio, 100.0))))
 
 
 def spliced_p_value(

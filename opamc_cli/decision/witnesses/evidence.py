@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
-from opamc_cli.decision.significance.spread import Spread
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -26,10 +25,6 @@ class Evidence(Protocol):
     @property
     def ranks(self) -> bool:
         """Whether sessions are ranked by it; if not, it counts where it is sure by itself."""
-
-    @property
-    def expected(self) -> Spread:
-        """Spread of healthy sessions' log distances where the sessions say little of it."""
 
     @property
     def cells(self) -> Sequence[object]:

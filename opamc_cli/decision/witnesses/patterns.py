@@ -13,7 +13,6 @@ from opamc_cli.decision.divergence.jensen_shannon import (
     effect_size,
     jensen_shannon,
 )
-from opamc_cli.decision.significance.spread import EXPECTED, Spread
 from opamc_cli.decision.witnesses.evidence import log_mean
 
 FloatArray = NDArray[np.float64]
@@ -178,7 +177,6 @@ class PatternEvidence:
 
     cells: Sequence[Cell]
     ranks: ClassVar[bool] = True
-    expected: ClassVar[Spread] = EXPECTED
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
         """Return the log of the mean divergence, each in units of the rest's own.

@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.deviation import (
     PRIOR_DOF,
     change_between,
@@ -24,14 +23,6 @@ IntArray = NDArray[np.int64]
 
 LEAST_SHARE = 1e-3
 """Of the current: sessions that agree to a thousandth of its root mean square agree."""
-
-TWO_INFLUENCES = Spread(math.pi / math.sqrt(6), 1.0)
-"""Of healthy sessions' log distances: that of the logarithm of a chi square of two degrees.
-
-One or two influences, such as temperature and load, move the whole course. Medians over healthy
-joints: 1.29 (27 virtual robots), 1.34 (162 of the nights' joints), 0.61 (a ball screw, nine
-sessions), where patterns have 0.12, 0.39, 0.17 and the spectrum 0.06, 0.22, 0.06.
-"""
 
 
 @dataclass(frozen=True)
@@ -133,7 +124,6 @@ class ProfileEvidence:
     cells: Sequence[ProfileCell]
     n_baseline: int
     ranks: ClassVar[bool] = False
-    expected: ClassVar[Spread] = TWO_INFLUENCES
 
     def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
         """Return the log of the squared deviation, the mean of that of size and of shape."""

@@ -8,7 +8,6 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.spread import EXPECTED, Spread
 from opamc_cli.decision.witnesses.deviation import (
     change_between,
     clearest_of,
@@ -67,7 +66,6 @@ class SpectrumEvidence:
     cells: Sequence[SpectrumCell]
     n_baseline: int
     ranks: ClassVar[bool] = True
-    expected: ClassVar[Spread] = EXPECTED
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
         """Return the log of the squared deviation, averaged over frames, bins and motions."""
