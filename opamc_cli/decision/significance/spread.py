@@ -71,8 +71,12 @@ def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> S
     return Spread(float(np.exp(log_variance / 2)), total)
 
 
-SIBLING_SHARE = 0.1
-"""Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread."""
+SIBLING_SHARE = 0.15
+"""Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread.
+
+Of 2160 healthy joints of virtual fleets 0.69 % have p below 0.01 with 0.1, 0.93 % with 0.15; of
+half of them 1.48 % with 0.25.
+"""
 
 
 def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
