@@ -22,21 +22,14 @@ SILENT_DAYS = 3
 
 @dataclass(frozen=True)
 class Morning:
-    """What a start has to say.
-
-    Attributes
-    ----------
-    lines
-        Sentences for people: robots that need a look first, three lines each.
-    values
-        The same for programs.
-    exit_code
-        The largest concern of the cell.
-    """
+    """What a start has to say."""
 
     lines: tuple[str, ...]
+    """Sentences for people: robots that need a look first, three lines each."""
     values: dict[str, Any]
+    """The same for programs."""
     exit_code: ExitCode
+    """The largest concern of the cell."""
 
 
 def silent(history: History, today: date) -> Iterator[Event]:

@@ -23,57 +23,37 @@ MOST_ATTEMPTS = 3
 
 @dataclass(frozen=True)
 class Comparison:
-    """The recordings of one program in one night, and those that they are held against.
-
-    Attributes
-    ----------
-    program, condition
-        What they have in common.
-    targets
-        Recordings of the night.
-    baseline
-        Recordings of the healthy state; empty while it is being recorded.
-    baseline_name
-        Name of the baseline; the series of nights begins anew where it changes.
-    missing
-        Why there is nothing to compare with; empty if there is.
-    """
+    """The recordings of one program in one night, and those that they are held against."""
 
     program: str
     condition: str
+    """With `program`: what they have in common."""
     targets: tuple[Recording, ...]
+    """Recordings of the night."""
     baseline: tuple[Recording, ...] = ()
+    """Recordings of the healthy state; empty while it is being recorded."""
     baseline_name: str = ""
+    """Name of the baseline; the series of nights begins anew where it changes."""
     missing: str = ""
+    """Why there is nothing to compare with; empty if there is."""
 
 
 @dataclass(frozen=True)
 class PlannedNight:
-    """One robot's night.
-
-    Attributes
-    ----------
-    robot, night
-        Which.
-    comparisons
-        One for each program.
-    broken
-        Recordings that cannot be used.
-    notes
-        What is worth knowing besides.
-    key
-        Hash of everything that the result depends on.
-    why
-        Why it is to be done; empty if it is done.
-    """
+    """One robot's night."""
 
     robot: str
     night: str
     comparisons: tuple[Comparison, ...]
+    """One for each program."""
     broken: tuple[Recording, ...]
+    """Recordings that cannot be used."""
     notes: tuple[str, ...]
+    """What is worth knowing besides."""
     key: str
+    """Hash of everything that the result depends on."""
     why: str
+    """Why it is to be done; empty if it is done."""
 
     @property
     def in_baseline(self) -> bool:
@@ -85,30 +65,20 @@ class PlannedNight:
 
 @dataclass(frozen=True)
 class Situation:
-    """What is known of a robot beside its recordings.
-
-    Attributes
-    ----------
-    baseline
-        How the cell tells the healthy state.
-    fixed
-        Recordings that `baseline.runs` names.
-    begun
-        Nights from which a baseline was declared to begin anew, ascending.
-    pinned
-        Nights of baselines that were complete before, by program, condition and since.
-    recorded
-        What became of the robot's nights.
-    config_hash
-        Of the options of its diagnosis.
-    """
+    """What is known of a robot beside its recordings."""
 
     baseline: BaselineConfig
+    """How the cell tells the healthy state."""
     fixed: Sequence[Recording]
+    """Recordings that `baseline.runs` names."""
     begun: Sequence[str]
+    """Nights from which a baseline was declared to begin anew, ascending."""
     pinned: Mapping[tuple[str, str, str], Sequence[str]]
+    """Nights of baselines that were complete before, by program, condition and since."""
     recorded: Mapping[str, NightRow]
+    """What became of the robot's nights."""
     config_hash: str
+    """Of the options of its diagnosis."""
 
 
 @dataclass(frozen=True)

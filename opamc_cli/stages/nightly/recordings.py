@@ -17,24 +17,16 @@ REMEMBER_EVERY = 50
 
 @dataclass(frozen=True)
 class Recording:
-    """One recording of a robot.
-
-    Attributes
-    ----------
-    log
-        Where it lies.
-    night
-        YYYY-MM-DD that it counts to; empty if nothing tells.
-    sha256
-        Of its bytes.
-    facts
-        What it says of itself.
-    """
+    """One recording of a robot."""
 
     log: LogFile
+    """Where it lies."""
     night: str
+    """YYYY-MM-DD that it counts to; empty if nothing tells."""
     sha256: str
+    """Of its bytes."""
     facts: Facts
+    """What it says of itself."""
 
     @cached_property
     def name(self) -> str:
@@ -56,18 +48,12 @@ class Recording:
 
 @dataclass(frozen=True)
 class CellRecordings:
-    """All recordings of a cell.
-
-    Attributes
-    ----------
-    by_robot
-        Recordings of each robot, by path; robots without any have an empty list.
-    baseline_by_robot
-        Those that `baseline.runs` names.
-    """
+    """All recordings of a cell."""
 
     by_robot: dict[str, list[Recording]]
+    """Recordings of each robot, by path; robots without any have an empty list."""
     baseline_by_robot: dict[str, list[Recording]]
+    """Those that `baseline.runs` names."""
 
 
 def find_recordings(

@@ -49,19 +49,13 @@ WORK, KEPT, COPIES = ".work", ".kept", ".copies"
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which nights are asked for; None: all.
-
-    Attributes
-    ----------
-    night, since
-        YYYY-MM-DD.
-    robots
-        Names.
-    """
+    """Which nights are asked for; None: all."""
 
     night: str | None = None
     since: str | None = None
+    """YYYY-MM-DD, as `night`."""
     robots: tuple[str, ...] | None = None
+    """Names."""
 
     def has(self, night: str) -> bool:
         """Whether a night is asked for."""
@@ -70,33 +64,22 @@ class Wanted:
 
 @dataclass
 class CellOutcome:
-    """What a start did.
-
-    Attributes
-    ----------
-    planned
-        Every night that was looked at, with why it was to be done.
-    done
-        Robot and night of those that were judged or taken into a baseline.
-    failed
-        Robot, night and why; of nights that were judged in part as well.
-    absent
-        Sentences that say of what was asked for that there is no recording of it.
-    ended
-        Why the start came to an end before all was done; empty if it did not.
-    robots
-        Those that were looked at.
-    summary
-        How all robots of the cell stand now.
-    """
+    """What a start did."""
 
     planned: list[PlannedNight] = field(default_factory=list)
+    """Every night that was looked at, with why it was to be done."""
     done: list[tuple[str, str]] = field(default_factory=list)
+    """Robot and night of those that were judged or taken into a baseline."""
     failed: list[tuple[str, str, str]] = field(default_factory=list)
+    """Robot, night and why; of nights that were judged in part as well."""
     absent: list[str] = field(default_factory=list)
+    """Sentences that say of what was asked for that there is no recording of it."""
     ended: str = ""
+    """Why the start came to an end before all was done; empty if it did not."""
     robots: tuple[str, ...] = ()
+    """Those that were looked at."""
     summary: Summary = field(default_factory=lambda: Summary(()))
+    """How all robots of the cell stand now."""
 
 
 def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> CellOutcome:

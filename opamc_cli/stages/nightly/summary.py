@@ -23,29 +23,20 @@ SEVERITY = (
 
 @dataclass(frozen=True)
 class JointSummary:
-    """One joint of a robot in one program, as of its last night.
-
-    Attributes
-    ----------
-    state
-        Of its last night.
-    night
-        That night.
-    report
-        Where its report lies, below `out`; empty if it was pruned.
-    alarm
-        The alarm that stands, or None.
-    health_index
-        Of its last night.
-    """
+    """One joint of a robot in one program, as of its last night."""
 
     axis: int
     program: str
     state: str
+    """Of its last night."""
     night: str
+    """That night."""
     report: str
+    """Where its report lies, below `out`; empty if it was pruned."""
     health_index: float | None
+    """Of its last night."""
     alarm: AlarmRow | None
+    """The alarm that stands, or None."""
 
     @property
     def shown(self) -> str:
@@ -69,19 +60,13 @@ class JointSummary:
 
 @dataclass(frozen=True)
 class RobotSummary:
-    """One robot.
-
-    Attributes
-    ----------
-    joints
-        Its joints.
-    last
-        What became of its last night; None if it has none.
-    """
+    """One robot."""
 
     name: str
     joints: tuple[JointSummary, ...]
+    """Its joints."""
     last: NightRow | None
+    """What became of its last night; None if it has none."""
 
     @property
     def several_programs(self) -> bool:

@@ -43,37 +43,24 @@ class ProgramJob:
 
 @dataclass(frozen=True)
 class NightJob:
-    """What a worker is handed.
-
-    Attributes
-    ----------
-    robot, night
-        Which.
-    programs
-        What is compared.
-    config
-        Options of the diagnosis.
-    axes
-        Joints that are watched; None: all.
-    kept
-        Folder of what is kept of baselines; None where the worker cannot reach it.
-    copies
-        Folder for copies of recordings that lie in an object store.
-    scratch
-        Folder for what is thrown away.
-    version
-        Of the program that planned the night.
-    """
+    """What a worker is handed."""
 
     robot: str
     night: str
     programs: tuple[ProgramJob, ...]
+    """What is compared."""
     config: Config
+    """Options of the diagnosis."""
     axes: tuple[int, ...] | None
+    """Joints that are watched; None: all."""
     kept: Path | None
+    """Folder of what is kept of baselines; None where the worker cannot reach it."""
     copies: Path
+    """Folder for copies of recordings that lie in an object store."""
     scratch: Path
+    """Folder for what is thrown away."""
     version: str = __version__
+    """Of the program that planned the night."""
 
 
 @dataclass(frozen=True)
@@ -95,27 +82,18 @@ class AxisResult:
 
 @dataclass(frozen=True)
 class ProgramResult:
-    """What became of one program's comparison.
-
-    Attributes
-    ----------
-    program
-        Its name.
-    axes
-        Joints; empty where the comparison failed.
-    files
-        Content of verdict.json and report.html.
-    failures
-        One sentence for each recording, or the whole comparison, that failed.
-    notes
-        What is worth knowing.
-    """
+    """What became of one program's comparison."""
 
     program: str
+    """Its name."""
     axes: tuple[AxisResult, ...] = ()
+    """Joints; empty where the comparison failed."""
     files: Mapping[str, bytes] = field(default_factory=dict)
+    """Content of verdict.json and report.html."""
     failures: tuple[str, ...] = ()
+    """One sentence for each recording, or the whole comparison, that failed."""
     notes: tuple[str, ...] = ()
+    """What is worth knowing."""
 
     @property
     def rank(self) -> tuple[int, str]:

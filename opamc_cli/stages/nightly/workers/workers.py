@@ -32,18 +32,12 @@ DEATHS = 2
 
 @dataclass(frozen=True)
 class Broken:
-    """Why a job has no result.
-
-    Attributes
-    ----------
-    kind
-        time, memory, died, refused (an error with an exit code of its own) or bug.
-    text
-        One sentence.
-    """
+    """Why a job has no result."""
 
     kind: Literal["time", "memory", "died", "refused", "bug"]
+    """time, memory, died, refused (an error with an exit code of its own) or bug."""
     text: str
+    """One sentence."""
 
 
 @dataclass
