@@ -60,20 +60,7 @@ class Schedule:
 def schedule(
     program: Program, top_velocity_rad_s: dict[int, float], rng: np.random.Generator
 ) -> Schedule:
-    """Lay a program out in time.
-
-    Parameters
-    ----------
-    program : Program
-    top_velocity_rad_s : dict
-        Joint velocity at full speed by axis.
-    rng : numpy.random.Generator
-        For the dwell jitter.
-
-    Returns
-    -------
-    Schedule
-    """
+    """Lay a program out in time, from the axes' speeds at full override; `rng` draws the dwells."""
     speed = program.speed_percent / 100.0
     acceleration = program.acceleration_rad_s2 * speed**program.acceleration_exponent
     jerk = program.jerk_rad_s3 * speed ** (2 * program.acceleration_exponent - 1)

@@ -39,20 +39,7 @@ def phase_currents(
 
 
 def quantise(values: NDArray[np.float64], full_scale: float, bits: int) -> NDArray[np.float32]:
-    """Round to the steps of a converter and clip at its range.
-
-    Parameters
-    ----------
-    values : ndarray
-    full_scale : float
-        Range is -full_scale..full_scale.
-    bits : int
-        Number of steps is 2**bits.
-
-    Returns
-    -------
-    ndarray of float32, same shape
-    """
+    """Round to 2**bits steps from -full_scale to full_scale, and clip at that range."""
     step = 2.0 * full_scale / 2.0**bits
     top = 2 ** (bits - 1)
     return (np.clip(np.rint(values / step), -top, top - 1) * step).astype(np.float32)

@@ -27,22 +27,10 @@ class AxisSession:
 
 
 def draw_session(robot: Robot, axis: int, seed: int, session: int) -> AxisSession:
-    """Draw the small differences of one session for one axis.
+    """Draw the small differences of one session for one axis, counted from 1.
 
     The sensors' gain and offset belong to the robot (they depend on seed and axis) and wander a
     little from session to session; temperature and friction are the session's own.
-
-    Parameters
-    ----------
-    robot : Robot
-    axis : int
-        Counted from 1.
-    seed, session : int
-        Not negative.
-
-    Returns
-    -------
-    AxisSession
     """
     spread, sensor = robot.spread, robot.sensor
     fixed = stream(seed, 0, axis, 0)

@@ -30,18 +30,7 @@ def plan_move(
     acceleration_rad_s2: float,
     jerk_rad_s3: float,
 ) -> Move:
-    """Plan the fastest symmetric move within velocity, acceleration and jerk limits.
-
-    Parameters
-    ----------
-    distance_rad : float
-        Signed distance.
-    velocity_rad_s, acceleration_rad_s2, jerk_rad_s3 : float
-        Limits, positive.
-
-    Returns
-    -------
-    Move
+    """Plan the fastest symmetric move of a signed distance within limits, all positive.
 
     Raises
     ------
@@ -76,17 +65,9 @@ def plan_move(
 def evaluate_move(
     move: Move, time_s: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Distance, velocity and acceleration of a move.
+    """Distance, velocity and acceleration at times since a move's start, each of shape (n,).
 
-    Parameters
-    ----------
-    move : Move
-    time_s : ndarray, shape (n,)
-        Times since the start of the move; held at rest before and after it.
-
-    Returns
-    -------
-    position_rad, velocity_rad_s, acceleration_rad_s2 : ndarray, shape (n,)
+    Before and after the move it is at rest.
     """
     sign = 1.0 if move.distance_rad >= 0 else -1.0
     jerks = sign * move.jerk_rad_s3 * np.array([1.0, 0.0, -1.0, 0.0, -1.0, 0.0, 1.0])

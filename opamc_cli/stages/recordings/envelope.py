@@ -50,28 +50,14 @@ OFFSET_SPANS = 64
 def current_offset(
     run: Run, axis: int, spans: Sequence[tuple[int, int]], wanted: EnvelopeKind = "auto"
 ) -> complex:
-    """Estimate what the current sensors add to the current vector of an axis.
+    """Estimate what the current sensors add to the current vector of an axis, A.
 
-    The vector turns, its sensors' offset stands still: it is the mean over many turns. Left in,
-    it modulates the envelope once per electrical period, by more than early damage does, and it
-    drifts from session to session.
+    The vector turns, its sensors' offset stands still: it is the mean over many turns, in `spans`
+    of samples (half-open) in which the axis moves. Left in, it modulates the envelope once per
+    electrical period, by more than early damage does, and it drifts from session to session.
 
-    Parameters
-    ----------
-    run
-        Open run.
-    axis
-        Counted from 1.
-    spans
-        Half-open intervals of samples in which the axis moves.
-    wanted
-        Which current, see `PatternsConfig.envelope`.
-
-    Returns
-    -------
-    complex
-        In ampere; 0 for a reported current, whose mean is torque, and where the vector turns too
-        little, see `signal.offset.mean_over_turns`.
+    It is 0 for a reported current, whose mean is torque, and where the vector turns too little,
+    see `signal.offset.mean_over_turns`.
     """
     if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
         return 0j
@@ -106,10 +92,8 @@ def read_course(
 
     Parameters
     ----------
-    run
-        Open run.
-    axis
-        Counted from 1.
+    run, axis
+        Open run, and axis counted from 1.
     start, stop
         Half-open interval of samples; what lies outside the run is left out.
     wanted
@@ -138,12 +122,7 @@ def read_course(
 def read_current(
     run: Run, axis: int, start: int, stop: int, wanted: EnvelopeKind = "auto"
 ) -> npt.NDArray[Any]:
-    """Read the current vector of an axis, or its signed reported current.
-
-    Parameters
-    ----------
-    run, axis, start, stop, wanted
-        As for `read_envelope`.
+    """Read the current vector of an axis, or its signed reported current; see `read_course`.
 
     Returns
     -------

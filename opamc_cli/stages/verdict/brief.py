@@ -23,17 +23,6 @@ def brief(
 ) -> dict[str, Any] | None:
     """Return what a maintainer needs of an unhealthy joint; None for any other.
 
-    Parameters
-    ----------
-    judgement
-        The decision.
-    bundle
-        What it was made from.
-    cause
-        The cause found for the change, if any.
-    unit
-        Of the current, or of the torque that stands for it.
-
     Returns
     -------
     dict or None

@@ -54,10 +54,8 @@ def reasons(
 
     Parameters
     ----------
-    judgement
-        The decision.
-    bundle
-        What it was made from.
+    judgement, bundle
+        The decision, and what it was made from.
     motions
         Entries `motions` of the verdict.
     sources

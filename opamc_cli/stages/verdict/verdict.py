@@ -61,15 +61,7 @@ class Decided:
 
 
 def decide(sides: Sides, config: Config) -> Decided:
-    """Decide about every joint.
-
-    Parameters
-    ----------
-    sides
-        Tables of baseline and target.
-    config
-        Section `score` is used.
-    """
+    """Decide about every joint; of the options those of section `score` are used."""
     known = bundles(sides)
     return Decided(sides, known, judge(known, policy_of(config.score)))
 

@@ -11,16 +11,9 @@ from opamc_cli.storage.files.atomic import ensure_directory
 
 
 def replace_folder(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Put a folder with these files in the place of the one that may be there.
+    """Put a folder with these files, by their paths in it, in the place of one that may be there.
 
     Between two renames there is none: whoever finds none takes the work for not done.
-
-    Parameters
-    ----------
-    folder
-        Where it is seen.
-    files
-        Content by path below the folder.
 
     Raises
     ------

@@ -31,16 +31,7 @@ class Document(BaseModel):
 def parsed(model: type[Model], raw: bytes, place: str, advice: str) -> Model:
     """Return JSON as a document.
 
-    Parameters
-    ----------
-    model
-        What it has to be.
-    raw
-        The JSON.
-    place
-        Where it stands, as the sentence's beginning.
-    advice
-        What to do, as its end.
+    What is wrong is said in a sentence that begins with `place` and ends with `advice`.
 
     Raises
     ------
@@ -74,24 +65,15 @@ def shown_key(key: str) -> str:
 
 
 def read_json(path: Path, schema: str, advice: str) -> dict[str, Any]:
-    """Read a JSON file and check it by one of the schemas that come with the package.
+    """Read a JSON file and check it by a schema that comes with the package, such as "verdict".
 
     Fields that are missing are passed over, as an earlier version may not have written them; but
     every axis has its number.
 
-    Parameters
-    ----------
-    path
-        The file.
-    schema
-        Name of the schema, such as "verdict".
-    advice
-        What to do if it is something else.
-
     Raises
     ------
     InputError
-        If it is no regular file, no JSON, or not by the schema.
+        If it is no regular file, no JSON, or not by the schema; with advice what to do.
     """
     try:
         values = from_json(read_text(path, InputError, MOST_BYTES), allow_inf_nan=False)

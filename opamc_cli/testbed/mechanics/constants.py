@@ -23,23 +23,8 @@ def axis_constants(
 ) -> dict[str, float]:
     """Return the constants of one axis in one session, by the names of `AxisConstants`.
 
-    Parameters
-    ----------
-    joint : Joint
-    sensor : Sensor
-    session : AxisSession
-    damage : Damage
-    payload_kg : float
-    start_rad : float
-        Joint angle at which the axis rests at the start.
-    sampling_rate_hz : float
-    controls_per_sample, steps_per_control : int
-        Control periods per sample, integration steps per control period.
-
-    Returns
-    -------
-    dict
-        Also `payload_inertia_per_kg` and `payload_gravity_per_kg`, for a change of payload.
+    The joint rests at `start_rad` at the start. Also `payload_inertia_per_kg` and
+    `payload_gravity_per_kg`, for a change of payload.
     """
     control_hz = sampling_rate_hz * controls_per_sample
     constants = _physical(joint, session, damage, payload_kg, start_rad)

@@ -46,14 +46,7 @@ def group_patterns(
 ) -> dict[Key, PatternRows]:
     """Group the identified rows of a pattern table by axis, motion, order and delay.
 
-    Parameters
-    ----------
-    table
-        Table of stage `patterns`.
-    name
-        How an error calls it.
-    session_of_run
-        Session by run; None: each run is one.
+    An error calls the table `name`; without sessions each run is one.
 
     Raises
     ------

@@ -77,16 +77,7 @@ class _Probe:
 
 
 def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) -> AxisSegments:
-    """Find the motions of an axis from its phase currents.
-
-    Parameters
-    ----------
-    run
-        Open run.
-    channels
-        Columns of the axis, with at least one phase.
-    config
-        Section `segment`.
+    """Find the motions of an axis from its phase currents, of which it has one at least.
 
     Raises
     ------

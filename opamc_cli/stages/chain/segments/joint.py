@@ -30,15 +30,6 @@ def joint_segments(
 ) -> AxisSegments:
     """Find the motions of an axis from its velocity, or from its position if there is none.
 
-    Parameters
-    ----------
-    run
-        Open run.
-    channels
-        Columns of the axis, with a reported current.
-    config, joint
-        Sections `segment` and `joint`.
-
     Raises
     ------
     InputError

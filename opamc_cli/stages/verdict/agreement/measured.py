@@ -69,15 +69,6 @@ def measure(
 ) -> list[Measured]:
     """Measure every axis of every run, from a few of its motions.
 
-    Parameters
-    ----------
-    sources
-        The runs.
-    segments
-        Their motions.
-    kept
-        Where results of the same work may lie.
-
     Raises
     ------
     InputError
