@@ -4,10 +4,10 @@ import ctypes
 import os
 import signal
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from time import perf_counter
@@ -80,13 +80,12 @@ def map_items(
     workers = min(jobs, len(items))
     if workers <= 1:
         return _gather([_Immediate(function, item) for item in items], watch)
-    saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent, (os.getpid(),))
     try:
-        with held_back():
-            calls = [pool.submit(function, item) for item in items]
-        return _gather(calls, watch)
+        with one_thread_each():
+            with held_back():
+                calls = [pool.submit(function, item) for item in items]
+            return _gather(calls, watch)
     except BrokenProcessPool as error:
         msg = "a worker process was killed, most often for want of memory; use fewer --jobs"
         raise UsageError(msg) from error
@@ -96,6 +95,16 @@ def map_items(
         raise
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Have the processes that are started meanwhile compute on one thread."""
+    saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
+    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
+    try:
+        yield
+    finally:
         for name, value in saved.items():
             if value is None:
                 os.environ.pop(name, None)
@@ -128,13 +137,17 @@ def _as_it_pays(
     return _gather(done, watch)
 
 
-def _end_with_parent(parent: int) -> None:
-    """Have this worker end when its parent does, however that ends."""
+def die_with(parent: int) -> None:
+    """Have the kernel, where it can, end this process when its parent ends, however that ends."""
     with suppress(AttributeError, OSError):
-        # at once, where the kernel can; below as soon as the interpreter gets to it
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
     if os.getppid() != parent:
         os._exit(1)
+
+
+def _end_with_parent(parent: int) -> None:
+    """Have this worker end when its parent does: at once, or when the interpreter gets to it."""
+    die_with(parent)
     threading.Thread(target=_watch_parent, daemon=True).start()
 
 

@@ -5,14 +5,13 @@ that is why this is here. Workers live for many nights, since starting one takes
 a short night; one that failed is replaced.
 """
 
-import ctypes
 import importlib
 import os
 import resource
 import signal
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, get_context
 from multiprocessing.connection import Connection
@@ -21,7 +20,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from opamc_cli.errors import OpamcError
-from opamc_cli.stages.processes.parallel import THREAD_VARIABLES
+from opamc_cli.stages.processes.parallel import die_with, one_thread_each
 
 Job = TypeVar("Job")
 
@@ -137,9 +136,7 @@ def run_all(
     pool: _Pool[Job] = _Pool(function, seconds, memory_gb)
     waiting = list(reversed(jobs))
     deaths: dict[int, int] = {}
-    saved = {name: os.environ.get(name) for name in THREAD_VARIABLES}
-    os.environ.update(dict.fromkeys(THREAD_VARIABLES, "1"))
-    try:
+    with one_thread_each(), closing(pool):
         for _ in range(workers):
             pool.hand(pool.start(), waiting.pop())
         running = workers
@@ -160,13 +157,6 @@ def run_all(
                     pool.hand(pool.start() if fresh else worker, waiting.pop())
                 else:
                     running -= 1
-    finally:
-        pool.close()
-        for name, value in saved.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
 
 
 def called(name: str) -> Callable[[Any], Any]:
@@ -178,7 +168,7 @@ def called(name: str) -> Callable[[Any], Any]:
 
 def _serve(pipe: Connection, name: str, memory: int | None, parent: int) -> None:
     """Answer jobs until the parent is gone."""
-    _die_with(parent)
+    die_with(parent)
     # an interrupt from the keyboard reaches the whole group: the parent answers it
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     function = called(name)
@@ -211,12 +201,3 @@ def _limit_memory(memory: int) -> None:
     now = int(status.read_text().split()[0]) * resource.getpagesize() if status.exists() else 0
     with suppress(ValueError, OSError):
         resource.setrlimit(resource.RLIMIT_AS, (now + memory, resource.RLIM_INFINITY))
-
-
-def _die_with(parent: int) -> None:
-    """Have the kernel end this process when its parent ends, however that ends."""
-    pr_set_pdeathsig = 1
-    with suppress(OSError, AttributeError):
-        ctypes.CDLL(None).prctl(pr_set_pdeathsig, signal.SIGKILL)
-    if os.getppid() != parent:
-        os._exit(1)
