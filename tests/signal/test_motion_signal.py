@@ -7,6 +7,7 @@ import ssqueezepy
 from opamc_cli.signal.motion.motion_signal import (
     MotionBand,
     MotionStream,
+    _smooth_at_least,
     join_frames,
     motion_frames,
 )
@@ -14,6 +15,12 @@ from opamc_cli.signal.transform.wavelet import FilterBank, Morse, scale_frequenc
 
 FS_HZ = 2048.0
 STEP = 16
+
+
+def test_a_block_has_the_least_smooth_length_that_holds_it():
+    smooth = sorted({2**k for k in range(12)} | {3 * 2**k for k in range(11)})
+    for n in range(1, 1500):
+        assert _smooth_at_least(n) == next(length for length in smooth if length >= n)
 
 
 def moving_carrier(n, seed=0):

@@ -38,6 +38,12 @@ def test_a_clipped_carrier_is_told_from_a_quantised_one():
     assert clipped_share(np.array([1.0])) == 0
 
 
+def test_a_limit_is_reached_more_than_five_times_as_often_as_the_value_inside():
+    inside = np.repeat([1.0, 2.0, 3.0, 4.0], 10)
+    assert clipped_share(np.append(inside, np.full(50, 5.0))) == 0
+    assert clipped_share(np.append(inside, np.full(51, 5.0))) == pytest.approx(51 / 91)
+
+
 def test_constants():
     assert is_constant(np.full(10, 2.0))
     assert is_constant(np.array([np.nan, 1.0, np.nan]))

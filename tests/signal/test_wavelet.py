@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
+from opamc_cli.config.models import SegmentConfig
 from opamc_cli.signal.transform.wavelet import CUTOFF, FilterBank, Morse, scale_frequencies
 
 WAVELETS = [Morse(), Morse(3, 60), Morse(2, 10)]
+
+
+def test_the_wavelet_of_a_notebook_is_that_of_the_stages():
+    options = SegmentConfig()
+    assert Morse() == Morse(options.gamma, options.beta)
 
 
 @pytest.mark.parametrize("wavelet", WAVELETS)

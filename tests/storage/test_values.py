@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.storage.ingest.guess.values import are_phases, rate_from_speed, time_unit, wraps
+from opamc_cli.storage.ingest.guess.write import _fits
 
 T = np.arange(2000) / 250.0
 ANGLE = 1.3 * np.sin(1.7 * T) + 0.4 * np.sin(4.1 * T)
@@ -50,3 +51,15 @@ def test_phases_add_up_to_little():
     assert not are_phases(phases[0], phases[1], np.roll(phases[0], 500))
     assert not are_phases(phases[0], phases[1], 0.3 * phases[2])
     assert not are_phases(*np.zeros((3, 10)))
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "fits"),
+    [
+        *(("A", "a", True), ("mA", "current", True), ("rad", "a", False), ("V", "current", False)),
+        # a torque stands for a drive's current, never for a phase's
+        *(("Nm", "current", True), ("Nm", "b", False), ("deg", "position", True)),
+    ],
+)
+def test_a_declared_unit_is_believed_where_it_is_one_of_the_quantity(unit, kind, fits):
+    assert _fits(unit, kind) is fits
