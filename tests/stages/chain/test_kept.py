@@ -7,6 +7,8 @@ import pytest
 from opamc_cli.config import load_config
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.verdict.agreement import duplicates
+from opamc_cli.storage.runs import Run
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples" / "normal"
 RUNS = [SAMPLES / f"session-{i:03d}.parquet" for i in range(3)]
@@ -77,3 +79,22 @@ def test_a_damaged_result_is_computed_again(kept_and_plain):
 def test_a_job_that_cannot_be_told_from_others_is_refused(tmp_path):
     with pytest.raises(TypeError, match="cannot be told"):
         KeptResults(tmp_path).find(len, object())
+
+
+def test_a_baselines_runs_are_read_once_to_be_told_apart(tmp_path, monkeypatch):
+    copy = tmp_path / "copy.parquet"
+    copy.write_bytes(RUNS[0].read_bytes())
+    sides = [*RUNS[:2], copy], [RUNS[2]]
+    kept = KeptResults(tmp_path / "results")
+    first = duplicates.repeated(*sides, kept)
+    assert first == duplicates.repeated(*sides)
+    assert len(first[0]) == 1
+    opened: list[Path] = []
+
+    def opening(path: Path) -> Run:
+        opened.append(path)
+        return Run(path)
+
+    monkeypatch.setattr(duplicates, "Run", opening)
+    assert duplicates.repeated(*sides, kept) == first
+    assert opened == [RUNS[2]]
