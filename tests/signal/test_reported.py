@@ -5,6 +5,7 @@ import pytest
 
 from opamc_cli.signal.motion.reported import (
     find_joint_motions,
+    fluctuation_frequency,
     motor_frequency,
     velocity_from_position,
 )
@@ -73,3 +74,10 @@ def test_what_stands_for_the_carrier():
     assert motor_frequency(turn, 100, 5) == pytest.approx(500)
     assert motor_frequency(turn, 100, None) == pytest.approx(100)
     assert motor_frequency(turn, None, None) == pytest.approx(1)
+
+
+def test_fluctuations_of_too_few_samples_are_as_fast_as_can_be_told():
+    sine = np.sin(2 * np.pi * 5 * np.arange(FS_HZ) / FS_HZ)
+    assert fluctuation_frequency(sine, FS_HZ) == pytest.approx(5, rel=0.05)
+    for known in (np.zeros(0), sine[:9], np.where(np.arange(FS_HZ) < 9, sine, np.nan)):
+        assert fluctuation_frequency(known, FS_HZ) == FS_HZ / 4
