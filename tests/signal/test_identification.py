@@ -29,6 +29,14 @@ def test_similarity_of_variance_vectors_by_hand():
     assert similarity == pytest.approx([1.0, (4 * 1 + 0 * 2) / (4 * np.sqrt(5))])
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_period_shows_from_its_second_time_on(seed):
+    twice = CYCLE * 2
+    assert period(series(twice, seed=seed)) == 4
+    # of the second time one segment is lacking
+    assert period(series(twice[:-1], seed=seed)) < 4
+
+
 def test_similarity_of_too_short_a_series_is_empty():
     assert sliding_similarity(np.ones(4), np.ones(3)).size == 0
 
