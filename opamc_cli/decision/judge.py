@@ -61,18 +61,12 @@ PATTERNS = "patterns"
 
 @dataclass(frozen=True)
 class Bundle:
-    """All that is known of one axis.
-
-    Attributes
-    ----------
-    cells : sequence of Cell
-        Its pattern counts, which also say what sessions and cycles there are.
-    witnesses : mapping of str to Evidence
-        What else tells its sessions apart, by name.
-    """
+    """All that is known of one axis."""
 
     cells: Sequence[Cell]
+    """Its pattern counts, which also say what sessions and cycles there are."""
     witnesses: Mapping[str, Evidence] = field(default_factory=dict)
+    """What else tells its sessions apart, by name."""
 
     def evidence(self) -> dict[str, Evidence]:
         """Return all that the sessions can be told apart by: the patterns first."""
@@ -85,93 +79,62 @@ class Bundle:
 
 @dataclass(frozen=True)
 class Policy:
-    """What it takes to call a joint changed or at fault.
-
-    Attributes
-    ----------
-    false_alarm_rate : float
-        Largest accepted probability of any false alarm over all joints of one diagnosis.
-    minimum_effect : float
-        Least relative change of the pattern probabilities (Cohen's w), or of the size of the
-        envelope's fluctuations, that matters.
-    fault_effect : float
-        Relative change from which a change is called a fault.
-    permutations : int
-        Most relabellings evaluated.
-    seed : int
-        Seed of the draw if there are more.
-    """
+    """What it takes to call a joint changed or at fault."""
 
     false_alarm_rate: float = 0.01
+    """Largest accepted probability of any false alarm over all joints of one diagnosis."""
     minimum_effect: float = 0.1
+    """Least relative change of the pattern probabilities (Cohen's w), or of the size of the
+    envelope's fluctuations, that matters."""
     fault_effect: float = 0.3
+    """Relative change from which a change is called a fault."""
     permutations: int = 1000
+    """Most relabellings evaluated."""
     seed: int = 0
+    """Seed of the draw if there are more."""
 
 
 @dataclass(frozen=True)
 class Shift:
-    """How far the target lies from the baseline.
-
-    Attributes
-    ----------
-    log_ratio : float
-        Log of the target's distance over that of a healthy session.
-    unit : float
-        Standard deviation of a healthy session's log distance.
-    spread : Spread
-        Standard deviation of `log_ratio` if nothing has changed.
-    """
+    """How far the target lies from the baseline."""
 
     log_ratio: float
+    """Log of the target's distance over that of a healthy session."""
     unit: float
+    """Standard deviation of a healthy session's log distance."""
     spread: Spread
+    """Standard deviation of `log_ratio` if nothing has changed."""
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """The decision about one joint.
-
-    Attributes
-    ----------
-    state : str
-        healthy, changed, fault or insufficient-data.
-    health_index : float
-        0 at the baseline's mean, in units of the baseline's own spread; larger is worse.
-    p_value : float
-        Probability of at least such a shift if the joint is healthy; NaN without data.
-    p_adjusted : float
-        Corrected for the number of joints (Holm).
-    p_alone : float
-        As `p_adjusted`, after what the siblings have in common is taken off.
-    common_log_ratio : float
-        What was taken off, not negative.
-    distance_ratio : float
-        Target's distance from the baseline over that of a healthy session.
-    effects : mapping of str to float
-        Relative change beyond the baseline's own by each witness; NaN where it knows none.
-    witnesses : mapping of str to float
-        p-value by each witness alone, not corrected for the number of joints.
-    method : str
-        sessions, relabelled-sessions, one-session or none.
-    n_baseline_sessions, n_target_sessions, n_baseline_cycles, n_target_cycles : int
-        What it rests on.
-    """
+    """The decision about one joint."""
 
     state: State
+    """healthy, changed, fault or insufficient-data."""
     health_index: float
+    """0 at the baseline's mean, in units of the baseline's own spread; larger is worse."""
     p_value: float
+    """Probability of at least such a shift if the joint is healthy; NaN without data."""
     p_adjusted: float
+    """Corrected for the number of joints (Holm)."""
     p_alone: float
+    """As `p_adjusted`, after what the siblings have in common is taken off."""
     common_log_ratio: float
+    """What was taken off, not negative."""
     distance_ratio: float
+    """Target's distance from the baseline over that of a healthy session."""
     effects: Mapping[str, float]
+    """Relative change beyond the baseline's own by each witness; NaN where it knows none."""
     witnesses: Mapping[str, float]
+    """p-value by each witness alone, not corrected for the number of joints."""
     method: Method
+    """sessions, relabelled-sessions, one-session or none."""
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
     n_target_cycles: int
+    """With `n_baseline_sessions`, `n_target_sessions`, `n_baseline_cycles`: what it rests on."""
 
     @property
     def effect(self) -> float:

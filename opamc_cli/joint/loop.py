@@ -24,43 +24,31 @@ CLOSED_SHARE = 0.9
 
 @dataclass(frozen=True)
 class Step:
-    """An effect that was added, with what spoke for it.
-
-    Attributes
-    ----------
-    term : Term
-        Effect and parameters.
-    interpretation : str
-        What it means to a maintainer.
-    gain, t_value, p_value : float
-        Share of the held-out error of all the others that it takes away, over its standard error
-        over parts of the data, and the probability of such a ratio by chance.
-    decoy_gain : float
-        What the same regressors take off a residual whose signs were drawn at random.
-    ties : tuple of str
-        Effects that explain the data as well.
-    experiment : str or None
-        What would tell them apart.
-    fit_of_name : float
-        Share of its domain's curve that the named form holds.
-    rmse_before_a, rmse_after_a : float
-        Error of the open data when the steps are added in order.
-    curve : Curve
-        Partial residual.
-    """
+    """An effect that was added, with what spoke for it."""
 
     term: Term
+    """Effect and parameters."""
     interpretation: str
+    """What it means to a maintainer."""
     gain: float
     t_value: float
     p_value: float
+    """With `gain`, `t_value`: share of the held-out error of all the others that it takes away,
+    over its standard error over parts of the data, and the probability of such a ratio by
+    chance."""
     decoy_gain: float
+    """What the same regressors take off a residual whose signs were drawn at random."""
     ties: tuple[str, ...]
+    """Effects that explain the data as well."""
     experiment: str | None
+    """What would tell them apart."""
     fit_of_name: float
+    """Share of its domain's curve that the named form holds."""
     rmse_before_a: float
     rmse_after_a: float
+    """With `rmse_before_a`: error of the open data when the steps are added in order."""
     curve: Curve
+    """Partial residual."""
 
     @property
     def approximate(self) -> bool:
@@ -95,53 +83,37 @@ class Untestable:
 
 @dataclass(frozen=True)
 class Loop:
-    """What closing the loop found on one axis.
-
-    Attributes
-    ----------
-    before, after : Fit
-        The declared and the extended model, fitted to the open groups.
-    steps : tuple of Step
-        Effects added, largest first; functions without a name are among them.
-    tried : tuple of (int, Tried)
-        What was asked beside the final model, with the step in whose place it was tried.
-    rejected, untestable : tuples
-        What was not added, and what could not be tried.
-    ceiling : Ceiling
-        What can be explained of the sealed data without a name.
-    verdict : str
-        "nothing-missing", "closed", "partial" or "not-in-library".
-    rmse_before_a, rmse_after_a, r2_before, r2_after : float
-        On the sealed data.
-    floor_a : float
-        Sealed error that the ceiling leaves.
-    noise_a : float
-        Standard deviation of what changes from sample to sample in the final residual.
-    explained_share : float
-        Share of the ceiling that named effects reach, 0 to 1.
-    remaining_domain : str or None
-        Where something without a name is left.
-    orders_note : str
-        What the recordings can tell of orders.
-    """
+    """What closing the loop found on one axis."""
 
     before: Fit
     after: Fit
+    """With `before`: the declared and the extended model, fitted to the open groups."""
     steps: tuple[Step, ...]
+    """Effects added, largest first; functions without a name are among them."""
     tried: tuple[tuple[int, Tried], ...]
+    """What was asked beside the final model, with the step in whose place it was tried."""
     rejected: tuple[Rejected, ...]
     untestable: tuple[Untestable, ...]
+    """With `rejected`: what was not added, and what could not be tried."""
     ceiling: Ceiling
+    """What can be explained of the sealed data without a name."""
     verdict: str
+    """"nothing-missing", "closed", "partial" or "not-in-library"."""
     rmse_before_a: float
     rmse_after_a: float
     r2_before: float
     r2_after: float
+    """With `rmse_before_a`, `rmse_after_a`, `r2_before`: on the sealed data."""
     floor_a: float
+    """Sealed error that the ceiling leaves."""
     noise_a: float
+    """Standard deviation of what changes from sample to sample in the final residual."""
     explained_share: float
+    """Share of the ceiling that named effects reach, 0 to 1."""
     remaining_domain: str | None
+    """Where something without a name is left."""
     orders_note: str
+    """What the recordings can tell of orders."""
 
 
 def close_loop(

@@ -14,35 +14,24 @@ FEATURE_NAMES = ("delta_mu", "delta_var", "ks")
 
 @dataclass(frozen=True)
 class LinearDiscriminant:
-    """A trained two-class discriminant.
-
-    Attributes
-    ----------
-    weights : tuple of float
-        Direction, scaled so that the pooled within-class variance along it is one.
-    centre : tuple of float
-        Grand mean of the training rows.
-    n_normal, n_fault : int
-        Training rows of each class.
-    mean_normal, mean_fault : float
-        Projected class means.
-    shrinkage : float
-        Share by which the within-class correlations were shrunk, 0..1.
-    conditions : mapping of str to (low, high)
-        Closed range of each operating condition in the training rows.
-    feature_names : tuple of str
-        Names of the features, in the order of `weights`.
-    """
+    """A trained two-class discriminant."""
 
     weights: tuple[float, ...]
+    """Direction, scaled so that the pooled within-class variance along it is one."""
     centre: tuple[float, ...]
+    """Grand mean of the training rows."""
     n_normal: int
     n_fault: int
+    """With `n_normal`: training rows of each class."""
     mean_normal: float
     mean_fault: float
+    """With `mean_normal`: projected class means."""
     shrinkage: float
+    """Share by which the within-class correlations were shrunk, 0..1."""
     conditions: Mapping[str, tuple[float, float]]
+    """Closed range of each operating condition in the training rows."""
     feature_names: tuple[str, ...] = FEATURE_NAMES
+    """Names of the features, in the order of `weights`."""
 
     def project(self, rows: ArrayLike) -> FloatArray:
         """Project rows of features onto the discriminant.

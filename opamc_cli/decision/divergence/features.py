@@ -8,21 +8,14 @@ from numpy.typing import ArrayLike
 
 @dataclass(frozen=True)
 class Features:
-    """Statistical distance between baseline and target divergences.
-
-    Attributes
-    ----------
-    delta_mu : float
-        Mean of the target minus mean of the baseline.
-    delta_var : float
-        Sample variance of the target minus that of the baseline.
-    ks : float
-        Two-sample Kolmogorov-Smirnov statistic, 0..1.
-    """
+    """Statistical distance between baseline and target divergences."""
 
     delta_mu: float
+    """Mean of the target minus mean of the baseline."""
     delta_var: float
+    """Sample variance of the target minus that of the baseline."""
     ks: float
+    """Two-sample Kolmogorov-Smirnov statistic, 0..1."""
 
 
 def _finite(values: ArrayLike) -> np.ndarray[tuple[int], np.dtype[np.float64]]:

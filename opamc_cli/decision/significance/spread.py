@@ -12,18 +12,12 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Spread:
-    """A standard deviation and how much it can be relied on.
-
-    Attributes
-    ----------
-    scale : float
-        Standard deviation.
-    dof : float
-        Degrees of freedom behind it.
-    """
+    """A standard deviation and how much it can be relied on."""
 
     scale: float
+    """Standard deviation."""
     dof: float
+    """Degrees of freedom behind it."""
 
 
 LEAST_VARIANCE = 1e-6

@@ -6,21 +6,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Night:
-    """What the rule looks at.
-
-    Attributes
-    ----------
-    signal : bool
-        The joint is not as it was, by the night's own verdict or by the chart.
-    gross : bool
-        So much so that one night is enough.
-    judged : bool
-        False: nothing is known of the night, which neither raises nor clears.
-    """
+    """What the rule looks at."""
 
     signal: bool
+    """The joint is not as it was, by the night's own verdict or by the chart."""
     gross: bool = False
+    """So much so that one night is enough."""
     judged: bool = True
+    """False: nothing is known of the night, which neither raises nor clears."""
 
 
 @dataclass(frozen=True)

@@ -33,19 +33,14 @@ LEAST_SPREAD = 0.05
 
 @dataclass(frozen=True)
 class Chart:
-    """The chart of one series.
-
-    Attributes
-    ----------
-    shift : ndarray, shape (T,)
-        Each night's distance from where healthy nights lie, in their standard deviations.
-    average : ndarray, shape (T,)
-        Weighted average up to each night, in its own standard deviations; NaN where the night has
-        no value.
-    """
+    """The chart of one series."""
 
     shift: FloatArray
+    """Each night's distance from where healthy nights lie, in their standard deviations; shape
+    (T,)."""
     average: FloatArray
+    """Weighted average up to each night, in its own standard deviations; NaN where the night has no
+    value; shape (T,)."""
 
 
 def control_chart(values: FloatArray, n_baseline: int) -> Chart:

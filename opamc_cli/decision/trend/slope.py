@@ -16,23 +16,16 @@ NORMAL_90 = 1.6449
 
 @dataclass(frozen=True)
 class Slope:
-    """Change per night.
-
-    Attributes
-    ----------
-    per_night, low, high : float
-        Change per night with its 90 % interval.
-    middle : float
-        Level in the middle of the nights, where it hardly depends on the slope.
-    age : float
-        Nights from that middle to the last night.
-    """
+    """Change per night."""
 
     per_night: float
     low: float
     high: float
+    """With `per_night`, `low`: change per night with its 90 % interval."""
     middle: float
+    """Level in the middle of the nights, where it hardly depends on the slope."""
     age: float
+    """Nights from that middle to the last night."""
 
     @property
     def level(self) -> float:

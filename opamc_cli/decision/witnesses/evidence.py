@@ -42,23 +42,16 @@ class Evidence(Protocol):
 
 @dataclass(frozen=True)
 class SessionDistances:
-    """Log distances of one axis's sessions.
-
-    Attributes
-    ----------
-    own : ndarray, shape (B,)
-        Of baseline session i from the other baseline sessions.
-    target : ndarray, shape (B, T)
-        Of each target session from the baseline without session i: the two numbers of a pair
-        differ in nothing but the session, same pool, same level, same finite-sample bias.
-    each : ndarray, shape (B + 1,)
-        Of every session from all others, the first target session last: all on the same footing,
-        so that the target's rank among them is that of any healthy session.
-    """
+    """Log distances of one axis's sessions."""
 
     own: FloatArray
+    """Of baseline session i from the other baseline sessions; shape (B,)."""
     target: FloatArray
+    """Of each target session from the baseline without session i: the two numbers of a pair differ
+    in nothing but the session, same pool, same level, same finite-sample bias; shape (B, T)."""
     each: FloatArray
+    """Of every session from all others, the first target session last: all on the same footing, so
+    that the target's rank among them is that of any healthy session; shape (B + 1,)."""
 
     @property
     def known(self) -> bool:

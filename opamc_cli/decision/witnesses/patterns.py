@@ -20,30 +20,22 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Cell:
-    """Pattern counts of one motion and order, by session.
-
-    Attributes
-    ----------
-    motion, order, tau : int
-        What the patterns are of; tau in samples.
-    baseline : ndarray, shape (B, K)
-        Counts of each baseline session; a row of zeros where a session lacks the motion.
-    target : ndarray, shape (T, K)
-        Counts of each target session, likewise.
-    cycles, target_cycles : ndarray, shape (C, K)
-        Counts of each single cycle of the baseline and of the target.
-    inflation : float
-        φ of `divergence.chance_inflation`, from the cycles within baseline sessions.
-    """
+    """Pattern counts of one motion and order, by session."""
 
     motion: int
     order: int
     tau: int
+    """With `motion`, `order`: what the patterns are of; tau in samples."""
     baseline: FloatArray
+    """Counts of each baseline session; a row of zeros where a session lacks the motion; shape (B,
+    K)."""
     target: FloatArray
+    """Counts of each target session, likewise; shape (T, K)."""
     cycles: FloatArray
     target_cycles: FloatArray
+    """With `cycles`: counts of each cycle of the baseline and of the target; shape (C, K)."""
     inflation: float
+    """φ of `divergence.chance_inflation`, from the cycles within baseline sessions."""
 
     def with_units(self, baseline: FloatArray, target: FloatArray) -> "Cell":
         """Return the same cell with other units, such as cycles, in the place of sessions."""
@@ -167,15 +159,10 @@ def pooled_divergence(cells: Sequence[Cell], is_target: NDArray[np.bool_]) -> Fl
 
 @dataclass(frozen=True)
 class PatternEvidence:
-    """Distance by the Jensen-Shannon divergence of ordinal patterns.
-
-    Attributes
-    ----------
-    cells : sequence of Cell
-        All motions and orders of one axis.
-    """
+    """Distance by the Jensen-Shannon divergence of ordinal patterns."""
 
     cells: Sequence[Cell]
+    """All motions and orders of one axis."""
     ranks: ClassVar[bool] = True
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:

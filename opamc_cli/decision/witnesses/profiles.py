@@ -27,34 +27,25 @@ LEAST_SHARE = 1e-3
 
 @dataclass(frozen=True)
 class ProfileCell:
-    """Course of one motion's current by session, its size and its shape apart.
-
-    Attributes
-    ----------
-    motion : int
-        What it is of.
-    scale : ndarray, shape (B + T, 1)
-        Size of each session's course over that of all sessions' mean; NaN where nothing is known.
-    shape : ndarray, shape (B + T, P)
-        The course over its size, over the root mean square of all sessions' mean.
-    cycles : ndarray, shape (B + T,)
-        Cycles that each is of.
-    within_scale, within_shape : ndarray, shape (1,) and (P,)
-        Variance of single cycles about their session's mean; NaN if unknown.
-    course : ndarray, shape (B + T, P)
-        The course itself, over the same root mean square.
-    rms_a : float
-        That root mean square, A.
-    """
+    """Course of one motion's current by session, its size and its shape apart."""
 
     motion: int
+    """What it is of."""
     scale: FloatArray
+    """Size of each session's course over that of all sessions' mean; NaN where nothing is known;
+    shape (B + T, 1)."""
     shape: FloatArray
+    """The course over its size, over the root mean square of all sessions' mean; (B + T, P)."""
     cycles: FloatArray
+    """Cycles that each is of; shape (B + T,)."""
     within_scale: FloatArray
     within_shape: FloatArray
+    """With `within_scale`: variance of single cycles about their session's mean; NaN if unknown;
+    shape (1,) and (P,)."""
     course: FloatArray
+    """The course itself, over the same root mean square; shape (B + T, P)."""
     rms_a: float
+    """That root mean square, A."""
 
 
 def profile_cell(
@@ -111,18 +102,12 @@ def profile_cell(
 
 @dataclass(frozen=True)
 class ProfileEvidence:
-    """Distance by the course of the current, size and shape counting alike.
-
-    Attributes
-    ----------
-    cells : sequence of ProfileCell
-        All motions of one axis.
-    n_baseline : int
-        Number of baseline sessions.
-    """
+    """Distance by the course of the current, size and shape counting alike."""
 
     cells: Sequence[ProfileCell]
+    """All motions of one axis."""
     n_baseline: int
+    """Number of baseline sessions."""
     ranks: ClassVar[bool] = False
 
     def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
@@ -154,25 +139,17 @@ class ProfileEvidence:
 
 @dataclass(frozen=True)
 class CourseChange:
-    """Where the course of the current has changed most clearly.
-
-    Attributes
-    ----------
-    motion : int
-        In which motion.
-    start, stop : float
-        Part of it, 0 at its beginning and 1 at its end.
-    change_a : float
-        Mean change of the current there, A.
-    scale : float
-        Size of the whole course over the baseline's.
-    """
+    """Where the course of the current has changed most clearly."""
 
     motion: int
+    """In which motion."""
     start: float
     stop: float
+    """With `start`: part of it, 0 at its beginning and 1 at its end."""
     change_a: float
+    """Mean change of the current there, A."""
     scale: float
+    """Size of the whole course over the baseline's."""
 
 
 def clearest_course(cells: Sequence[ProfileCell], n_baseline: int) -> CourseChange | None:

@@ -24,47 +24,33 @@ LEAST_VARIANCE = 1e-6
 
 @dataclass(frozen=True)
 class SpectrumCell:
-    """Log power of one motion's frames and bins, by session.
-
-    Attributes
-    ----------
-    motion : int
-        What it is of.
-    sessions : ndarray, shape (B + T, F)
-        Mean over each session's cycles, baseline first; NaN where nothing is known.
-    cycles : ndarray, shape (B + T,)
-        Cycles that each mean is of.
-    within : ndarray, shape (F,)
-        Variance of a single cycle about its session's mean, from all sessions; NaN if unknown.
-    frames, bins : int
-        F is their product, frames first.
-    bin_hz : float
-        Frequency of the first bin; bin k lies at k + 1 times it.
-    """
+    """Log power of one motion's frames and bins, by session."""
 
     motion: int
+    """What it is of."""
     sessions: FloatArray
+    """Mean over each session's cycles, baseline first; NaN where nothing is known; shape (B + T,
+    F)."""
     cycles: FloatArray
+    """Cycles that each mean is of; shape (B + T,)."""
     within: FloatArray
+    """Variance of a single cycle about its session's mean, from all sessions; NaN if unknown; shape
+    (F,)."""
     frames: int
     bins: int
+    """With `frames`: f is their product, frames first."""
     bin_hz: float
+    """Frequency of the first bin; bin k lies at k + 1 times it."""
 
 
 @dataclass(frozen=True)
 class SpectrumEvidence:
-    """Distance by the short-time spectrum of the envelope.
-
-    Attributes
-    ----------
-    cells : sequence of SpectrumCell
-        All motions of one axis.
-    n_baseline : int
-        Number of baseline sessions.
-    """
+    """Distance by the short-time spectrum of the envelope."""
 
     cells: Sequence[SpectrumCell]
+    """All motions of one axis."""
     n_baseline: int
+    """Number of baseline sessions."""
     ranks: ClassVar[bool] = True
 
     def log_distances(self, units: NDArray[np.int64], rest: NDArray[np.int64]) -> FloatArray:
@@ -88,25 +74,17 @@ class SpectrumEvidence:
 
 @dataclass(frozen=True)
 class BandChange:
-    """Where the envelope's fluctuations have changed most clearly.
-
-    Attributes
-    ----------
-    motion : int
-        In which motion.
-    start, stop : float
-        Part of it, 0 at its beginning and 1 at its end.
-    frequency_hz : float
-        Of the fluctuation.
-    size_ratio : float
-        Its amplitude over the baseline's mean.
-    """
+    """Where the envelope's fluctuations have changed most clearly."""
 
     motion: int
+    """In which motion."""
     start: float
     stop: float
+    """With `start`: part of it, 0 at its beginning and 1 at its end."""
     frequency_hz: float
+    """Of the fluctuation."""
     size_ratio: float
+    """Its amplitude over the baseline's mean."""
 
 
 def size_effect(cells: Sequence[SpectrumCell], n_baseline: int) -> float:

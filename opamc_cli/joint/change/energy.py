@@ -20,19 +20,13 @@ CLEAR = 2.5
 
 @dataclass(frozen=True)
 class Energy:
-    """Change of the mean square residual, A^2.
-
-    Attributes
-    ----------
-    slow : float
-        In the declared effects' coefficients: what the baseline's mean model leaves more in the
-        target than a unit's own fit, less the same in the baseline.
-    fast : float
-        In the residual of every unit's own fit.
-    """
+    """Change of the mean square residual, A^2."""
 
     slow: float
+    """In the declared effects' coefficients: what the baseline's mean model leaves more in the
+    target than a unit's own fit, less the same in the baseline."""
     fast: float
+    """In the residual of every unit's own fit."""
 
     @property
     def total(self) -> float:

@@ -45,44 +45,30 @@ has to grow tenfold in power. Nothing else does that to it: such a ripple is cle
 
 @dataclass(frozen=True)
 class Cause:
-    """One effect that the target has and the baseline has not, or has less of.
-
-    Attributes
-    ----------
-    effect, domain : str
-        From the library.
-    parameters : dict
-        Non-linear parameters.
-    evidence : dict
-        What was measured, by name.
-    interpretation : str
-        What it means to a maintainer.
-    share : float
-        Share of the change of the current's mean square beyond the sessions' own differences
-        that it explains, 0 to 1.
-    p_value : float
-        Probability with which healthy units show as much, corrected for what was tried.
-    ties : tuple of str
-        Effects or readings that explain the change as well.
-    origin : str
-        The effect's: "joint", or "environment", "load", "measurement", which are no fault of it.
-    serious : bool
-        True where it is the joint's and large enough to be called a fault whatever else changed.
-    clear : bool
-        True where nothing that all joints have in common could look like it.
-    """
+    """One effect that the target has and the baseline has not, or has less of."""
 
     effect: str
     domain: str
+    """With `effect`: from the library."""
     parameters: Parameters
+    """Non-linear parameters."""
     interpretation: str
+    """What it means to a maintainer."""
     share: float
+    """Share of the change of the current's mean square beyond the sessions' own differences that it
+    explains, 0 to 1."""
     p_value: float
+    """Probability with which healthy units show as much, corrected for what was tried."""
     ties: tuple[str, ...]
+    """Effects or readings that explain the change as well."""
     origin: str
+    """The effect's: "joint", or "environment", "load", "measurement", which are no fault of it."""
     serious: bool
+    """True where it is the joint's and large enough to be called a fault whatever else changed."""
     clear: bool = False
+    """True where nothing that all joints have in common could look like it."""
     evidence: Parameters = field(default_factory=dict)
+    """What was measured, by name."""
 
     @property
     def harmless(self) -> bool:
@@ -92,38 +78,25 @@ class Cause:
 
 @dataclass(frozen=True)
 class Change:
-    """What `explain_change` found.
-
-    Attributes
-    ----------
-    causes : tuple of Cause
-        Serious ones first, then by share; empty where nothing lies outside what healthy units
-        show.
-    excess_a : float
-        Root of how much larger the mean square residual is in the target than in the baseline,
-        beyond the sessions' own differences.
-    explained_share : float
-        Share of that excess which all causes explain together.
-    harmless : bool
-        True where harmless causes explain at least half of the excess and no cause is serious.
-    units : tuple of int
-        Baseline and target units that were compared.
-    sessions : bool
-        True where these are recordings, False where they are cycles.
-    angle : str
-        What orders are counted by: a revolution of the "motor", of the "joint", or "electrical".
-    why_not : str or None
-        Why nothing could be said, where nothing could.
-    """
+    """What `explain_change` found."""
 
     causes: tuple[Cause, ...]
+    """Serious ones first, then by share; empty where healthy units show as much."""
     excess_a: float
+    """Root of how much larger the mean square residual is in the target than in the baseline,
+    beyond the sessions' own differences."""
     explained_share: float
+    """Share of that excess which all causes explain together."""
     harmless: bool
+    """True where harmless causes explain at least half of the excess and no cause is serious."""
     units: tuple[int, int] = (0, 0)
+    """Baseline and target units that were compared."""
     sessions: bool = False
+    """True where these are recordings, False where they are cycles."""
     angle: str = "motor"
+    """What orders are counted by: a revolution of the "motor", of the "joint", or "electrical"."""
     why_not: str | None = None
+    """Why nothing could be said, where nothing could."""
 
 
 def explain_change(

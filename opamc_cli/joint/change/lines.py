@@ -31,50 +31,35 @@ NEIGHBOURHOOD = 12
 
 @dataclass(frozen=True)
 class OrderSpectra:
-    """Whitened power over order, one row per unit, on one grid.
-
-    Attributes
-    ----------
-    orders : array of shape (k,)
-        Cycles per revolution of the machine angle.
-    before, after : arrays of shape (units, k)
-        Mean power per sample, summed coherently within strokes only: phases alone know no zero
-        of the angle, and the velocity loop turns the phase with the speed.
-    resolution : float
-        Smallest difference of orders that the usual stroke can tell apart.
-    """
+    """Whitened power over order, one row per unit, on one grid."""
 
     orders: Floats
+    """Cycles per revolution of the machine angle; (k,)."""
     before: Floats
     after: Floats
+    """With `before`: mean power per sample, summed coherently within strokes only: phases alone
+    know no zero of the angle, and the velocity loop turns the phase with the speed; s of shape
+    (units, k)."""
     resolution: float
+    """Smallest difference of orders that the usual stroke can tell apart."""
 
 
 @dataclass(frozen=True)
 class Line:
-    """A line that grew.
-
-    Attributes
-    ----------
-    order, error : float
-        With its standard error over units.
-    reference : float or None
-        Where the baseline's own line lies, if it has one within two resolutions.
-    growth : float
-        Ratio of the powers.
-    excess : float
-        Difference of the powers.
-    p_value : float
-        Corrected for the number of orders.
-    """
+    """A line that grew."""
 
     order: float
     error: float
+    """With `order`: with its standard error over units."""
     reference: float | None
+    """Where the baseline's own line lies, if it has one within two resolutions."""
     reference_error: float
     growth: float
+    """Ratio of the powers."""
     excess: float
+    """Difference of the powers."""
     p_value: float
+    """Corrected for the number of orders."""
 
 
 def fast_residuals(

@@ -22,18 +22,12 @@ phase picks up has as much in that frame as in either of its two lines over the 
 
 @dataclass(frozen=True)
 class Periodic:
-    """A periodic effect that grew.
-
-    Attributes
-    ----------
-    reading : Reading
-        What it means.
-    power : float
-        Mean square that it holds more in the target than in the baseline, A^2.
-    """
+    """A periodic effect that grew."""
 
     reading: Reading
+    """What it means."""
     power: float
+    """Mean square that it holds more in the target than in the baseline, A^2."""
 
 
 def find_periodic(

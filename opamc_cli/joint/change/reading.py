@@ -41,40 +41,27 @@ FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
 
 @dataclass(frozen=True)
 class Reading:
-    """What the lines say.
-
-    Attributes
-    ----------
-    effect : str
-        Name in the library.
-    parameters : dict
-        Order per revolution of the track's machine angle.
-    evidence : dict
-        The order as measured, its error, the smallest difference of orders that a stroke can
-        tell apart, and by which factor the power of the line has grown.
-    interpretation : str
-        To a maintainer.
-    ties : tuple of str
-        Effects or readings that the data cannot tell from it.
-    lines : tuple of Line
-        Those that belong to it.
-    fundamental : float
-        Order whose harmonics are the comb.
-    known : bool
-        Whether the order has a meaning in a strain wave gear.
-    mesh : bool
-        Whether it is that of the wave generator's passage over the teeth.
-    """
+    """What the lines say."""
 
     effect: str
+    """Name in the library."""
     parameters: Parameters
+    """Order per revolution of the track's machine angle."""
     evidence: Parameters
+    """The order as measured, its error, the smallest difference of orders that a stroke can tell
+    apart, and by which factor the power of the line has grown."""
     interpretation: str
+    """To a maintainer."""
     ties: tuple[str, ...]
+    """Effects or readings that the data cannot tell from it."""
     lines: tuple[Line, ...]
+    """Those that belong to it."""
     fundamental: float
+    """Order whose harmonics are the comb."""
     known: bool
+    """Whether the order has a meaning in a strain wave gear."""
     mesh: bool = False
+    """Whether it is that of the wave generator's passage over the teeth."""
 
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:

@@ -65,30 +65,20 @@ LARGEST_COLD_FACTOR = 2.0
 
 @dataclass(frozen=True)
 class SlowCause:
-    """A slow effect that changed.
-
-    Attributes
-    ----------
-    effect : str
-        From the library.
-    parameters : dict
-        Non-linear parameters and, for the temperature, how much colder it was.
-    note : str
-        What it means, where the effect itself does not say enough.
-    shift : Shift
-        Jointly with the causes before it.
-    p_value : float
-        Corrected for what was tried.
-    ties : tuple of str
-        Effects whose contribution is nearly the same.
-    """
+    """A slow effect that changed."""
 
     effect: str
+    """From the library."""
     parameters: Parameters
+    """Non-linear parameters and, for the temperature, how much colder it was."""
     note: str
+    """What it means, where the effect itself does not say enough."""
     shift: Shift
+    """Jointly with the causes before it."""
     p_value: float
+    """Corrected for what was tried."""
     ties: tuple[str, ...]
+    """Effects whose contribution is nearly the same."""
 
 
 def find_slow_causes(

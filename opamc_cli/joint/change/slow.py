@@ -25,56 +25,37 @@ FEWEST_EXCITED = 10.0
 
 @dataclass(frozen=True)
 class Population:
-    """What the baseline's units are like.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        Declared effects.
-    mean : array of shape (k,)
-        Mean coefficients.
-    covariance : array of shape (k, k)
-        Of one unit's coefficients.
-    variance : float
-        Of the coarse grid's residual.
-    power : float
-        Mean square of the slow current.
-    between : float
-        Variance, in shares of the slow current's power, by which sessions differ beyond what
-        units of one session can show.
-    """
+    """What the baseline's units are like."""
 
     terms: tuple[Term, ...]
+    """Declared effects."""
     mean: Floats
+    """Mean coefficients; (k,)."""
     covariance: Floats
+    """Of one unit's coefficients; (k, k)."""
     variance: float
+    """Of the coarse grid's residual."""
     power: float
+    """Mean square of the slow current."""
     between: float
+    """Variance, in shares of the slow current's power, by which sessions differ beyond what units
+    of one session can show."""
 
 
 @dataclass(frozen=True)
 class Shift:
-    """Effects that the target has and the baseline has not, or has less of.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        Jointly fitted.
-    coefficients : array
-        Mean over the target's units less the baseline's, of all terms' columns.
-    covariance : array
-        Of these.
-    p_value : float
-        Of the last term beside the others.
-    width : int
-        Number of the last term's columns.
-    """
+    """Effects that the target has and the baseline has not, or has less of."""
 
     terms: tuple[Term, ...]
+    """Jointly fitted."""
     coefficients: Floats
+    """Mean over the target's units less the baseline's, of all terms' columns."""
     covariance: Floats
+    """Of these."""
     p_value: float
+    """Of the last term beside the others."""
     width: int
+    """Number of the last term's columns."""
 
 
 @dataclass(frozen=True)

@@ -28,26 +28,18 @@ LOST = 2.0
 
 @dataclass(frozen=True)
 class Unit:
-    """One recording, or one cycle of it.
-
-    Attributes
-    ----------
-    fine, coarse : Track
-        The recording at its own rate, and averaged to about 100 Hz.
-    factor : int
-        Samples per coarse one.
-    fine_rows, coarse_rows : bool arrays
-        Samples of the unit that count.
-    after : bool
-        True in the target.
-    """
+    """One recording, or one cycle of it."""
 
     fine: Track
     coarse: Track
+    """With `fine`: the recording at its own rate, and averaged to about 100 Hz."""
     factor: int
+    """Samples per coarse one."""
     fine_rows: Bools
     coarse_rows: Bools
+    """With `fine_rows`: samples of the unit that count."""
     after: bool
+    """True in the target."""
     # a search asks for most of them again at every step: half of its time
     _coarse_columns: dict[object, Floats] = field(init=False, repr=False, default_factory=dict)
 

@@ -19,18 +19,12 @@ SEALED_PARTS = 12
 
 @dataclass(frozen=True)
 class Ceiling:
-    """Share of the sealed mean square error that can be explained without a name.
-
-    Attributes
-    ----------
-    share : float
-        At least 0.
-    standard_error : float
-        Over parts of the sealed data.
-    """
+    """Share of the sealed mean square error that can be explained without a name."""
 
     share: float
+    """At least 0."""
     standard_error: float
+    """Over parts of the sealed data."""
 
     @property
     def certain(self) -> bool:

@@ -14,20 +14,14 @@ PLACED = ("motor-angle", "joint-angle")
 
 @dataclass(frozen=True)
 class Applied:
-    """What a frozen model says of recordings.
-
-    Attributes
-    ----------
-    residual_a : array of shape (n,)
-        Current less model.
-    judged : bool array of shape (n,)
-        Samples at which it means something: the joint moves, and the smoothing of the motion takes
-        nothing from its acceleration.
-    """
+    """What a frozen model says of recordings."""
 
     track: Track
     residual_a: Floats
+    """Current less model; (n,)."""
     judged: Bools
+    """Samples at which it means something: the joint moves, and the smoothing of the motion takes
+    nothing from its acceleration; bool array of shape (n,)."""
 
     def rmse(self, among: Bools | None = None) -> float:
         """Root mean square residual on the judged samples, or on those that are `among` them."""

@@ -15,24 +15,16 @@ INSEPARABLE = 0.995
 
 @dataclass(frozen=True)
 class Certainty:
-    """Block-robust certainty of one fit.
-
-    Attributes
-    ----------
-    standard_errors : tuple of arrays
-        One array per term, in the coefficient's unit.
-    factor : float
-        Student factor of the 95 % interval (degrees of freedom: units less one).
-    condition_number : float
-        Of the regressors scaled to unit length.
-    inseparable : tuple of tuple of str
-        Sets of effects that can replace one another within the data.
-    """
+    """Block-robust certainty of one fit."""
 
     standard_errors: tuple[Floats, ...]
+    """One array per term, in the coefficient's unit."""
     factor: float
+    """Student factor of the 95 % interval (degrees of freedom: units less one)."""
     condition_number: float
+    """Of the regressors scaled to unit length."""
     inseparable: tuple[tuple[str, ...], ...]
+    """Sets of effects that can replace one another within the data."""
 
 
 def certainty(fit: Fit) -> Certainty:

@@ -61,22 +61,16 @@ class Term:
 
 @dataclass(frozen=True)
 class Grid:
-    """A track with the samples that the fit may look at, group after group.
-
-    Attributes
-    ----------
-    track : Track
-        At this grid's rate.
-    fit, sealed : bool arrays of shape (n,)
-        Moving samples of the groups that are open, and of those that are sealed.
-    slices : tuple of (int, int)
-        Half-open ranges of the open groups among the `fit` samples.
-    """
+    """A track with the samples that the fit may look at, group after group."""
 
     track: Track
+    """At this grid's rate."""
     fit: Bools
     sealed: Bools
+    """With `fit`: moving samples of the groups that are open, and of those that are sealed; bool
+    arrays of shape (n,)."""
     slices: tuple[tuple[int, int], ...]
+    """Half-open ranges of the open groups among the `fit` samples."""
 
     @property
     def rows(self) -> list[NDArray[np.int64]]:
@@ -87,30 +81,21 @@ class Grid:
 
 @dataclass(frozen=True)
 class Session:
-    """Everything the loop works on: the fine and the coarse grid of the same recordings.
-
-    Attributes
-    ----------
-    fine, coarse : Grid
-        At the full rate and averaged; of a long recording, a sample of the open groups.
-    opened : Session or None
-        The same open samples with all sealed groups beside them, where `fine` has none.
-    factor : int
-        Fine samples per coarse one.
-    grouping : Grouping
-    fit_groups : tuple of int
-        Groups that may be looked at before the end.
-    cache : RegressorCache
-        Regressors and products that fits share.
-    """
+    """Everything the loop works on: the fine and the coarse grid of the same recordings."""
 
     fine: Grid
     coarse: Grid
+    """With `fine`: full rate and averaged; of a long recording, a sample of the open groups."""
     factor: int
+    """Fine samples per coarse one."""
     grouping: Grouping
+    """"""
     fit_groups: tuple[int, ...]
+    """Groups that may be looked at before the end."""
     opened: "Session | None" = None
+    """The same open samples with all sealed groups beside them, where `fine` has none."""
     cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
+    """Regressors and products that fits share."""
 
     @cached_property
     def sharp(self) -> Grid:
@@ -236,27 +221,18 @@ def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Gri
 
 @dataclass(frozen=True)
 class Fit:
-    """Joint least squares of all terms on the fine grid's open samples.
-
-    Attributes
-    ----------
-    terms : tuple of Term
-        What was fitted.
-    coefficients : tuple of arrays
-        One array per term.
-    session : Session
-        With the fitted load and model currents.
-    residual_a : array of shape (n,)
-        Current less model on the whole fine grid (it means something where samples move).
-    sums : Sums
-        Of the fine grid's open samples.
-    """
+    """Joint least squares of all terms on the fine grid's open samples."""
 
     terms: tuple[Term, ...]
+    """What was fitted."""
     coefficients: tuple[Floats, ...]
+    """One array per term."""
     session: Session
+    """With the fitted load and model currents."""
     residual_a: Floats
+    """Current less model on the whole fine grid (it means something where samples move); (n,)."""
     sums: Sums
+    """Of the fine grid's open samples."""
 
     @cached_property
     def coarse_sums(self) -> tuple[Sums, list[Floats]]:

@@ -18,24 +18,16 @@ PARTS_PER_UNIT = 4
 
 @dataclass(frozen=True)
 class Parts:
-    """Open samples of one grid, part after part.
-
-    Attributes
-    ----------
-    rows : int array of shape (m,)
-        Places on the grid.
-    slices : tuple of (int, int)
-        Half-open range of each part among the rows.
-    unit : int array of shape (p,)
-        Unit that each part belongs to; a unit is left out as one.
-    judged : bool array of shape (p,)
-        Parts whose error counts; all are fitted.
-    """
+    """Open samples of one grid, part after part."""
 
     rows: Ints
+    """Places on the grid; int array of shape (m,)."""
     slices: tuple[tuple[int, int], ...]
+    """Half-open range of each part among the rows."""
     unit: Ints
+    """Unit that each part belongs to; a unit is left out as one; int array of shape (p,)."""
     judged: Bools
+    """Parts whose error counts; all are fitted; bool array of shape (p,)."""
 
     @property
     def units(self) -> int:

@@ -23,23 +23,16 @@ FEWEST_FIT_GROUPS = 4
 
 @dataclass(frozen=True)
 class Grouping:
-    """Groups of samples that are left out as one, and the sealed ones among them.
-
-    Attributes
-    ----------
-    group : int array of shape (n,)
-        Group of each sample, -1 outside all groups.
-    names : tuple of str
-        Name of each group, for people.
-    sealed : tuple of int
-        Groups that nothing looks at before the end.
-    kind : {"cycles", "recordings", "blocks"}
-    """
+    """Groups of samples that are left out as one, and the sealed ones among them."""
 
     group: Ints
+    """Group of each sample, -1 outside all groups; int array of shape (n,)."""
     names: tuple[str, ...]
+    """Name of each group, for people."""
     sealed: tuple[int, ...]
+    """Groups that nothing looks at before the end."""
     kind: str
+    """"""
 
 
 def cycle_length(path: Floats, rate_hz: float) -> int | None:

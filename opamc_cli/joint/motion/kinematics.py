@@ -39,32 +39,22 @@ SLOWEST_SHARE = 0.02
 
 @dataclass(frozen=True)
 class Recording:
-    """One joint's samples of one run, as they were logged.
-
-    Attributes
-    ----------
-    name : str
-        Name of the run.
-    rate_hz : float
-        Sampling rate.
-    current_a : array of shape (n,) or None
-        Reported torque current, signed.
-    phases_a : array of shape (n, 3) or None
-        Phase currents.
-    position_rad, velocity_rad_s, temperature_c : array of shape (n,) or None
-        Joint side.
-    started_s : float or None
-        Start of the run on a clock common to all runs.
-    """
+    """One joint's samples of one run, as they were logged."""
 
     name: str
+    """Name of the run."""
     rate_hz: float
+    """Sampling rate."""
     current_a: Floats | None = None
+    """Reported torque current, signed; (n,) or None."""
     phases_a: Floats | None = None
+    """Phase currents; (n, 3) or None."""
     position_rad: Floats | None = None
     velocity_rad_s: Floats | None = None
     temperature_c: Floats | None = None
+    """With `position_rad`, `velocity_rad_s`: joint side; (n,) or None."""
     started_s: float | None = None
+    """Start of the run on a clock common to all runs."""
 
     @property
     def size(self) -> int:
@@ -103,39 +93,28 @@ def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
 
 @dataclass(frozen=True)
 class Motion:
-    """Smoothed motion of one recording.
-
-    Attributes
-    ----------
-    position_rad, velocity, acceleration : arrays of shape (n,)
-        Smoothed.
-    window : int
-        Samples over which they are smooth.
-    velocity_noise : float
-        Standard deviation of the speed's noise.
-    kernel : array of odd length
-        Moving average that the acceleration has gone through.
-    evenly_smooth : bool
-        True where position and speed have gone through the same.
-    quiet : int
-        Samples over which the acceleration's noise averages to almost nothing.
-    blur : array of shape (n, 2) or None
-        What the acceleration would gain or lose by a third and by three times the window.
-    taken_noise : float
-        Standard deviation of the noise in what the window would take from the acceleration a
-        second time; 0 where it is not known.
-    """
+    """Smoothed motion of one recording."""
 
     position_rad: Floats
     velocity: Floats
     acceleration: Floats
+    """With `position_rad`, `velocity`: smoothed; s of shape (n,)."""
     window: int
+    """Samples over which they are smooth."""
     velocity_noise: float
+    """Standard deviation of the speed's noise."""
     kernel: Floats
+    """Moving average that the acceleration has gone through."""
     quiet: int = 1
+    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
+    """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
+    None."""
     taken_noise: float = 0.0
+    """Standard deviation of the noise in what the window would take from the acceleration a second
+    time; 0 where it is not known."""
     evenly_smooth: bool = False
+    """True where position and speed have gone through the same."""
 
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
         """Return the motion delayed by a fraction of a sample."""

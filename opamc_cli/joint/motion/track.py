@@ -49,97 +49,75 @@ class Joint:
 
 @dataclass(frozen=True)
 class Track:
-    """All recordings of one joint, one after another on a uniform grid of samples.
-
-    Attributes
-    ----------
-    rate_hz : float
-        Sampling rate of the grid.
-    bounds : tuple of (int, int)
-        Half-open (start, stop) of each recording on the grid.
-    time_s, run_time_s : array of shape (n,)
-        Seconds since the first recording began, and since the sample's own recording began.
-    current_a : array of shape (n,)
-        Torque-producing motor current with its sign.
-    position_rad, velocity, acceleration : array of shape (n,)
-        Smoothed motion: joint side where the scale is known, else of the angle that is known.
-    machine_angle_rad : array of shape (n,)
-        Angle whose orders are searched: motor, joint or electrical, as `angle_kind` says.
-    angle_kind : {"motor", "joint", "electrical"}
-        What one revolution of `machine_angle_rad` is.
-    direction : array of shape (n,)
-        -1, 0 or 1; 0 where the joint is too slow to tell.
-    moving : bool array of shape (n,)
-        Samples that count: the joint moves and its direction is certain.
-    clear : bool array of shape (n,)
-        Samples at which the smoothing of the motion takes nothing from the acceleration. On the
-        coarse grid, where the current is equally smooth, others count as well; at the full rate
-        residuals are looked at on these.
-    group : int array of shape (n,)
-        Cycle, recording or block that is left out as one; -1 outside all of them.
-    load_a, model_a : array of shape (n,)
-        Current that carries the load, and the whole fitted current (zero before a fit).
-    temperature_c, current_d_a, electrical_rad : array of shape (n,) or None
-        Where known: temperature, current in the flux axis, electrical angle.
-    static_terms : tuple
-        Fitted terms that neither shift nor ripple.
-    open_samples : bool array of shape (n,) or None
-        Moving samples that a fit may look at: none that are sealed.
-    kernel : array of odd length
-        Moving average that the acceleration has gone through; the coarse grid puts the current
-        through it too.
-    evenly_smooth : bool
-        True where position and speed have gone through it as well; otherwise the coarse grid puts
-        them through it.
-    blur : array of shape (n, 2) or None
-        What the acceleration would gain or lose by a shorter and a longer window.
-    quiet : int
-        Samples over which the acceleration's noise averages to almost nothing.
-    channels : frozenset of str
-        What was logged or follows from it: position, logged (motion beside the current),
-        scale, temperature, phases, electrical.
-    period_samples : int or None
-        Length of a cycle, if the motion repeats.
-    full : Track or None
-        What an averaged track is the block means of: the same recordings at the full rate, with
-        current, position, speed and direction as smooth as the acceleration.
-    reference : Reference or None
-        What regressors are measured by, where it is not to be that of these recordings.
-    own_clocks_s : tuple of float
-        `time_s` at which each recording begins, where recordings have no common clock.
-    """
+    """All recordings of one joint, one after another on a uniform grid of samples."""
 
     rate_hz: float
+    """Sampling rate of the grid."""
     bounds: tuple[tuple[int, int], ...]
+    """Half-open (start, stop) of each recording on the grid."""
     time_s: Floats
     run_time_s: Floats
+    """With `time_s`: seconds since the first recording began, and since the sample's own recording
+    began; (n,)."""
     current_a: Floats
+    """Torque-producing motor current with its sign; (n,)."""
     position_rad: Floats
     velocity: Floats
     acceleration: Floats
+    """With `position_rad`, `velocity`: smoothed motion: joint side where the scale is known, else
+    of the angle that is known; (n,)."""
     machine_angle_rad: Floats
+    """Angle whose orders are searched: motor, joint or electrical, as `angle_kind` says; (n,)."""
     angle_kind: str
+    """What one revolution of `machine_angle_rad` is."""
     direction: Floats
+    """-1, 0 or 1; 0 where the joint is too slow to tell; (n,)."""
     moving: Bools
+    """Samples that count: the joint moves and its direction is certain; shape (n,)."""
     clear: Bools
+    """Samples at which the smoothing of the motion takes nothing from the acceleration. On the
+    coarse grid, where the current is equally smooth, others count as well; at the full rate
+    residuals are looked at on these; bool array of shape (n,)."""
     group: Ints
+    """Cycle, recording or block that is left out as one; -1 outside all of them; int array of shape
+    (n,)."""
     load_a: Floats
     model_a: Floats
+    """With `load_a`: current that carries the load, and the whole fitted current (zero before a
+    fit); (n,)."""
     joint: Joint
     channels: frozenset[str]
+    """What was logged or follows from it: position, logged (motion beside the current), scale,
+    temperature, phases, electrical."""
     temperature_c: Floats | None = None
     current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
+    """With `temperature_c`, `current_d_a`: where known: temperature, current in the flux axis,
+    electrical angle; (n,) or None."""
     period_samples: int | None = None
+    """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
+    """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None
+    """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
+    None."""
     kernel: Floats = field(default_factory=lambda: np.ones(1))
+    """Moving average that the acceleration has gone through; the coarse grid puts the current
+    through it too."""
     evenly_smooth: bool = False
+    """True where position and speed have gone through it as well; otherwise the coarse grid puts
+    them through it."""
     quiet: int = 1
+    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
+    """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
     full: "Track | None" = None
+    """What an averaged track is the block means of: the same recordings at the full rate, with
+    current, position, speed and direction as smooth as the acceleration."""
     own_clocks_s: tuple[float, ...] = ()
+    """`time_s` at which each recording begins, where recordings have no common clock."""
     reference: "Reference | None" = None
+    """What regressors are measured by, where it is not to be that of these recordings."""
 
     @property
     def size(self) -> int:

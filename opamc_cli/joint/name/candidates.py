@@ -31,24 +31,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Batch:
-    """Regressors of many guesses of equal width, on the parts' rows.
-
-    Attributes
-    ----------
-    terms : sequence of Term
-        K guesses.
-    columns : array of shape (m, K * w)
-        Guess after guess.
-    own : array of shape (p, K, w, w)
-        Products of each guess with itself.
-    moment : array of shape (p, K, w)
-        Products with the current.
-    """
+    """Regressors of many guesses of equal width, on the parts' rows."""
 
     terms: Sequence[Term]
+    """K guesses."""
     columns: Floats
+    """Guess after guess; (m, K * w)."""
     own: Floats
+    """Products of each guess with itself; (p, K, w, w)."""
     moment: Floats
+    """Products with the current; (p, K, w)."""
 
     @property
     def width(self) -> int:

@@ -19,26 +19,18 @@ itself charges for those that are of no use."""
 
 @dataclass(frozen=True)
 class Chain:
-    """A fitted model and its held-out error.
-
-    Attributes
-    ----------
-    fit : Fit
-        All terms, the declared ones first.
-    added : int
-        Number of terms at the end that were not declared.
-    error : array of shape (p,)
-        Sum of squares of each judged part, of the fit to all other units. Every moving sample is
-        judged once: at the full rate where it is clear of corners of the motion, else on the
-        coarse grid, where the current is as smooth as the motion.
-    samples : float
-        Samples that are judged.
-    """
+    """A fitted model and its held-out error."""
 
     fit: Fit
+    """All terms, the declared ones first."""
     added: int
+    """Number of terms at the end that were not declared."""
     error: Floats
+    """Sum of squares of each judged part, of the fit to all other units. Every moving sample is
+    judged once: at the full rate where it is clear of corners of the motion, else on the coarse
+    grid, where the current is as smooth as the motion; (p,)."""
     samples: float
+    """Samples that are judged."""
 
     @property
     def terms(self) -> tuple[Term, ...]:

@@ -31,23 +31,17 @@ COVARIATES = {
 
 @dataclass(frozen=True)
 class Curve:
-    """A partial residual over its own covariate.
-
-    Attributes
-    ----------
-    covariate, unit : str
-        What it is drawn over.
-    x, residual_a, named_a : arrays of shape (k,)
-        Bins of equally many samples: the covariate's mean, the mean of what the effect and the
-        final residual hold together, and of what the effect holds. Where friction resists, both are
-        taken times the direction.
-    """
+    """A partial residual over its own covariate."""
 
     covariate: str
     unit: str
+    """With `covariate`: what it is drawn over."""
     x: Floats
     residual_a: Floats
     named_a: Floats
+    """With `x`, `residual_a`: bins of equally many samples: the covariate's mean, the mean of what
+    the effect and the final residual hold together, and of what the effect holds. Where friction
+    resists, both are taken times the direction; s of shape (k,)."""
 
 
 def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:

@@ -30,24 +30,16 @@ PROMISING = 0.25
 
 @dataclass(frozen=True)
 class Pool:
-    """What may be added, with the regressors that do not follow the model computed once.
-
-    Attributes
-    ----------
-    slow : list of Batch
-        Guesses of effects that do not follow the model, on the coarse grid.
-    library : dict of str to Effect
-        Everything that may be added.
-    least_share : float
-        Of the held-out error, that an effect has to take away.
-    without : collection of str
-        Rules that are switched off.
-    """
+    """What may be added, with the regressors that do not follow the model computed once."""
 
     slow: list[Batch]
+    """Guesses of effects that do not follow the model, on the coarse grid."""
     library: Library
+    """Everything that may be added."""
     least_share: float = LEAST_SHARE
+    """Of the held-out error, that an effect has to take away."""
     without: Collection[str] = field(default=())
+    """Rules that are switched off."""
 
     @classmethod
     def of(
@@ -71,47 +63,32 @@ class Pool:
 
 @dataclass(frozen=True)
 class Tried:
-    """What is told of a trial in the end, when its fit and its sums are gone.
-
-    Attributes
-    ----------
-    term : Term
-        The effect.
-    score : float
-        Of the chain with it less that of the chain without.
-    gain, t_value, p_value : float
-        As of the trial.
-    why_not : str or None
-        None where the effect may be added.
-    """
+    """What is told of a trial in the end, when its fit and its sums are gone."""
 
     term: Term
+    """The effect."""
     score: float
+    """Of the chain with it less that of the chain without."""
     gain: float
     t_value: float
     p_value: float
+    """With `gain`, `t_value`: as of the trial."""
     why_not: str | None
+    """None where the effect may be added."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A chain with one effect more, and why it is none, if it is not.
-
-    Attributes
-    ----------
-    parent, chain : Chain
-        Without and with the effect.
-    gain, t_value : float
-        Share of the parent's held-out error, and over its standard error.
-    why_not : str or None
-        None where the effect may be added.
-    """
+    """A chain with one effect more, and why it is none, if it is not."""
 
     parent: Chain
     chain: Chain
+    """With `parent`: without and with the effect."""
     gain: float
     t_value: float
+    """With `gain`: share of the parent's held-out error, and over its standard error."""
     why_not: str | None
+    """None where the effect may be added."""
 
     @property
     def term(self) -> Term:

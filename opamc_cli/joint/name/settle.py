@@ -17,21 +17,14 @@ MOST_ROUNDS = 4
 
 @dataclass(frozen=True)
 class Named:
-    """An added effect, beside all the others.
-
-    Attributes
-    ----------
-    trial : Trial
-        What it takes off the error that all the others leave.
-    others : tuple of Tried
-        What else was tried in its place.
-    ties : tuple of str
-        Effects that explain the data as well.
-    """
+    """An added effect, beside all the others."""
 
     trial: Trial
+    """What it takes off the error that all the others leave."""
     others: tuple[Tried, ...]
+    """What else was tried in its place."""
     ties: tuple[str, ...]
+    """Effects that explain the data as well."""
 
     @property
     def term(self) -> Term:

@@ -25,32 +25,23 @@ angle over the travel two ratios that are tried differ; how finely speeds and la
 
 @dataclass(frozen=True)
 class PhaseAngle:
-    """Smoothed electrical angle of one recording, and its derivatives.
-
-    Attributes
-    ----------
-    angle_rad, velocity_rad_s, acceleration_rad_s2 : arrays of shape (n,)
-        Electrical.
-    strong : bool array of shape (n,)
-        Samples with enough current to tell an angle.
-    clear : bool array of shape (n,)
-        Samples with enough current for an acceleration that is not mostly noise.
-    window : int
-        Samples over which it is smooth.
-    kernel : array of odd length
-        Moving average that the angle and its derivatives have gone through.
-    blur : array of shape (n, 2)
-        What the acceleration would gain or lose by a shorter and a longer window.
-    """
+    """Smoothed electrical angle of one recording, and its derivatives."""
 
     angle_rad: Floats
     velocity_rad_s: Floats
     acceleration_rad_s2: Floats
+    """With `angle_rad`, `velocity_rad_s`: electrical; s of shape (n,)."""
     strong: Bools
+    """Samples with enough current to tell an angle; bool array of shape (n,)."""
     clear: Bools
+    """Samples with enough current for an acceleration that is not mostly noise; bool array of shape
+    (n,)."""
     window: int
+    """Samples over which it is smooth."""
     kernel: Floats
+    """Moving average that the angle and its derivatives have gone through."""
     blur: Floats
+    """What the acceleration would gain or lose by a shorter and a longer window; (n, 2)."""
 
     def aligned_with(
         self, position_rad: Floats, velocity_rad_s: Floats, ratio: float | None, rate_hz: float
