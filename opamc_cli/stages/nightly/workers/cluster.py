@@ -81,6 +81,10 @@ def run_all(
                 time.sleep(LOOK_EVERY_S)
                 continue
             for future in completed.next_batch(block=False):
+                if future.status == "lost":
+                    # its worker died with the result: the scheduler has it computed once more
+                    completed.add(future)
+                    continue
                 answer = _answer(future)
                 if client.status != "running":
                     raise _lost(address, n_done, len(jobs))
