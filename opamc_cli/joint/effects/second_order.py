@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import lfilter
 
 from opamc_cli.joint.motion.track import Floats
 
@@ -35,8 +36,6 @@ def answers(
         All signals through the low-pass, of gain 1 at rest; then through the band-pass, the
         low-pass's rate of change in units of the resonance.
     """
-    from scipy.signal import lfilter  # slow to load, and a cause needs no such filter
-
     # The bilinear transform bends frequencies; start from the bent one.
     w = 2 * rate_hz * np.tan(rad_per_s / (2 * rate_hz))
     found = []

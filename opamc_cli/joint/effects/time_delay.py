@@ -1,6 +1,7 @@
 """A current that comes later, or earlier, than the motion it belongs to."""
 
 import numpy as np
+from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
@@ -131,8 +132,6 @@ def lagging(columns: Floats, samples: float) -> Floats:
     samples : float
         Time constant.
     """
-    from scipy.signal import lfilter  # slow to load, and few delays are filters
-
     pole = np.exp(-1.0 / max(samples, 1e-3))
     rest = pole * columns[:1]
     smooth: Floats = lfilter([1.0 - pole], [1.0, -pole], columns, axis=0, zi=rest)[0]

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import correlate
 
 from opamc_cli.joint.motion.track import Bools, Floats, Ints
-from opamc_cli.signal.filters import autocorrelation
 
 REPEAT_ERROR = 0.02
 COARSE_REPEAT_ERROR = 0.3
@@ -85,7 +85,7 @@ def _mismatch(path: Floats) -> Floats:
     """Mean square of ``path[t + lag] - path[t]`` for every lag below n, by one correlation."""
     n = path.size
     centred = path - path.mean()
-    products = autocorrelation(centred)
+    products = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     lags = np.arange(n)
     overlap = n - lags

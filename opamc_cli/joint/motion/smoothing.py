@@ -1,9 +1,9 @@
 """Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
 
 import numpy as np
+from scipy.signal import savgol_coeffs, savgol_filter
 
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.signal.filters import local_polynomial, polynomial_weights
 
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
@@ -94,7 +94,7 @@ def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     derivative : int
         Order of the derivative.
     """
-    kernel = polynomial_weights(window, POLYNOMIAL_ORDER, derivative, 1.0 / rate_hz)
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
     return float(np.linalg.norm(kernel))
 
 
@@ -116,7 +116,7 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
     array of shape (window,)
         Sum 1.
     """
-    weights = polynomial_weights(window, POLYNOMIAL_ORDER, derivative, use="product")
+    weights = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, use="dot")
     for _ in range(derivative):
         weights = -np.cumsum(weights)
     # Two sums have moved the weights back by one sample, one sum by half a sample.
@@ -172,7 +172,7 @@ def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     float
         For a path that is white noise of unit deviation.
     """
-    kernel = polynomial_weights(window, POLYNOMIAL_ORDER, derivative, 1.0 / rate_hz)
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
     twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
     half = (twice.size - kernel.size) // 2
     return float(np.linalg.norm(np.pad(kernel, half) - twice))
@@ -200,7 +200,7 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
     int
         At least 1, at most 0.2 s.
     """
-    kernel = polynomial_weights(window, POLYNOMIAL_ORDER, derivative, 1.0 / rate_hz)
+    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
     longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
     block = 1
     while block < longest:
@@ -233,7 +233,10 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
     ----------
     Savitzky and Golay, Analytical Chemistry 36, 1964.
     """
-    return local_polynomial(path, window, POLYNOMIAL_ORDER, derivative, 1.0 / rate_hz)
+    smooth: Floats = savgol_filter(
+        path, window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz, mode="interp"
+    )
+    return smooth
 
 
 def unstepped(values: Floats) -> Floats:

@@ -6,8 +6,7 @@ from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-
-from opamc_cli.signal.filters import convolved
+from scipy.signal import oaconvolve, upfirdn
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -251,7 +250,8 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
         part = values[start:stop]
         padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
         padded = np.pad(part, padding, mode="edge")
-        smooth[start:stop] = convolved(padded, kernel)
+        shape = (-1,) + (1,) * (part.ndim - 1)
+        smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
     return smooth
 
 
@@ -271,8 +271,6 @@ def averaged_blocks(
     factor : int
         Samples per block, at least 1.
     """
-    from scipy.signal import upfirdn  # slow to load, and few models have fast terms
-
     weights = np.convolve(kernel, np.full(factor, 1.0 / factor))
     half = kernel.size // 2
     # a whole number of blocks before the first sample that all weights reach

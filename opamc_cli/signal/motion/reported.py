@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.signal.filters import local_polynomial
 from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.motion.segmentation import hysteresis
 
@@ -69,7 +68,11 @@ def velocity_from_position(
     window = min(wanted, angle.size - 1 + angle.size % 2)
     if window < 3:
         return np.zeros(angle.size)
-    return local_polynomial(angle, window, 2, 1, 1 / fs_hz)
+    # Importing it takes as long as all else together, and few runs lack the velocity.
+    from scipy.signal import savgol_filter
+
+    velocity: NDArray[np.float64] = savgol_filter(angle, window, 2, deriv=1, delta=1 / fs_hz)
+    return velocity
 
 
 SLOWEST_WINDOW_S = 0.2
