@@ -240,6 +240,16 @@ GOOD = "columns: {axis1_a: {source: 0, unit: A}}\n"
         ("time: {source: 1, unit: weeks}\n" + GOOD, "units of time: s, ms, us, ns"),
         ("sampling_rate_hz: {source: fs, unit: A}\n" + GOOD, "a rate is in Hz or kHz"),
         ("sampling_rate_hz: 1\nformat: mat\nheader: true\n" + GOOD, "header is for csv"),
+        ("sampling_rate_hz: 1\naxes: 2\n" + GOOD, "axes is 2, but no column holds {n}"),
+        (
+            "sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unit: A, scale: 0}}",
+            "columns.axis1_a.scale is 0",
+        ),
+        (
+            "sampling_rate_hz: 1\n"
+            "columns: {axis1_a: {source: 0, unit: A}, axis2_a: {source: 0, unit: A}}",
+            "columns.axis1_a and columns.axis2_a are both of 0",
+        ),
         ("sampling_rate_hz: 1\nencoding: klingon\n" + GOOD, "encoding is 'klingon'"),
         ("sampling_rate_hz: 1\ndecimal: ','\n" + GOOD, "separator and decimal are both ','"),
         (
@@ -255,6 +265,17 @@ def test_unusable_maps_are_refused(tmp_path, text, expected):
         load_map(path)
     assert expected in str(caught.value)
     assert str(caught.value).startswith(str(path))
+
+
+def test_maps_that_are_odd_but_may_be(tmp_path):
+    path = tmp_path / "map.yaml"
+    # one thermometer for all joints, and a line for one axis beside that for all
+    path.write_text(
+        "sampling_rate_hz: 1\naxes: 2\ncolumns: {axis3_a: {source: u, unit: A}, "
+        "axis{n}_a: {source: 'i_{n}', unit: A}, axis1_temperature: {source: t, unit: K}, "
+        "axis2_temperature: {source: t, unit: K}}"
+    )
+    assert load_map(path).axes == 2
 
 
 def test_overrides_reach_into_the_map(tmp_path):

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from opamc_cli.storage.ingest.guess.values import are_phases, rate_from_speed, time_unit, wraps
+from opamc_cli.storage.ingest.guess.values import (
+    angle_units,
+    are_phases,
+    current_unit,
+    rate_from_speed,
+    time_unit,
+    wraps,
+)
 from opamc_cli.storage.ingest.guess.write import _fits
 
 T = np.arange(2000) / 250.0
@@ -63,3 +70,56 @@ def test_phases_add_up_to_little():
 )
 def test_a_declared_unit_is_believed_where_it_is_one_of_the_quantity(unit, kind, fits):
     assert _fits(unit, kind) is fits
+
+
+@pytest.mark.parametrize(
+    ("position", "speed", "units"),
+    [
+        (1.0, 1.0, ("rad", "rad/s")),
+        (180 / np.pi, 180 / np.pi, ("deg", "deg/s")),
+        (180 / np.pi, 1.0, ("deg", "rad/s")),
+        (1.0, 180 / np.pi, ("rad", "deg/s")),
+        (180 / np.pi, 30 / np.pi, ("deg", "rpm")),
+        (1.0, 30 / np.pi, ("rad", "rpm")),
+        # a tenth apart still agrees, more does not
+        (1.0, 1.09, ("rad", "rad/s")),
+    ],
+)
+def test_units_of_an_angle_are_those_whose_steps_agree_with_the_speed(position, speed, units):
+    found = angle_units({1: position * ANGLE}, {1: speed * SPEED}, 250.0)
+    assert (found[0].unit, found[1].unit) == units
+    assert found[0].why.endswith("; its steps agree with the speed")
+
+
+def test_units_by_the_range_alone():
+    for largest, angle, speed in ((12.5, "rad", "rad/s"), (12.6, "deg", "deg/s")):
+        found = angle_units({1: ANGLE, 2: np.array([-largest])}, {3: np.array([largest])}, None)
+        assert (found[0].unit, found[1].unit) == (angle, speed)
+        assert found[0].why == f"largest {largest:.3g}, by the range alone"
+    found = angle_units({1: ANGLE}, {1: 1.2 * SPEED}, 250.0)
+    assert found[0].why == "largest 1.69, by the range alone (its steps are 0.833 of the speed)"
+    assert [guess.why for guess in angle_units({}, {}, 250.0)] == [
+        "largest 0, by the range alone",
+        "largest 0, by the range alone",
+    ]
+
+
+def test_currents_of_more_than_sixty_are_in_milliampere():
+    assert (current_unit(60.0).unit, current_unit(60.1).unit) == ("A", "mA")
+
+
+def test_rates_are_those_of_loggers():
+    for rate, known in ((4.9, None), (5.0, 5.0), (20_000.0, 20_000.0), (21_000.0, None)):
+        assert rate_from_speed({1: np.arange(50.0) / rate}, {1: np.ones(50)}) == known
+    for step, unit in ((0.19, "s"), (0.21, "ms"), (0.21e3, "us"), (5.1e-5, "s"), (1e-9, "s")):
+        assert time_unit(np.arange(50) * step + 0.5).unit == unit, step
+
+
+def test_stamps_may_stand_still_for_a_tenth_of_their_steps():
+    stamps = np.arange(101.0) / 100
+    stamps[10:20] = stamps[9]
+    assert time_unit(stamps).unit == "s"
+    stamps[20] = stamps[9]
+    assert time_unit(stamps) is None
+    stamps[10:20] = np.nan
+    assert time_unit(np.r_[stamps[:10], stamps[21:]]).unit == "s"

@@ -44,7 +44,7 @@ def filled(value: object, axis: int) -> object:
     >>> filled("q_«n-1»", 3), filled("«n-1»", 3), filled("q", 3)
     ('q_2', 2, 'q')
     """
-    if not isinstance(value, str) or not has_placeholder(value):
+    if not isinstance(value, str):
         return value
     text = _READ.sub(lambda m: str(axis + int(m[1] or 0)), value)
     return int(text) if _READ.fullmatch(value) else text

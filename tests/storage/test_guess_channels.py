@@ -1,0 +1,73 @@
+"""Which of a recording's channels a map takes for which axis."""
+
+from opamc_cli.storage.ingest.guess.channels import choose, time_channel
+from opamc_cli.storage.ingest.guess.names import meanings
+from opamc_cli.storage.ingest.source import Listed
+
+
+def chosen(*names, counted=True, **wide):
+    """Return {kind: {axis: channel}} and {kind: what was passed over}."""
+    listed = [*map(Listed, names), *(Listed(name, width) for name, width in wide.items())]
+    choices = choose(meanings(listed, counted))
+    axes = {
+        kind: {
+            axis: c.source if c.index is None else (c.source, c.index)
+            for axis, c in choice.by_axis.items()
+        }
+        for kind, choice in choices.items()
+    }
+    return axes, {kind: choice.passed_over for kind, choice in choices.items()}
+
+
+def test_axes_count_from_the_lowest_number_of_the_currents():
+    for first in (0, 1, 4):
+        numbers = range(first, first + 3)
+        axes, _ = chosen(*(f"i_cur_{n}" for n in numbers), *(f"q_{n}" for n in numbers), "q_9")
+        assert axes["current"] == {k + 1: f"i_cur_{n}" for k, n in enumerate(numbers)}
+        # a position of no axis with a current is left out
+        assert axes["position"] == {k + 1: f"q_{n}" for k, n in enumerate(numbers)}
+
+
+def test_the_measured_family_with_most_axes_wins():
+    axes, over = chosen("target_cur_1", "target_cur_2", "cur_1", "mean_cur_1", "mean_cur_2")
+    assert axes["current"] == {1: "mean_cur_1", 2: "mean_cur_2"}
+    # what was wanted comes last, whatever it holds
+    assert over["current"] == ("cur_#", "target_cur_#")
+    # what says that it is actual goes first, then the shorter name
+    axes, over = chosen("cur_1", "cur_2", "ActualCur_1", "CurMean_1")
+    assert axes["current"] == {1: "ActualCur_1"}
+    assert over["current"] == ("cur_#", "CurMean_#")
+    assert chosen("cur_mean_1", "cur_1")[0]["current"] == {1: "cur_1"}
+
+
+def test_axes_of_another_name_are_added():
+    axes, over = chosen("cur_1", "cur_2", "ext_cur_3", "ext2_cur_2", "target_cur_4")
+    assert axes["current"] == {1: "cur_1", 2: "cur_2", 3: "ext_cur_3"}
+    assert over["current"] == ("ext2_cur_#", "target_cur_#")
+
+
+def test_a_torque_stands_for_a_current_that_was_not_measured():
+    assert chosen("tau_1", "target_cur_1")[0]["current"] == {1: "tau_1"}
+    assert chosen("tau_1", "cur_1")[0]["current"] == {1: "cur_1"}
+    assert "current" not in chosen("tau_1", "i_a", "i_b", "i_c")[0]
+
+
+def test_columns_of_a_wide_channel_are_axes_from_its_first():
+    axes, _ = chosen("temp_1", "temp_2", motor_cur=2, q=3)
+    assert axes["current"] == {1: ("motor_cur", 0), 2: ("motor_cur", 1)}
+    assert axes["position"] == {1: ("q", 0), 2: ("q", 1)}
+    # where no current has a number in its name, others tell the lowest
+    assert axes["temperature"] == {1: "temp_1", 2: "temp_2"}
+
+
+def test_joints_without_numbers_are_axes_in_their_order_by_topic():
+    joints = [f"/states/{joint}/effort" for joint in ("pan", "lift")]
+    axes, over = chosen(*joints, "/more/states/pan/effort", counted=False)
+    assert axes["current"] == {1: joints[0], 2: joints[1]}
+    assert over["current"] == ("/more/states/pan/effort",)
+
+
+def test_time_is_the_first_that_was_measured():
+    meant = meanings([Listed("target_time"), Listed("cur_1"), Listed("t"), Listed("stamp")])
+    assert time_channel(meant).source == "t"
+    assert time_channel(meant[:2]) is None

@@ -1,0 +1,171 @@
+"""Maps that are guessed for recordings, line by line."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.guess.write import guess_map
+
+
+def table(path, columns, head="", separator=","):
+    """Write columns by their names."""
+    rows = np.column_stack(list(columns.values()))
+    lines = [separator.join(f"{v:.10g}" for v in row) for row in rows]
+    path.write_text(head + "\n".join([separator.join(columns), *lines]) + "\n")
+    return path
+
+
+def lines_of(*paths):
+    """Return the lines of a map without its first, which names the file, and without the end."""
+    lines = guess_map(list(paths)).splitlines()
+    assert lines[0].startswith(f"# Guessed from {paths[0].name}. ")
+    end = lines.index("metadata:")
+    return [" ".join(line.split()) for line in lines[1:end]], lines[end:]
+
+
+N = 400
+T = np.arange(N) / 100
+ANGLE = np.sin(2 * T)
+SPEED = 2 * np.cos(2 * T)
+METADATA = [
+    "metadata:",
+    "  robot:    # such as cell 7; runs of different robots are told apart",
+    "  program:  # such as pick; runs of different programs are not compared",
+]
+
+
+def test_a_table_of_everything(tmp_path):
+    columns = {
+        "t": T,
+        **{f"cur_{k}": 1.5 * SPEED for k in (1, 2)},
+        "set_point": ANGLE,
+        **{f"target_cur_{k}": SPEED for k in (1, 2)},
+        **{f"q_{k}": np.degrees(ANGLE) for k in (1, 2)},
+        "qd_1": np.degrees(SPEED),
+        "temp_1": 31.4 + 0 * T,
+        **{f"mode_{k}": 0 * T for k in range(3)},
+    }
+    lines, end = lines_of(table(tmp_path / "a.csv", columns, "a log\n", ";"))
+    assert lines == [
+        "format: csv",
+        'separator: ";"',
+        "header: true",
+        "skip_rows: 1",
+        "time: {source: t, unit: s} # steps of 0.01: 100 Hz, even",
+        "columns:",
+        "axis{n}_current: {source: cur_{n}, unit: A} # largest 3; not target_cur_#",
+        "axis{n}_position: {source: q_{n}, unit: deg} "
+        "# largest 57.3; its steps agree with the speed",
+        "axis1_velocity: {source: qd_1, unit: deg/s} # largest 115; as the position",
+        "axis1_temperature: {source: temp_1, unit: degC} # largest 31.4",
+        "# not used: set_point, target_cur_#, mode_#",
+    ]
+    assert end == METADATA
+
+
+def test_axes_that_no_number_counts_have_lines_of_their_own(tmp_path):
+    names = {"t": T, "cur_1": SPEED, "cur_2": SPEED, "ext_cur_3": SPEED, "t2 temp_2": T}
+    lines, _ = lines_of(table(tmp_path / "a.csv", names))
+    assert lines[4:] == [
+        "columns:",
+        "axis1_current: {source: cur_1, unit: A} # largest 2",
+        "axis2_current: {source: cur_2, unit: A} # largest 2",
+        "axis3_current: {source: ext_cur_3, unit: A} # largest 2",
+        "axis2_temperature: {source: t2 temp_2, unit: degC} # largest 3.99",
+    ]
+    names = {"t": T, **{f"cur_{k}": 70 * SPEED for k in (5, 6, 8)}, "ext_cur_7": SPEED}
+    lines, _ = lines_of(table(tmp_path / "a.csv", names))
+    assert lines[5:] == [
+        "axis{n}_current: {source: cur_{n+4}, unit: mA} # largest 140: too many for amperes",
+        "axis3_current: {source: ext_cur_7, unit: mA} # largest 140: too many for amperes",
+    ]
+
+
+def test_units_that_a_file_declares_are_believed_and_decimal_commas_read(tmp_path):
+    path = tmp_path / "a.csv"
+    rows = "".join(
+        f"{t:g};{i:.6f};{i:.6f};7\n".replace(".", ",") for t, i in zip(T, SPEED, strict=True)
+    )
+    path.write_text("t;cur_1;temp_1;q_9\n[ms];(mA);[V];rad\n" + rows, encoding="utf-16")
+    lines, _ = lines_of(path)
+    assert lines[2:] == [
+        'decimal: ","',
+        "header: true",
+        "units_rows: 1",
+        "encoding: utf-16",
+        "time: {source: t, unit: ms} # as the file says: 100000 Hz, even",
+        "columns:",
+        "axis1_current: {source: cur_1, unit: mA} # as the file says; largest 2",
+        "axis1_temperature: {source: temp_1, unit: degC} # largest 2",
+        "# not used: q_#",
+    ]
+
+
+def test_dates_are_a_clock_and_a_start(tmp_path):
+    path = tmp_path / "a.csv"
+    dates = np.datetime64("2026-03-01T08:00:00.000") + (10 * np.arange(N)).astype("m8[ms]")
+    rows = "".join(f"{d},{v:.6f}\n" for d, v in zip(dates, SPEED, strict=True))
+    path.write_text("when,cur_1\n" + rows)
+    lines, end = lines_of(path)
+    assert lines[3] == "time: {source: when, unit: iso8601} # dates: 100 Hz, even"
+    assert end == [*METADATA, "  started_at: {source: when}"]
+
+
+@pytest.mark.parametrize(("start", "known"), [(1e8, False), (1.7e9, True)])
+def test_seconds_since_1970_tell_the_start(tmp_path, start, known):
+    _, end = lines_of(table(tmp_path / "a.csv", {"t": start + T, "cur_1": SPEED}))
+    assert end == [*METADATA, *(["  started_at: {source: t}"] if known else [])]
+
+
+def test_counted_samples_have_the_rate_at_which_angle_and_speed_agree(tmp_path):
+    columns = {"t": np.arange(N), "cur_1": SPEED, "q_1": ANGLE, "qd_1": SPEED}
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns))
+    assert lines[3:5] == [
+        "time: {source: t, unit: samples} # counts rows",
+        "sampling_rate_hz: 100 # at this rate the positions agree with the speeds",
+    ]
+    assert "its steps agree with the speed" in lines[7]
+    del columns["qd_1"]
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns))
+    assert lines[4] == "sampling_rate_hz: # write how many samples make a second"
+    del columns["t"]
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns))
+    assert lines[3] == "sampling_rate_hz: # no channel tells it: write the samples per second"
+
+
+def test_clocks_that_differ_end_at_one_rate_or_are_told(tmp_path):
+    def log(name, rate, late=0.0):
+        times = (np.arange(N) + late * (np.arange(N) % 2) * (np.arange(N) < N - 1)) / rate
+        return table(tmp_path / name, {"t": times, "cur_1": SPEED})
+
+    even = log("even.csv", 100)
+    lines, _ = lines_of(even, log("same.csv", 100))
+    assert lines[3:5] == ["time: {source: t, unit: s} # steps of 0.01: 100 Hz, even", "columns:"]
+    lines, _ = lines_of(even, log("b.csv", 101), log("c.csv", 104))
+    assert lines[4] == (
+        "resample_hz: 101 # 100 to 104 Hz in 3 recordings; runs of one rate can be compared"
+    )
+    lines, _ = lines_of(even, log("d.csv", 109.9))
+    assert lines[4].startswith("resample_hz: 105 # 100 to 109.9 Hz in 2 recordings")
+    lines, _ = lines_of(even, log("e.csv", 110.1))
+    assert lines[4] == "# rates differ from 100 to 110.1 Hz: too much for one"
+    lines, _ = lines_of(log("late.csv", 100, late=0.3))
+    assert lines[3].endswith(": 100 Hz, uneven by up to 3 ms")
+    assert lines[4].startswith("resample_hz: 100 # an uneven clock is another one in every rec")
+
+
+def test_three_columns_without_names_are_phases_if_they_behave_so(tmp_path):
+    path = tmp_path / "a.csv"
+    phases = np.cos(40 * T[:, None] - np.arange(3) * 2 * np.pi / 3)
+    np.savetxt(path, phases, delimiter=",")
+    lines, _ = lines_of(path)
+    assert lines[2:8] == [
+        "header: false",
+        "sampling_rate_hz: # no channel tells it: write the samples per second",
+        "columns:",
+        *(f"axis1_{p}: {{source: {k}, unit: A}} # largest 1" for k, p in enumerate("abc")),
+    ]
+    for others in (phases[:, :2], phases[:, [0, 1, 1]], np.column_stack([phases, T])):
+        np.savetxt(path, others, delimiter=",")
+        with pytest.raises(InputError, match="no channel looks like a motor current"):
+            guess_map([path])

@@ -1,0 +1,79 @@
+"""What names of channels mean, over names that loggers write."""
+
+import pytest
+
+from opamc_cli.storage.ingest.guess.names import Meant, meanings
+from opamc_cli.storage.ingest.source import Listed
+
+KNOWN = {
+    "current": "cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1",
+    "torque": "torque_1 torques_1 effort_1 tau_1 moment_1 JointTrq1",
+    "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1",
+    "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1",
+    "temperature": "motor_temp_1 temps_1 temperature_1 temperatures_1",
+    "time": "time timestamp timestamps stamp t clock Zeit",
+}
+WANTED = (
+    "target command commanded cmd cmptd computed desired des setpoint ref reference limit error "
+    "sm model std planned nominal"
+)
+ELSEWHERE = "mm tcp tool gripper base cartesian flange io voltage"
+
+
+def only(name, **listed):
+    (found,) = meanings([Listed(name, **listed)])
+    return found
+
+
+@pytest.mark.parametrize(
+    ("quantity", "name"), [(q, name) for q, names in KNOWN.items() for name in names.split()]
+)
+def test_names_of_a_quantity(quantity, name):
+    found = only(name)
+    assert (found.quantity, found.measured) == (quantity, True)
+    assert found.number == (None if quantity == "time" else 1)
+
+
+def test_what_a_controller_wanted_is_not_measured():
+    assert [w for w in WANTED.split() if only(f"{w}_q_1").measured] == []
+    assert [w for w in ELSEWHERE.split() if meanings([Listed(f"{w}_q_1")])] == []
+    assert meanings([Listed("runtime_state"), Listed("q_«n»"), Listed(3)]) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "phase"),
+    [
+        ("I_u", "a"),
+        ("i2_v", "b"),
+        ("Current W", "c"),
+        ("axis1_current_a", "a"),
+        ("Phase-B", "b"),
+        ("ph.c", "c"),
+        ("cur_a", "a"),
+        ("drive ia_b", "b"),
+        ("joint 3 is_c", "c"),
+    ],
+)
+def test_phases_by_their_letter_where_all_three_are_there(name, phase):
+    others = [Listed(f"{name[:-1]}{letter}") for letter in ("abc" if phase in "abc" else "uvw")]
+    assert phase in {found.quantity for found in meanings([Listed(name), *others])}
+    # alone it is a unit: ampere
+    assert only(name).quantity == "current"
+
+
+def test_the_last_number_counts_axes_unless_names_are_joints():
+    assert only("robot2_q_13_rad") == Meant(
+        "position", 13, "robot2_q_#_rad", "robot2_q_13_rad", None, True, None
+    )
+    (joint,) = meanings([Listed("wrist_1/effort", unit="Nm")], counted=False)
+    assert joint == Meant("torque", None, "wrist_1/effort", "wrist_1/effort", None, True, "Nm")
+
+
+def test_columns_of_one_channel_are_axes_and_dates_are_time():
+    found = meanings([Listed("target_q", width=2, unit="deg"), Listed("when", dates=True)])
+    assert found == [
+        Meant("position", 0, "target_q", "target_q", 0, False, "deg"),
+        Meant("position", 1, "target_q", "target_q", 1, False, "deg"),
+        Meant("time", None, "when", "when", None, True, None),
+    ]
+    assert meanings([Listed("time", width=2), Listed("tcp_pose", width=6)]) == []
