@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.offset import turning_means, turning_offset
+from opamc_cli.signal.offset import mean_over_turns, turning_means, turning_offset, turns
 
 FS_HZ = 2048.0
 
@@ -39,3 +39,47 @@ def test_gaps_and_short_runs_are_passed_over() -> None:
     assert abs(turning_offset(turning_means(z, FS_HZ)) - 0.2) < 0.03
     assert turning_offset(turning_means(z[:10], FS_HZ)) == 0j
     assert turning_offset(turning_means(z[:0], FS_HZ)) == 0j
+
+
+def turning(n_turns: float, n: int) -> np.ndarray:
+    return np.exp(2j * np.pi * np.linspace(0, n_turns, n))
+
+
+def test_turns_are_counted_whatever_the_torque_s_sign() -> None:
+    z = turning(3.25, 200)
+    z[100:] *= -1
+    assert turns(np.stack([z, z[::-1], 0 * z + 1])) == pytest.approx([3.25, 3.25, 0])
+
+
+@pytest.mark.parametrize(("n_turns", "known"), [(49.9, False), (50.1, True)])
+def test_the_mean_over_fifty_turns_is_the_offset(n_turns: float, known: bool) -> None:
+    motions = [0.1 + 0.2j + turning(n_turns / 2, 2501)[:2500] for _ in range(2)]
+    motions[0][7] = np.nan
+    found = mean_over_turns([*motions, np.array([9.0 + 0j])])  # a single sample tells nothing
+    if known:
+        each = [z[np.isfinite(z)] for z in motions]
+        assert found == pytest.approx(np.concatenate(each).mean())
+    else:
+        assert found == 0j
+    assert mean_over_turns([]) == 0j
+
+
+@pytest.mark.parametrize(("turns_of_a_piece", "n_pieces"), [(3.9, 0), (4.1, 3)])
+def test_pieces_are_quarters_of_a_second_of_four_turns(
+    turns_of_a_piece: float, n_pieces: int
+) -> None:
+    fs_hz = 400.0
+    z = np.exp(2j * np.pi * turns_of_a_piece * np.arange(399) / 99)
+    means = turning_means(z, fs_hz)
+    assert means.size == n_pieces
+    taper = np.hanning(100)
+    for k, mean in enumerate(means):
+        assert mean == pytest.approx(np.average(z[100 * k : 100 * k + 100], weights=taper))
+    # two samples at least, at whatever rate
+    assert turning_means(z, 1.0).size == 0
+
+
+def test_the_offset_is_the_median_of_four_pieces_at_least() -> None:
+    means = np.array([1 + 1j, 2 + 9j, 3 + 2j, 90 + 3j])
+    assert turning_offset(means) == 2.5 + 2.5j
+    assert turning_offset(means[:3]) == 0j

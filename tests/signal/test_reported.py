@@ -6,7 +6,10 @@ import pytest
 from opamc_cli.signal.motion.reported import (
     find_joint_motions,
     fluctuation_frequency,
+    lacks_sign,
     motor_frequency,
+    quiet_velocity,
+    signed_by_speed,
     velocity_from_position,
 )
 
@@ -81,3 +84,107 @@ def test_fluctuations_of_too_few_samples_are_as_fast_as_can_be_told():
     assert fluctuation_frequency(sine, FS_HZ) == pytest.approx(5, rel=0.05)
     for known in (np.zeros(0), sine[:9], np.where(np.arange(FS_HZ) < 9, sine, np.nan)):
         assert fluctuation_frequency(known, FS_HZ) == FS_HZ / 4
+
+
+def steps(*parts):
+    """Return stretches of constant speed, (speed, samples) each."""
+    return np.concatenate([np.full(n, float(speed)) for speed, n in parts])
+
+
+def spans(velocity, least_s=0.02, still_s=0.06):
+    found = find_joint_motions(velocity, FS_HZ, least_s, still_s)
+    return [(m.start, m.stop, m.direction) for m in found]
+
+
+def test_a_motion_reaches_a_twentieth_and_lasts_above_a_fiftieth_of_the_largest_speed():
+    velocity = steps(
+        *((0, 2000), (0.021, 1000), (1, 2000), (0.019, 2000), (0.049, 2000), (-0.051, 2000))
+    )
+    assert spans(velocity) == [(2000, 5000, 1), (9000, 11000, -1)]
+    (first, second) = find_joint_motions(velocity, FS_HZ, 0.02, 0.06)
+    assert (first.speed_rad_s, second.speed_rad_s) == (1.0, pytest.approx(0.051))
+    # a joint that never reaches a hundredth of a radian a second stands
+    assert spans(0.0099 * velocity) == []
+    assert len(spans(0.0101 * velocity)) == 2
+
+
+def test_short_rests_are_bridged_between_motions_of_one_direction():
+    for rest, n in ((59, 1), (60, 2)):
+        assert len(spans(steps((1, 200), (0, rest), (1, 200)))) == n
+        assert len(spans(steps((1, 200), (0, rest), (-1, 200)))) == 2
+    joined = steps((1, 100), (0, 30), (1, 100), (0, 30), (1, 100))
+    assert spans(joined) == [(0, 360, 1)]
+
+
+def test_short_motions_are_dropped():
+    velocity = steps((1, 200), (0, 100), (1, 49), (0, 100), (1, 50))
+    assert spans(velocity, least_s=0.05) == [(0, 200, 1), (449, 499, 1)]
+    # those of fewer than ten samples at whatever rate
+    velocity = steps((1, 200), (0, 100), (1, 9), (0, 100), (1, 10))
+    assert spans(velocity, least_s=0.0) == [(0, 200, 1), (409, 419, 1)]
+
+
+def test_noise_raises_both_thresholds():
+    rng = np.random.default_rng(2)
+    velocity = steps((0, 2000), (0.06, 500), (0, 2000), (1, 500), (0, 2000))
+    loud = velocity + 0.02 * rng.standard_normal(velocity.size)
+    assert [a // 100 for a, _, _ in spans(loud)] == [45]
+    quiet = velocity + 0.002 * rng.standard_normal(velocity.size)
+    assert [a // 100 for a, _, _ in spans(quiet)] == [20, 45]
+
+
+def test_the_parabola_has_five_samples_at_least_and_a_twentieth_of_a_second():
+    angle = np.zeros(400)
+    angle[200] = 1.0
+    for fs_hz, width in ((20.0, 5), (1000.0, 51), (1010.0, 51), (100.0, 5)):
+        moved = np.flatnonzero(velocity_from_position(angle, fs_hz))
+        # the middle of a parabola has no slope from its own sample
+        assert (moved[0], moved[-1]) == (200 - width // 2, 200 + width // 2)
+
+
+def test_missing_angles_are_bridged_and_turns_undone():
+    angle = 3.0 * np.arange(400) / 1000
+    wrapped = np.mod(angle + 6.0, 2 * np.pi)
+    wrapped[[0, 50, 51, 399]] = np.nan
+    velocity = velocity_from_position(wrapped, FS_HZ)
+    assert velocity[26:370] == pytest.approx(3.0)
+    assert np.isnan(velocity_from_position(np.full(9, np.nan), FS_HZ)).all()
+
+
+def test_the_window_is_doubled_until_the_noise_is_below_standstill():
+    rng = np.random.default_rng(5)
+    angle = np.sin(np.arange(4000) / 1000)
+    for noise, window_s in ((3e-3, 0.05), (1e-2, 0.1), (3e-2, 0.2), (0.1, 0.2)):
+        noisy = angle + noise * rng.standard_normal(angle.size)
+        expected = velocity_from_position(noisy, FS_HZ, window_s)
+        np.testing.assert_array_equal(quiet_velocity(noisy, FS_HZ), expected)
+    assert quiet_velocity(np.zeros(0), FS_HZ).size == 0
+
+
+def test_a_current_without_its_sign():
+    """It is larger either way than at rest; a load's is larger one way alone."""
+    v = steps((0, 20), (1, 20), (0, 20), (-1, 20))
+    friction, load = np.abs(v) + 0.5, 0.3 * v + 0.5
+    assert lacks_sign(friction, v) is True
+    assert lacks_sign(-friction, v) is True
+    assert lacks_sign(load, v) is False
+    assert lacks_sign(v, v) is False  # both signs
+    assert lacks_sign(np.full(v.size, np.nan), v) is False
+    # too little on its way, and too little at rest, to tell
+    assert lacks_sign(friction[:69], v[:69]) is False
+    assert lacks_sign(friction[:70], v[:70]) is True
+    moving = np.abs(v) > 0
+    for n_rest, found in ((9, None), (10, True)):
+        chosen = moving | (np.cumsum(~moving) <= n_rest)
+        assert lacks_sign(friction[chosen], v[chosen]) is found
+    # less than a third of the largest speed is neither rest nor way
+    slow = np.where(v == 0, 0.29, v)
+    assert lacks_sign(friction, slow) is None
+
+
+def test_a_current_takes_the_sign_of_the_speed_and_fades_at_rest():
+    v = np.array([1.0] * 200 + [-1.0] * 200 + [0.0, 0.01, -0.02, 0.03])
+    found = signed_by_speed(np.full(v.size, -2.0), v)
+    assert found[[0, 399]].tolist() == [2, -2]
+    assert found[-4:] == pytest.approx([0, 1, -2, 2])
+    assert signed_by_speed(np.ones(3), np.zeros(3)).tolist() == [0, 0, 0]

@@ -20,8 +20,21 @@ def test_fewer_windows_rather_than_too_short_ones():
     assert len(carrier_windows(0, 500, 60.0, 1000.0, 4, 1200)) == 1
 
 
+def test_a_window_is_as_long_as_its_periods_and_the_room_allow():
+    # 3.5 periods of 100 samples: three
+    assert carrier_windows(7, 357, 10.0, 1000.0, 1, 1) == [(7, 307)]
+    assert carrier_windows(7, 357, 10.0, 1000.0, 3, 1) == [(7, 107), (107, 207), (207, 307)]
+    # periods of 2.5 samples, rounded up to three, where two have room
+    assert carrier_windows(0, 5, 400.0, 1000.0, 2, 1) == [(0, 2), (2, 4)]
+    assert carrier_windows(0, 350, 10.0, 1000.0, 2, 175) == [(0, 100), (100, 200)]
+    assert carrier_windows(0, 350, 10.0, 1000.0, 2, 176) == [(0, 300)]
+    assert carrier_windows(0, 350, 10.0, 1000.0, 3, 0) == [(0, 100), (100, 200), (200, 300)]
+
+
 def test_less_than_a_period_gives_none():
     assert carrier_windows(0, 10, 60.0, 1000.0, 4, 1) == []
+    assert carrier_windows(0, 99, 10.0, 1000.0, 1, 1) == []
+    assert carrier_windows(0, 100, 10.0, 1000.0, 1, 1) == [(0, 100)]
 
 
 @given(

@@ -38,6 +38,6 @@ def carrier_windows(
     period = fs_hz / f_carrier_hz
     n_periods = int(np.floor((stop - start) / n / period))
     length = min(round(n_periods * period), (stop - start) // n)
-    if n_periods < 1 or length < 1:
+    if length < 1:
         return []
     return [(start + i * length, start + (i + 1) * length) for i in range(n)]
