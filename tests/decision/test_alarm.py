@@ -18,6 +18,10 @@ S, N, U = Night(True), Night(False), Night(False, judged=False)
         ([N, Night(True, gross=True), N, N], [Episode(1, None)]),
         ([N, Night(True, gross=True), N, N, N], [Episode(1, 4)]),
         ([S, S, U, U, U], [Episode(1, None)]),
+        # in the night of a signal only, and cleared by as many quiet nights as are looked at
+        ([S, U, N, S, N, N, N, N], [Episode(3, 6)]),
+        ([Night(False, gross=True), N], [Episode(0, None)]),
+        ([Night(False, gross=True), N, N], [Episode(0, 2)]),
         ([S, S, N, N, N, S, S], [Episode(1, 4), Episode(6, None)]),
     ],
 )

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from opamc_cli.decision.judge import Policy
+from tests.decision import known_fleet
 from tests.decision.fleet import Fleet, cells, judge
 from tests.marks import long
 
@@ -157,3 +158,83 @@ def test_the_decision_does_not_depend_on_the_order_of_sessions():
     }
     for axis, judgement in judge(drawn).items():
         assert judge(turned)[axis].p_value == pytest.approx(judgement.p_value)
+
+
+DIGITS = {
+    "six sessions": """
+healthy 0.8636 1 1 0 0.4778 -1.042 0 0 0 0.7849 0.8903 0.4989
+fault 0.00145 0.0058 0.0058 0 6.136 6.335 0.4992 0 0 0.0007257 0.6929 0.5044
+fault 9.25e-05 0.0004625 0.0004625 0 53.58 63.08 0 0.3973 0 0.7302 4.625e-05 0.4839
+healthy 0.6659 1 1 0 0.6851 -0.6784 0 0 0.2669 0.6607 0.6705 0.0151
+healthy 0.5603 1 1 0 0.9216 -0.4093 0.07622 0 0.08286 0.5736 0.5377 0.373
+""",
+    "six sessions, two lack a motion": """
+healthy 0.7386 1 1 0.1779 0.5347 -0.8384 0 0 0 0.6994 0.7984 0.5072
+healthy 0.01085 0.0434 0.0434 0 3.413 2.024 0.4947 0 0 0.005468 0.6903 0.5194
+fault 0.0002022 0.001011 0.001011 0 75.45 66.33 0 0.3981 0 0.6975 0.0001011 0.4956
+healthy 0.5563 1 1 0.194 0.8633 -0.5064 0 0 0.2663 0.5597 0.5531 0.01352
+healthy 0.4048 1 1 0 1.182 -0.1418 0.07622 0.02145 0.08286 0.5828 0.3705 0.3513
+""",
+    "six sessions, all joints move": """
+healthy 0.02082 0.06245 1 1.207 2.722 2.033 0.2698 0 0 0.01053 0.8903 0.4989
+healthy 0.00145 0.0058 0.07005 1.001 8.643 9.149 0.4992 0 0 0.0007257 0.6929 0.5044
+fault 9.207e-05 0.0004604 0.001925 1.001 37.88 45.34 0.2782 0.3973 0 0.009868 4.625e-05 0.4839
+healthy 0.04878 0.09755 1 1.292 3.344 1.778 0.2481 0 0.2669 0.02531 0.6705 0.0151
+healthy 0.5622 0.5622 1 1.207 0.911 -0.4278 0.07622 0 0.08286 0.5736 0.5377 0.373
+""",
+    "two sessions": """
+healthy 0.7215 1 1 0 0.6538 -1.056 0.1325 0 0.09458 0.7215
+healthy 0.002455 0.01227 0.01227 0 9.72 19.24 0.5761 0.05654 0.1022 0.002455
+healthy 0.7048 1 1 0 0.669 -1.015 0.136 0.3937 0.1105 0.7048
+healthy 0.6644 1 1 0 0.691 -0.9587 0.136 0.01837 0.3623 0.6644
+healthy 0.5538 1 1 0 0.928 -0.4432 0.1723 0 0.1037 0.5538
+""",
+    "one session": """
+healthy 0.4489 1 1 0 1.033 0.01236 0.2308 nan nan 0.4489
+fault 5.395e-05 0.0002697 0.0002697 0 7.651 28.81 0.5543 nan nan 5.395e-05
+healthy 0.541 1 1 0 0.9679 -0.2732 0.2296 nan nan 0.541
+healthy 0.5687 1 1 0 0.9488 -0.3406 0.2251 nan nan 0.5687
+healthy 0.5543 1 1 0 0.9576 -0.3085 0.2004 nan nan 0.5543
+""",
+    "three and two": """
+healthy 0.6268 1 1 0 0.5447 -1.654 0 0 0.05592 0.5445 0.771 0.6415
+healthy 0.004185 0.01674 0.01674 0 5.021 13.23 0.4746 0 0.05591 0.002098 0.7577 0.757
+healthy 0.003198 0.01599 0.01599 0 19.93 56.13 0 0.3997 0.04294 0.5744 0.001604 0.863
+healthy 0.6777 1 1 0 0.524 -1.684 0 0 0.2632 0.5901 0.6886 0.02028
+healthy 0.7094 1 1 0 0.7562 -0.9165 0 0 0 0.6273 0.7853 0.9479
+""",
+    "four and two, one lacks a motion": """
+healthy 0.9586 1 1 0 0.6902 -0.5642 0 0 0 0.9881 0.9235 0.8662
+healthy 0.0228 0.09122 0.09122 0 3.559 1.998 0.4984 0 0 0.01154 0.9269 0.9155
+healthy 0.009895 0.04947 0.04947 0 43.42 35.1 0 0.3926 0 0.9813 0.004973 0.9066
+healthy 0.5455 1 1 0 0.7695 -0.4834 0 0 0.3265 0.6069 0.5784 0.01446
+healthy 0.3632 1 1 0 0.8969 -0.3648 0.07147 0.0257 0 0.3053 0.3735 0.7227
+""",
+    "nine and three": """
+healthy 0.9045 0.9748 0.9748 0.007165 0.6635 -0.6691 0 0 0 0.7157 0.9132 0.9887
+healthy 0.05264 0.1579 0.1579 0 6.306 10.19 0.5164 0 0 6.528e-06 0.8608 0.8267
+healthy 0.009054 0.03622 0.03622 0 88.05 148.8 0 0.3972 0 0.6066 1.769e-08 0.7572
+changed 0.0002023 0.001012 0.001012 0 16.53 34.2 0 0 0.2976 0.8515 0.9008 6.745e-05
+healthy 0.4874 0.9748 0.9748 0 1.006 -0.08878 0 0 0.03256 0.3363 0.5841 0.5856
+""",
+}
+"""By plan, a line for each axis: state, p-value, adjusted, alone, common log ratio, distance ratio,
+health index, effects by patterns, spectrum and profile, and p-values by those that were asked."""
+
+
+@pytest.mark.parametrize("plan", known_fleet.PLANS)
+def test_verdicts_of_a_fleet_without_chance_to_the_digit(plan):
+    lines = DIGITS[plan].split("\n")[1:-1]
+    for line, found in zip(lines, known_fleet.judged(plan).values(), strict=True):
+        state, *numbers = line.split()
+        assert found.state == state
+        values = [
+            *(found.p_value, found.p_adjusted, found.p_alone, found.common_log_ratio),
+            *(found.distance_ratio, found.health_index),
+            *found.effects.values(),
+            *found.witnesses.values(),
+        ]
+        assert values == pytest.approx([float(v) for v in numbers], rel=1e-3, nan_ok=True)
+        n_baseline, n_target, _, _ = known_fleet.PLANS[plan]
+        assert (found.n_baseline_sessions, found.n_target_sessions) == (n_baseline, n_target)
+        assert (found.n_baseline_cycles, found.n_target_cycles) == (4 * n_baseline, 4 * n_target)

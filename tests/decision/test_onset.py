@@ -22,3 +22,17 @@ def test_the_onset_is_found(kind):
 def test_awkward_series_have_an_onset():
     for values in ([], [1.0], [1.0, 1.0, 1.0], [0.0] * 10):
         assert 0 <= onset(np.arange(float(len(values))), np.array(values)) <= len(values)
+
+
+def test_onsets_by_hand():
+    """A step or a rise, exactly: no error is left at the night at which it begins."""
+    nights = np.array([0.0, 1.0, 2.0, 4.0, 5.0, 7.0, 8.0])
+    for start in range(1, 6):
+        step = np.where(np.arange(7) >= start, 3.0, 1.0)
+        assert onset(nights, step) == start
+        rise = 1.0 + np.clip(nights - nights[start - 1], 0, None)
+        assert onset(nights, rise) == start
+    # two nights after it at least, and two before in all
+    assert onset(nights, np.array([0.0] * 6 + [1.0])) < 6
+    assert onset(np.arange(3.0), np.array([0.0, 5.0, 5.0])) == 0
+    assert onset(np.arange(4.0), np.array([0.0, 5.0, 5.0, 5.0])) == 1
