@@ -1,9 +1,12 @@
+from itertools import combinations, pairwise
+
 import numpy as np
 import pytest
 
 from opamc_cli.signal.identification import (
     MatchRule,
     SegmentFeatures,
+    _most_windows,
     find_reference,
     identify,
     period,
@@ -104,3 +107,69 @@ def test_fewer_segments_than_a_cycle():
     found = identify(series(CYCLE), series(CYCLE[:2]), RULE)
     assert found.cycle.tolist() == [-1, -1]
     assert find_reference(series(CYCLE[:1]), RULE) == (0, 1)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_the_most_windows_then_the_most_alike_are_those_of_trying_all(seed):
+    rng = np.random.default_rng(seed)
+    n, fits = 1 + seed % 3, rng.random(9) < 0.6
+    similarity = rng.integers(6, 9, 9) / 8
+    every = [
+        chosen
+        for count in range(10)
+        for chosen in combinations(np.flatnonzero(fits).tolist(), count)
+        if all(b - a >= n for a, b in pairwise(chosen))
+    ]
+    worth = [(len(chosen), similarity[list(chosen)].sum()) for chosen in every]
+    # of equal ones those that begin first
+    best = min(c for c, w in zip(every, worth, strict=True) if w == max(worth))
+    assert _most_windows(fits, similarity, n) == list(best)
+
+
+@pytest.mark.parametrize(
+    ("column", "tolerance"), [(1, RULE.duration_tolerance), (2, RULE.f_max_tolerance)]
+)
+def test_each_segment_agrees_within_the_tolerance(column, tolerance):
+    for off, fits in ((0.999, True), (1.001, False)):
+        for sign in (-1, 1):
+            rows = [list(row) for row in CYCLE]
+            rows[2][column] *= 1 + sign * off * tolerance
+            found = identify(series(CYCLE, noise=0), series(rows, noise=0), RULE)
+            assert bool(found.cycle.max() == 0) is fits
+
+
+def test_an_unknown_direction_is_no_other():
+    unknown = [(v, d, f, 0, p) for v, d, f, _, p in CYCLE]
+    for one, other in ((CYCLE, unknown), (unknown, CYCLE)):
+        assert identify(series(one), series(other), RULE).cycle.max() == 0
+
+
+def test_the_best_similarity_of_what_is_unidentified_is_kept():
+    reference = series(CYCLE[:2], noise=0)
+    rows = [(1.0, 9.0, 9.0, 1, 0.3), (1.0, 9.0, 9.0, 1, 0.3), (0.0, 9.0, 9.0, 1, 0.3)]
+    found = identify(reference, series(rows, noise=0), RULE)
+    length = np.hypot(4.0, 3.5)
+    expected = [7.5 / length / np.sqrt(2), 7.5 / length / np.sqrt(2), 4 / length]
+    assert found.similarity == pytest.approx(expected)
+    assert found.motion.tolist() == found.cycle.tolist() == [-1, -1, -1]
+
+
+def test_a_pause_is_clearly_longer_from_half_as_much_again():
+    for pause, start in ((0.44, 0), (0.46, 3)):
+        rows = [(*row[:4], 0.3) for row in CYCLE]
+        rows[3] = (*rows[3][:4], pause)
+        assert find_reference(series((rows * 5)[:-1]), RULE) == (start, start + 4)
+    # unknown pauses say nothing
+    rows[3] = (*rows[3][:4], np.nan)
+    assert find_reference(series((rows * 5)[:-1]), RULE) == (0, 4)
+    assert find_reference(series(CYCLE * 4), RULE, segments_per_cycle=2)[1] == 2
+    assert find_reference(series(CYCLE), RULE, segments_per_cycle=9) == (0, 4)
+
+
+def test_differences_below_a_fiftieth_are_no_period():
+    rows = [(4.0 * (1 + 0.005 * (-1) ** k), 1.0, 314.0, 1, 0.3) for k in range(8)]
+    assert period(series(rows, noise=0)) == 1
+    rows = [(4.0 * (1 + 0.05 * (-1) ** k), 1.0, 314.0, 1, 0.3) for k in range(8)]
+    assert period(series(rows, noise=0)) == 2
+    assert period(series(rows[:1])) == 1
+    assert period(series(rows[:3], noise=0)) == 1
