@@ -105,12 +105,7 @@ class ArrowSource:
         for selection in selections.values():
             if str(selection.source) not in known:
                 raise missing_channel(self.path, selection.source, list(known))
-        columns = sorted({str(s.source).partition(".")[0] for s in selections.values()})
-        # a column may have a dot in its own name
-        columns = sorted(
-            {str(s.source) for s in selections.values() if str(s.source) in self._schema.names}
-            | {name for name in columns if name in self._schema.names}
-        )
+        columns = sorted({self._column(str(s.source)) for s in selections.values()})
         for batch in self._batches(columns):
             yield {name: self._values(batch, selection) for name, selection in selections.items()}
 
@@ -124,11 +119,15 @@ class ArrowSource:
             return metadata[name[1:]]
         if name not in dict(self._leaves()):
             raise missing_channel(self.path, source, [leaf for leaf, _ in self._leaves()])
-        for batch in self._batches([name.partition(".")[0]]):
+        for batch in self._batches([self._column(name)]):
             for found in self._leaf(batch, name).drop_null()[:1].to_pylist():
                 return found
         msg = f"{self.path}: column {name!r} is empty where a value is needed"
         raise InputError(msg)
+
+    def _column(self, name: str) -> str:
+        # a column may have a dot in its own name
+        return name if name in self._schema.names else name.partition(".")[0]
 
     def _leaves(self) -> list[tuple[str, pa.DataType]]:
         leaves: list[tuple[str, pa.DataType]] = []
@@ -140,7 +139,7 @@ class ArrowSource:
         return leaves
 
     def _width(self, name: str) -> int:
-        batch = next(iter(self._batches([name.partition(".")[0]])), None)
+        batch = next(iter(self._batches([self._column(name)])), None)
         lengths = pc.list_value_length(self._leaf(batch, name)) if batch is not None else None
         return int(pc.max(lengths).as_py() or 0) if lengths is not None else 0
 
