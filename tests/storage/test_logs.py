@@ -1,8 +1,13 @@
 """Which files of a cell are recordings, whose they are, and of which night."""
 
+import hashlib
+
+import numpy as np
 import pytest
 
-from opamc_cli.storage.logs import find_logs
+from opamc_cli.errors import InputError
+from opamc_cli.storage.logs import Facts, LogFile, copy_name, fetch, find_logs, read_facts
+from opamc_cli.storage.runs import RunInfo, save_run
 
 
 @pytest.mark.parametrize(
@@ -27,3 +32,89 @@ def test_other_folders_beside_the_nights_are_no_logs(tmp_path):
         (tmp_path / "r1" / folder).mkdir(parents=True)
         (tmp_path / "r1" / folder / "a.parquet").write_bytes(b"")
     assert find_logs(f"{tmp_path}/{{robot}}/{{night}}/*.parquet", None) == []
+
+
+def touch(path, content=b""):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(content)
+    return path
+
+
+@pytest.mark.parametrize("scheme", ["", "file://"])
+def test_patterns(tmp_path, scheme):
+    for name in ("r1/2026-03-02/a.parquet", "r1/2026-03-02/deep/er/b.parquet", "r2/c.parquet"):
+        touch(tmp_path / name, b"xyz")
+    touch(tmp_path / "r[3]" / "2026-03-01" / "1" / "a.parquet")
+
+    def found(pattern, robots=None):
+        logs = find_logs(f"{scheme}{tmp_path}/{pattern}", robots)
+        place = f"{scheme}{tmp_path}/"
+        assert all(log.path.startswith(place) and log.remote is bool(scheme) for log in logs)
+        return [(log.robot, log.night, log.path.removeprefix(place)) for log in logs]
+
+    a, b = "r1/2026-03-02/a.parquet", "r1/2026-03-02/deep/er/b.parquet"
+    odd = "r[3]/2026-03-01/1/a.parquet"
+    assert found("{robot}/{night}/*.parquet") == [("r1", "2026-03-02", a)]
+    assert found("{robot}/{night}/**/*.parquet") == [
+        *(("r1", "2026-03-02", a), ("r1", "2026-03-02", b), ("r[3]", "2026-03-01", odd))
+    ]
+    assert found("{robot}/{night}/**/*.parquet", ("r[3]", "r9")) == [("r[3]", "2026-03-01", odd)]
+    assert found("{robot}/?.parquet") == [("r2", None, "r2/c.parquet")]
+    assert found("{robot}/[!abd].parquet") == [("r2", None, "r2/c.parquet")]
+    assert found("{robot}/[ab].parquet") == []
+    # one baseline for several robots
+    assert found("r2/*.parquet", ("x", "w")) == [
+        *(("w", None, "r2/c.parquet"), ("x", None, "r2/c.parquet"))
+    ]
+    assert found("none/{robot}/*") == []
+    # the same name twice is the same robot twice
+    touch(tmp_path / "s" / "r1" / "r1-x.parquet")
+    touch(tmp_path / "s" / "r1" / "r2-x.parquet")
+    assert found("s/{robot}/{robot}-x.parquet") == [("r1", None, "s/r1/r1-x.parquet")]
+    size = {
+        log.path.rpartition("/")[2]: log.size
+        for log in find_logs(f"{scheme}{tmp_path}/{{robot}}/*.parquet", None)
+    }
+    assert size == {"c.parquet": 3}
+
+
+def test_an_address_that_cannot_be_listed_is_told():
+    with pytest.raises(InputError, match=r"cannot be listed .*; check address and credentials"):
+        find_logs("nothing://place/{robot}/*.parquet", None)
+
+
+def test_facts_of_a_recording_and_of_none(tmp_path):
+    path = tmp_path / "copy.parquet"
+    info = RunInfo(100.0, "R1", "pick", 50.0, 1.5, "2026-03-02T00:00:00Z")
+    save_run(path, info, {"axis1_a": np.zeros(10)})
+    log = LogFile("s3://place/a.parquet", "r1", None, 1, 2)
+    digest, facts = read_facts(log, path)
+    assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert facts == Facts("pick", 50.0, 1.5, 100.0, "2026-03-02T00:00:00Z")
+    assert Facts.from_json(facts.to_json()) == facts
+    assert Facts.of(RunInfo(100.0)) == Facts(sampling_rate_hz=100.0)
+    path.write_bytes(b"no run")
+    digest, facts = read_facts(log, path)
+    assert digest == hashlib.sha256(b"no run").hexdigest()
+    assert facts.error.startswith("s3://place/a.parquet: cannot be opened")
+    assert read_facts(log, tmp_path / "none")[1].error == (
+        "s3://place/a.parquet: cannot be read (No such file or directory)"
+    )
+
+
+def test_a_recording_is_fetched_once_and_whole(tmp_path):
+    path = touch(tmp_path / "a.parquet", b"one")
+    assert fetch(LogFile(str(path), "r", None, 3, 1), tmp_path / "to") == path
+    log = LogFile(f"file://{path}", "r", None, 3, 1)
+    copy = fetch(log, tmp_path / "to" / "deep")
+    assert copy == tmp_path / "to" / "deep" / copy_name(log)
+    assert copy.read_bytes() == b"one"
+    path.write_bytes(b"two")
+    assert fetch(log, copy.parent).read_bytes() == b"one"
+    # other bytes have another name
+    later = LogFile(log.path, "r", None, 3, 2)
+    assert fetch(later, copy.parent).read_bytes() == b"two"
+    path.unlink()
+    with pytest.raises(InputError, match=r"cannot be fetched .*; check address and credentials"):
+        fetch(LogFile(log.path, "r", None, 4, 2), copy.parent)
+    assert len(list(copy.parent.iterdir())) == 2
