@@ -83,3 +83,43 @@ def test_a_torque_that_passes_its_standstill_value_does_not_stay(hold):
         z[1100 : 1100 + n_stay] = z[0]
         start, _ = refine_boundaries(z, 1200, 2800, FS_HZ, 0.0)
         assert (start > 1090) is stays
+
+
+FOUND = {
+    (1.0, 0, 0.1): (0, 0, 2, 2, 39, -39, 2, 2),
+    (1.0, 0, 0.4): (0, 0, 95, -4, 40, -40, 40, -4),
+    (1.0, 0, 1.0): (105, -71, 126, -169, 40, -40, 40, -40),
+    (1.0, 940, 0.1): (7, 0, -2, -11, 40, -39, -2, -11),
+    (1.0, 940, 0.4): (6, 0, 2, -154, 40, -40, 2, -40),
+    (1.0, 940, 1.0): (4, -114, 116, -177, 33, -40, 40, -40),
+    (0.4, 0, 0.1): (0, 0, -1, 2, 40, -40, -1, 2),
+    (0.4, 0, 0.4): (1, 1, 109, -1, 1, 1, 5, -1),
+    (0.4, 0, 1.0): (100, -4, 140, -175, 40, -4, 40, -40),
+    (0.4, 940, 0.1): (9, 0, -2, 1, 40, -40, -3, 1),
+    (0.4, 940, 0.4): (7, -2, 0, -30, -1, -2, 0, -30),
+    (0.4, 940, 1.0): (4, -121, 125, -189, 3, -40, 40, -40),
+    (0.05, 0, 0.1): (-2, 3, -2, 3, -2, 3, -2, 3),
+    (0.05, 0, 0.4): (0, 1, 117, 0, 0, 1, 2, 0),
+    (0.05, 0, 1.0): (55, -2, 151, -179, 40, -2, 40, -40),
+    (0.05, 940, 0.1): (9, 2, -3, 2, -3, 2, -3, 2),
+    (0.05, 940, 0.4): (7, 0, 0, -3, -1, 0, 0, -3),
+    (0.05, 940, 1.0): (5, -118, 130, -200, 2, -40, 40, -40),
+}
+"""By current at rest, samples cut off before, and noise said to be in it: how late start and stop
+are found from two coarse starts and stops, in the vector and in one phase, samples."""
+
+
+@pytest.mark.parametrize(("hold", "cut", "noise_a"), FOUND)
+def test_boundaries_of_an_uneven_torque_to_the_sample(hold, cut, noise_a):
+    k = np.arange(N - cut)
+    # as uneven as noise, and the same on every machine
+    uneven = np.modf(k * 0.6180339887)[0] - 0.5 + 1j * (np.modf(k * 0.7548776662)[0] - 0.5)
+    z = vector(torque=1.0, hold=0.0)[cut:] * (2.0 + 0.8 * np.sin(k / 190)) + 0.02 * uneven
+    z += vector(torque=0.0, hold=hold)[cut:]
+    found = [
+        refine_boundaries(part(z), start - cut, stop - cut, FS_HZ, noise_a)
+        for start, stop in ((1200, 2800), (1040, 2960))
+        for part in (np.asarray, np.real)
+    ]
+    late = [(start + cut - BEGIN, stop + cut - END) for start, stop in found]
+    assert np.ravel(late) == pytest.approx(FOUND[hold, cut, noise_a], abs=1)

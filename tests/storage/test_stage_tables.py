@@ -1,12 +1,13 @@
 import json
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError
-from opamc_cli.storage.schemas.tables import PATTERNS, SEGMENTS
+from opamc_cli.storage.schemas.tables import MAY_BE_NULL, PATTERNS, SEGMENTS, TABLES
 from opamc_cli.storage.tables import (
     TABLE_KEY,
     read_table,
@@ -135,6 +136,63 @@ def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected
     assert expected in str(caught.value)
 
 
+EDGES = {
+    "axis": (1, 999),
+    **dict.fromkeys(("segment",), (0, 10**9)),
+    **dict.fromkeys(("cycle", "motion"), (-1, 10**9)),
+    "start": (0, 10**15),
+    "stop": (1, 10**15),
+    "sampling_rate_hz": (1e-9, 1e8),
+    "direction": (-1, 1),
+    "variance": (0, 1e15),
+    "f_max_hz": (0, 1e8),
+    "order": (2, 8),
+    "tau": (1, 10**9),
+    **dict.fromkeys(("n_patterns", "n_masked", "n_pool"), (0, 10**15)),
+    "base": (1, 1e15),
+    "jsd": (0, 1e3),
+    "ks": (0, 1),
+    **dict.fromkeys(("frames", "bins"), (0, 10**6)),
+    # of all others
+    "similarity": (-1e15, 1e15),
+}
+
+
+@pytest.mark.parametrize("name", EDGES)
+def test_values_of_a_column_lie_within_its_limits(tmp_path, name):
+    low, high = EDGES[name]
+    kind = next(schema.field(name).type for schema in TABLES.values() if name in schema.names)
+    schema = pa.schema([(name, kind)])
+    # as near as a number of the column's type comes
+    below, above = (
+        (low - 1, high + 1)
+        if pa.types.is_integer(kind)
+        else (np.nextafter(float(end), away) for end, away in ((low, -np.inf), (high, np.inf)))
+    )
+    for value, fits in ((low, True), (high, True), (below, False), (above, False)):
+        try:
+            table = pa.table({name: pa.array([value], kind)})
+        except pa.ArrowInvalid:
+            continue  # the type itself holds no more
+        path = write(tmp_path / "t.parquet", table)
+        if fits:
+            assert read_table(path, "segment", schema).num_rows == 1
+        else:
+            with pytest.raises(InputError, match=f"column {name} holds"):
+                read_table(path, "segment", schema)
+
+
+def test_an_order_of_a_line_is_any_number_and_an_unknown_number_none(tmp_path):
+    schema = pa.schema([("order", pa.float64())])
+    for value, fits in ((0.0, True), (1e15, True), (-0.1, False), (np.nan, True), (np.inf, False)):
+        path = write(tmp_path / "t.parquet", pa.table({"order": pa.array([value])}))
+        if fits:
+            read_table(path, "segment", schema)
+        else:
+            with pytest.raises(InputError, match="column order holds"):
+                read_table(path, "segment", schema)
+
+
 @pytest.mark.parametrize(("length", "fits"), [(6, True), (5, False), (24, False)])
 def test_counts_are_as_many_as_their_order_has_patterns(tmp_path, length, fits):
     row = dict.fromkeys(PATTERNS.names, 1) | {"run": "r", "signal": "phases", "order": 3}
@@ -177,3 +235,31 @@ def test_every_flipped_byte_is_noticed(tmp_path):
         except InputError:
             continue
         assert found.to_pylist() == TABLE.to_pylist(), f"byte {at} of {len(content)}"
+
+
+def test_what_may_be_unknown(tmp_path):
+    every = {name: schema.field(name) for schema in TABLES.values() for name in schema.names}
+    assert every.keys() >= MAY_BE_NULL
+    for name, field in every.items():
+        path = write(tmp_path / "t.parquet", pa.table({name: pa.array([None], field.type)}))
+        if name in [
+            "temperature_c",
+            "gamma",
+            "lda",
+            "jsd",
+            "chance",
+            "excess",
+            "delta_mu",
+            "delta_var",
+            "ks",
+        ]:
+            read_table(path, "segment", pa.schema([field]))
+        else:
+            with pytest.raises(InputError, match=f"column {name} is null in 1 of 1 rows"):
+                read_table(path, "segment", pa.schema([field]))
+
+
+def test_a_table_names_the_libraries_that_its_numbers_depend_on(tmp_path):
+    versions = record_at(write(tmp_path / "t.parquet"))["versions"]
+    assert set(versions) >= {"opamc", "python", "numpy", "pyarrow"}
+    assert all(version[0].isdigit() for version in versions.values())
