@@ -155,6 +155,9 @@ def test_a_model_survives_json_and_knows_what_it_was_trained_on():
     "damage",
     [
         {"version": 2},
+        {"kind": "another"},
+        {"centre": [1.0]},
+        {"feature_names": ["ks"]},
         {"weights": [1.0]},
         {"weights": [float("nan"), 0.0, 0.0]},
         {"classes": {}},
@@ -173,8 +176,49 @@ def test_a_damaged_model_is_refused(damage):
         ([[0.0], [1.0], [2.0]], [True, True, True]),
         ([[0.0], [1.0]], [True, False]),
         ([[0.0], [np.nan], [2.0]], [True, False, True]),
+        ([[0.0], [1.0], [2.0]], [True, False]),
+        ([0.0, 1.0, 2.0], [True, False, True]),
     ],
 )
 def test_rows_that_cannot_be_trained_on_are_refused(rows, labels):
     with pytest.raises(ValueError, match=r"rows"):
         fit(rows, labels)
+
+
+def test_shrinkage_is_its_definition():
+    """The variance of each correlation's estimate over its square, summed over pairs."""
+    rows = np.array([[1.0, 0.5, 0], [-2, -1.4, 0], [0.5, 1.2, 0], [0.5, -0.3, 0]])
+    divisor = 3
+    z = rows[:, :2] / np.sqrt((rows[:, :2] ** 2).sum(axis=0) / divisor)
+    products = z[:, 0] * z[:, 1]
+    variance = 4 / divisor**3 * ((products - products.mean()) ** 2).sum()
+    expected = variance / (4 / divisor * products.mean()) ** 2
+    assert 0 < expected < 1
+    assert correlation_shrinkage(rows, divisor) == pytest.approx(expected)
+    assert correlation_shrinkage(rows, 1) == 1.0
+    assert correlation_shrinkage(rows[:, :1], divisor) == 1.0
+
+
+def test_a_fit_by_hand():
+    # two features without correlation, of deviations 1 and 2, whose means differ by 3 and 4
+    rows = np.array([[1, 2], [-1, -2], [1, -2], [-1, 2]])
+    rows = np.concatenate([rows, rows + np.array([3, 4])]) * np.sqrt(6 / 8)
+    model = fit(rows, [0] * 4 + [1] * 4)
+    difference = np.sqrt(6 / 8) * np.array([3.0, 4.0])
+    length = np.hypot(difference[0], difference[1] / 2)
+    np.testing.assert_allclose(model.weights, difference / [1, 4] / length)
+    assert (model.mean_normal, model.mean_fault) == pytest.approx((-length / 2, length / 2))
+    np.testing.assert_allclose(model.centre, difference / 2)
+    # classes that do not differ have no direction
+    assert fit(np.zeros((4, 2)), [0, 0, 1, 1]).weights == (0.0, 0.0)
+    # a feature that never varies within a class has a millionth of its size for a deviation
+    still = fit([[1.0], [1.0], [3.0], [3.0]], [0, 0, 1, 1])
+    assert still.weights == pytest.approx((1 / 3e-6,))
+
+
+def test_a_twentieth_of_the_larger_bound_is_within_the_training():
+    rows = [features for features, _ in TABLE_5_3]
+    model = fit(rows, FAULT, conditions={"x": (-10.0, 2.0)})
+    for value, inside in ((-10.49, True), (-10.51, False), (2.49, True), (2.51, False)):
+        assert (model.outside_training({"x": value}) == []) is inside
+    assert model.outside_training({"x": -11.0}, tolerance=0.1) == []

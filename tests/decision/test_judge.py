@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from opamc_cli.decision.judge import Policy
+from opamc_cli.decision.judge import (
+    HEALTHY_SHIFT_SPREAD,
+    Bundle,
+    Policy,
+    Shift,
+    common_log_ratio,
+    one_session_log_ratio,
+    one_session_shift,
+)
+from opamc_cli.decision.judge import judge as decide
+from opamc_cli.decision.significance.spread import Spread, moderated_spread
 from tests.decision import known_fleet
 from tests.decision.fleet import Fleet, cells, judge
 from tests.marks import long
@@ -238,3 +248,54 @@ def test_verdicts_of_a_fleet_without_chance_to_the_digit(plan):
         n_baseline, n_target, _, _ = known_fleet.PLANS[plan]
         assert (found.n_baseline_sessions, found.n_target_sessions) == (n_baseline, n_target)
         assert (found.n_baseline_cycles, found.n_target_cycles) == (4 * n_baseline, 4 * n_target)
+
+
+def test_one_session_without_some_motions():
+    """Motions that either side lacks say nothing; without any nothing is known."""
+    whole = known_fleet.bundle(2, 1, 1, (), 0.0).cells
+    no_baseline = replace(whole[1], baseline=0 * whole[1].baseline)
+    no_target = replace(whole[1], target=0 * whole[1].target)
+    alone = one_session_log_ratio(whole[:1])
+    assert one_session_log_ratio([whole[0], no_baseline]) == alone
+    assert one_session_log_ratio([whole[0], no_target]) == alone
+    assert one_session_log_ratio(whole) != alone
+    assert np.isnan(one_session_log_ratio([no_baseline, no_target]))
+
+
+def test_cycles_are_counted_in_the_motion_that_has_most():
+    cells = known_fleet.bundle(2, 6, 1, (), 0.0).cells
+    fewer = replace(cells[1], cycles=cells[1].cycles[:20], target_cycles=cells[1].target_cycles[:3])
+    found = decide({1: Bundle([cells[0], fewer])})[1]
+    assert (found.n_baseline_cycles, found.n_target_cycles) == (24, 4)
+
+
+def test_what_siblings_have_in_common_is_that_of_the_middle_one():
+    def shifts(*ratios):
+        spreads = (0.1, 0.2, 0.1, 0.4, 0.1)
+        return {
+            k: Shift(r, 1.0, Spread(s, 5))
+            for k, (r, s) in enumerate(zip(ratios, spreads, strict=False))
+        }
+
+    # of two the lower one, as a ratio or in units of the spread, whichever is more
+    assert common_log_ratio(shifts(9.0, 2.0, 3.0), 0) == pytest.approx(2.0)
+    assert common_log_ratio(shifts(9.0, 2.0, 0.6), 0) == pytest.approx(0.6)
+    assert common_log_ratio(shifts(9.0, 2.0, 0.6), 1) == pytest.approx(1.2)
+    assert common_log_ratio(shifts(9.0, 2.0, 3.0), 0, largest=True) == 3.0
+    assert common_log_ratio(shifts(9.0, -2.0, -3.0), 0, largest=True) == 0.0
+    assert common_log_ratio(shifts(9.0, -2.0, -3.0), 0) == 0.0
+    assert common_log_ratio(shifts(9.0, 2.0), 0) == 0.0
+    assert common_log_ratio(shifts(9.0, 2.0, 3.0), 7) == 0.0
+
+
+def test_a_joint_among_its_siblings_of_one_session():
+    lone = one_session_shift({1: 0.7, 2: 0.1, 3: np.nan}, 1)
+    prior = HEALTHY_SHIFT_SPREAD
+    assert (lone.log_ratio, lone.unit) == (0.7, prior.scale)
+    assert lone.spread.scale == pytest.approx(prior.scale * np.sqrt(1 + 1 / 6))
+    # 0 stands for published joints beside the two siblings: median 0.1, deviations 0.1 and 0.2
+    beside = one_session_shift({1: 0.7, 2: 0.1, 3: 0.3}, 1)
+    assert beside.log_ratio == pytest.approx(0.6)
+    blended = moderated_spread((1.4826 * 0.1) ** 2, 0.37 * 2, prior)
+    assert beside.unit == blended.scale
+    assert beside.spread == Spread(pytest.approx(blended.scale * np.sqrt(1 + 1 / 3)), blended.dof)

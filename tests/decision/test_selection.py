@@ -23,13 +23,14 @@ def drawn(rng, n_motions=4, n_cycles=5, n=200, difference=1.0, n_patterns=24):
     return np.array([rng.multinomial(n, pmf[m]) for m in motion]), motion, cycle
 
 
-def test_it_is_what_its_definition_says():
-    counts, motion, cycle = drawn(np.random.default_rng(0))
+@pytest.mark.parametrize(("n_motions", "n_cycles"), [(4, 5), (2, 2)])
+def test_it_is_what_its_definition_says(n_motions, n_cycles):
+    counts, motion, cycle = drawn(np.random.default_rng(0), n_motions, n_cycles)
     gain = []
     for row, m, c in zip(counts, motion, cycle, strict=True):
         by_motion = {
             other: jensen_shannon(row, counts[(cycle != c) & (motion == other)].sum(axis=0))
-            for other in range(4)
+            for other in range(n_motions)
         }
         gain.append(min(v for k, v in by_motion.items() if k != m) - by_motion[m])
     expected = np.mean(gain) / np.std(gain, ddof=1)

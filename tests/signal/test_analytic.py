@@ -101,6 +101,16 @@ class TestStream:
         assert np.array_equal(z.real, x)
         assert np.abs(z - analytic_signal(x))[1024:-1024].max() < 0.01
 
+    @pytest.mark.parametrize(("f_min_hz", "half"), [(8.0, 1024), (7.9, 1038), (2000.0, 8)])
+    def test_it_is_a_filter_of_four_periods_of_the_lowest_carrier_either_way(self, f_min_hz, half):
+        x = self.carrier(5000).astype(float)
+        stream = AnalyticStream(FS_HZ, f_min_hz)
+        z = np.concatenate([stream.push(x), stream.finish()])
+        n = np.arange(-half, half + 1)
+        taps = np.divide(2, np.pi * n, out=np.zeros(n.size), where=n % 2 != 0)
+        filtered = np.convolve(np.pad(x, half, mode="reflect"), taps * np.blackman(n.size), "valid")
+        np.testing.assert_allclose(z.imag, filtered, atol=1e-5)
+
     def test_a_constant_has_no_imaginary_part(self):
         assert np.abs(self.whole(np.full(9000, 3.0, dtype=np.float32)).imag).max() < 1e-5
 

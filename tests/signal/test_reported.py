@@ -188,3 +188,17 @@ def test_a_current_takes_the_sign_of_the_speed_and_fades_at_rest():
     assert found[[0, 399]].tolist() == [2, -2]
     assert found[-4:] == pytest.approx([0, 1, -2, 2])
     assert signed_by_speed(np.ones(3), np.zeros(3)).tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("n", [10, 63, 64, 65, 200])
+def test_the_frequency_of_fluctuations_is_that_of_the_first_zero_of_their_autocorrelation(n):
+    t = np.arange(n)
+    x = np.sin(2 * np.pi * t / 40) + 0.3 * np.modf(t * 0.6180339887)[0] + 0.1 * t
+    plain = x - np.polyval(np.polyfit(t, x, 1), t)
+    lags = range(n // 2)
+    below = [k for k in lags if plain[: n - k] @ plain[k:] <= 0]
+    assert fluctuation_frequency(x, FS_HZ) == FS_HZ / (4 * (below[0] if below else n // 2))
+    # what is missing between known samples is bridged
+    x[3] = np.nan
+    bridged = np.where(t == 3, (x[2] + x[4]) / 2, x)
+    assert fluctuation_frequency(x, FS_HZ) == fluctuation_frequency(bridged, FS_HZ)

@@ -99,6 +99,6 @@ def test_a_sample_next_to_a_grid_point_is_taken_as_it_is():
 def test_the_cubic_is_used_between_half_and_one_and_a_half_periods():
     for step, cubic in ((0.51, True), (0.49, False), (1.49, True), (1.51, False)):
         times = 0.05 + np.cumsum([0.0, 1.0, 1.0, 1.0, step, 1.0, 1.0, 1.0])
-        found = on_grid(times, times**3, 3.0, 1.0, 2, 9.0)
+        found = on_grid(times / 50, times**3, 3.0 / 50, 50.0, 2, 9.0 / 50)
         # the step in question is one of the three between the four nearest samples
         assert np.isclose(found, [27, 64], rtol=1e-9).tolist() == [cubic] * 2
