@@ -43,3 +43,23 @@ def test_what_does_not_grow_has_no_forecast():
     assert nights_until(flat, 0.5) is None
     assert nights_until(flat, 0.01) == (0.0, 0.0)
     assert robust_slope(nights[: LEAST_NIGHTS - 1], nights[: LEAST_NIGHTS - 1]) is None
+
+
+def test_a_slope_and_its_interval_by_hand():
+    """Sen's interval of six nights: 15 slopes, and 9 of them either side of the middle."""
+    nights, values = np.arange(6.0), np.array([0.0, 1.0, 4.0, 9.0, 16.0, 25.0])
+    slopes = np.sort([a + b for a in range(6) for b in range(a)])
+    found = robust_slope(nights, values)
+    reach = 1.6449 * np.sqrt(6 * 5 * 17 / 18)
+    low, high = int((15 - reach) / 2), int(np.ceil((15 + reach) / 2))
+    assert (low, high) == (3, 12)
+    assert (found.per_night, found.low, found.high) == (5.0, slopes[low], slopes[high])
+    assert (found.middle, found.age) == (np.median(values - 5 * (nights - 2.5)), 2.5)
+    assert found.level == found.middle + 12.5
+    assert robust_slope(nights[:5], values[:5]) is None
+    # what does not grow for sure is no growth
+    still = robust_slope(nights, np.array([0.0, 0, 0, 0, 0, 1]))
+    assert still.low == 0
+    assert not still.clear
+    assert nights_until(still, 9.0) is None
+    assert nights_until(found, found.level) == (0.0, 0.0)

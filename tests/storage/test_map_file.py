@@ -75,3 +75,10 @@ def test_a_line_for_every_axis_that_the_file_has():
     # without a file: as for one axis that has all of them
     alone = for_axes(IngestMap.model_validate({"columns": lines}))
     assert set(alone.columns) == {"axis1_a", "axis1_position", "axis2_a"}
+
+
+def test_axes_end_where_the_file_has_no_channel_for_the_next_one():
+    lines = {"axis«n»_a": {"source": "i_«n»", "unit": "A"}}
+    listed = [Listed("i_1"), Listed("i_2"), Listed("i_4")]
+    found = for_axes(IngestMap.model_validate({"columns": lines}), lambda: listed).columns
+    assert list(found) == ["axis1_a", "axis2_a"]

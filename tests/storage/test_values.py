@@ -40,6 +40,9 @@ def test_a_turn_of_the_encoder_is_no_step_and_no_turn_is_missed():
     assert wraps({1: wrapped}, "rad")
     assert wraps({1: np.degrees(wrapped)}, "deg")
     assert not wraps({1: turns}, "rad")
+    # three quarters of a turn are one already, a twentieth more than one is none any more
+    for step, turn in ((0.74, False), (0.76, True), (1.04, True), (1.06, False)):
+        assert wraps({1: np.array([0.0, 0.0, step * 360.0])}, "deg") is turn
     assert not wraps({1: np.degrees(wrapped)}, "rad")
 
 
