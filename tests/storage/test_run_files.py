@@ -1,9 +1,4 @@
 import json
-import os
-import signal
-import subprocess
-import sys
-import time
 
 import numpy as np
 import pyarrow as pa
@@ -12,9 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.errors import InputError, LockedError, UsageError
-from opamc_cli.storage.files.atomic import ensure_directory, write_text
-from opamc_cli.storage.files.lock import output_lock
+from opamc_cli.errors import InputError
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, find_runs, save_run, write_run
 
 INFO = RunInfo(2048.0, "R1", "pick", 50.0, 1.0, "2022-10-26T08:17:21Z", "ab" * 32)
@@ -233,98 +226,6 @@ def test_empty_folders_and_missing_paths_are_refused(tmp_path):
         find_runs([tmp_path])
     with pytest.raises(InputError, match="no such file or folder"):
         find_runs([tmp_path / "x"])
-
-
-# -- whole or not there --------------------------------------------------------------------
-
-
-def test_a_failed_write_leaves_the_old_file(tmp_path):
-    path = tmp_path / "r.txt"
-    write_text(path, "old")
-    with pytest.raises(TypeError):
-        write_text(path, 5)  # type: ignore[arg-type]
-    assert path.read_text() == "old"
-    assert [p.name for p in tmp_path.iterdir()] == ["r.txt"]
-
-
-KILLED = """
-import signal, sys, time
-import numpy as np
-import pyarrow as pa
-from opamc_cli.storage.runs import RunInfo, write_run
-# a shell starts background jobs, and so what they start, with SIGINT ignored
-signal.signal(signal.SIGINT, signal.default_int_handler)
-schema = pa.schema([("axis1_a", pa.float32())])
-with write_run({path!r}, RunInfo(1.0), schema) as writer:
-    while True:
-        writer.write_table(pa.table({{"axis1_a": np.zeros(100_000, np.float32)}}))
-        print("written", flush=True)
-        time.sleep(0.01)
-"""
-
-
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_a_killed_writer_leaves_no_run(tmp_path, sent):
-    path = tmp_path / "r.parquet"
-    code = KILLED.format(path=str(path))
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
-    ) as writer:
-        assert writer.stdout is not None
-        assert writer.stdout.readline() == b"written\n"
-        writer.send_signal(sent)
-        writer.wait(timeout=30)
-    assert not path.exists()
-    with pytest.raises(InputError, match="holds no run"):
-        find_runs([tmp_path])
-
-
-def test_an_output_folder_that_is_a_file_is_refused(tmp_path):
-    file = tmp_path / "file"
-    file.touch()
-    for path in (file, file / "below"):
-        with pytest.raises(UsageError, match="cannot make this output folder"):
-            ensure_directory(path)
-    with pytest.raises(UsageError, match="choose another with --out"):
-        write_text(file / "r.txt", "x")
-
-
-def test_files_are_for_everybody_the_umask_lets_read(tmp_path):
-    before = os.umask(0o027)
-    try:
-        write_text(tmp_path / "r.txt", "x")
-    finally:
-        os.umask(before)
-    assert (tmp_path / "r.txt").stat().st_mode & 0o777 == 0o640
-
-
-# -- one writer per folder -----------------------------------------------------------------
-
-HOLDER = """
-import sys, time
-from pathlib import Path
-from opamc_cli.storage.files.lock import output_lock
-with output_lock(Path({folder!r})):
-    print("held", flush=True)
-    time.sleep(60)
-"""
-
-
-def test_a_folder_that_another_process_writes_to_is_refused(tmp_path):
-    code = HOLDER.format(folder=str(tmp_path))
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE) as holder:
-        assert holder.stdout is not None
-        assert holder.stdout.readline() == b"held\n"
-        with pytest.raises(LockedError, match="another opamc run is writing here"):
-            output_lock(tmp_path).__enter__()
-        holder.kill()
-        holder.wait()
-    # the kernel let go of it with the process, though the file is still there
-    deadline = time.monotonic() + 5
-    with output_lock(tmp_path):
-        assert time.monotonic() < deadline
-    with output_lock(tmp_path):
-        pass
 
 
 def test_blocks_are_bounded_whatever_the_row_groups(tmp_path):
