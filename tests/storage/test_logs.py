@@ -42,7 +42,7 @@ def touch(path, content=b""):
 
 @pytest.mark.parametrize("scheme", ["", "file://"])
 def test_patterns(tmp_path, scheme):
-    for name in ("r1/2026-03-02/a.parquet", "r1/2026-03-02/deep/er/b.parquet", "r2/c.parquet"):
+    for name in ("r1/2026-03-02/a.parquet", "r1/2026-03-02/deep/er/b.parquet", "r2/x.parquet"):
         touch(tmp_path / name, b"xyz")
     touch(tmp_path / "r[3]" / "2026-03-01" / "1" / "a.parquet")
 
@@ -59,12 +59,12 @@ def test_patterns(tmp_path, scheme):
         *(("r1", "2026-03-02", a), ("r1", "2026-03-02", b), ("r[3]", "2026-03-01", odd))
     ]
     assert found("{robot}/{night}/**/*.parquet", ("r[3]", "r9")) == [("r[3]", "2026-03-01", odd)]
-    assert found("{robot}/?.parquet") == [("r2", None, "r2/c.parquet")]
-    assert found("{robot}/[!abd].parquet") == [("r2", None, "r2/c.parquet")]
+    assert found("{robot}/?.parquet") == [("r2", None, "r2/x.parquet")]
+    assert found("{robot}/[!abd].parquet") == [("r2", None, "r2/x.parquet")]
     assert found("{robot}/[ab].parquet") == []
     # one baseline for several robots
     assert found("r2/*.parquet", ("x", "w")) == [
-        *(("w", None, "r2/c.parquet"), ("x", None, "r2/c.parquet"))
+        *(("w", None, "r2/x.parquet"), ("x", None, "r2/x.parquet"))
     ]
     assert found("none/{robot}/*") == []
     # the same name twice is the same robot twice
@@ -75,7 +75,7 @@ def test_patterns(tmp_path, scheme):
         log.path.rpartition("/")[2]: log.size
         for log in find_logs(f"{scheme}{tmp_path}/{{robot}}/*.parquet", None)
     }
-    assert size == {"c.parquet": 3}
+    assert size == {"x.parquet": 3}
 
 
 def test_an_address_that_cannot_be_listed_is_told():
