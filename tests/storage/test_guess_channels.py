@@ -44,6 +44,10 @@ def test_axes_of_another_name_are_added():
     axes, over = chosen("cur_1", "cur_2", "ext_cur_3", "ext2_cur_2", "target_cur_4")
     assert axes["current"] == {1: "cur_1", 2: "cur_2", 3: "ext_cur_3"}
     assert over["current"] == ("ext2_cur_#", "target_cur_#")
+    # below the first there is no axis
+    axes, over = chosen("cur_2", "cur_3", "ext_cur_1")
+    assert axes["current"] == {1: "cur_2", 2: "cur_3"}
+    assert over["current"] == ("ext_cur_#",)
 
 
 def test_a_torque_stands_for_a_current_that_was_not_measured():

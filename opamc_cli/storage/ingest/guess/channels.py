@@ -49,7 +49,8 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
         for group in groups_of_kind:
             own = _by_axis(group, lowest)
             # the same kind under another name, for axes that the first does not hold
-            if not by_axis or (group[0].measured and not own.keys() & by_axis.keys()):
+            fits = not by_axis or (group[0].measured and not own.keys() & by_axis.keys())
+            if own and fits:
                 by_axis.update(own)
                 taken.append(group[0].pattern)
         others = tuple(g[0].pattern for g in groups_of_kind if g[0].pattern not in taken)
@@ -95,4 +96,6 @@ def _by_axis(group: Sequence[Meant], lowest: int) -> dict[int, Meant]:
     if any(channel.number is None for channel in group):
         return dict(enumerate(group, start=1))
     first = 0 if group[0].index is not None else lowest
-    return {int(channel.number or 0) - first + 1: channel for channel in group}
+    axes = {int(channel.number or 0) - first + 1: channel for channel in group}
+    # what is numbered below the first current belongs to no axis
+    return {axis: channel for axis, channel in axes.items() if axis > 0}

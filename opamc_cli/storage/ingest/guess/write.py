@@ -120,7 +120,8 @@ def _look(path: Path) -> _Look:
             for c in [*chosen, *([time] if time else [])]
         }
     used = {channel.pattern for channel in [*chosen, *([time] if time else [])]}
-    unused = [re.sub(r"[0-9]+(?=[^0-9]*$)", "#", str(channel.name)) for channel in listed]
+    names = [channel.name for channel in listed if isinstance(channel.name, str)]
+    unused = [re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name) for name in names]
     rest = [name for name in dict.fromkeys(unused) if name not in used and "/" not in name[1:]]
     return _Look(path, layout, choices, time, values, rest)
 
