@@ -196,6 +196,7 @@ def test_shrinkage_is_its_definition():
     assert 0 < expected < 1
     assert correlation_shrinkage(rows, divisor) == pytest.approx(expected)
     assert correlation_shrinkage(rows, 1) == 1.0
+    assert correlation_shrinkage(rows[:, :2] + 9, 2) < 0.1
     assert correlation_shrinkage(rows[:, :1], divisor) == 1.0
 
 
@@ -214,6 +215,8 @@ def test_a_fit_by_hand():
     # a feature that never varies within a class has a millionth of its size for a deviation
     still = fit([[1.0], [1.0], [3.0], [3.0]], [0, 0, 1, 1])
     assert still.weights == pytest.approx((1 / 3e-6,))
+    small = fit([[0.1], [0.1], [0.3], [0.3]], [0, 0, 1, 1])
+    assert small.weights == pytest.approx((1 / 0.3e-6,))
 
 
 def test_a_twentieth_of_the_larger_bound_is_within_the_training():

@@ -123,3 +123,19 @@ def test_boundaries_of_an_uneven_torque_to_the_sample(hold, cut, noise_a):
     ]
     late = [(start + cut - BEGIN, stop + cut - END) for start, stop in found]
     assert np.ravel(late) == pytest.approx(FOUND[hold, cut, noise_a], abs=1)
+
+
+def test_a_current_that_still_rests_at_the_coarse_boundary_moves_none():
+    zero = np.zeros(N)
+    assert refine_boundaries(zero + 0j, 1200, 2800, FS_HZ, 0.0) == (1200, 2800)
+    # what comes after the boundary is not smoothed into the standstill before it
+    zero[1200:2800] = 1.0
+    assert refine_boundaries(zero, 1200, 2800, FS_HZ, 0.0) == (1200, 2800)
+
+
+def test_the_way_of_turning_is_that_of_the_tenth_of_a_second_after_the_coarse_boundary():
+    t = np.arange(N)
+    forth = np.where((t >= BEGIN) & (t < 1500), (t - BEGIN) / 1000 * 60.0, 0.0)
+    z = np.exp(2j * np.pi * np.cumsum(forth - 60.0 * (t >= 1500)) / FS_HZ)
+    start, _ = refine_boundaries(z, 1200, 2800, FS_HZ, 0.0)
+    assert abs(start - BEGIN) <= 1

@@ -173,3 +173,11 @@ def test_differences_below_a_fiftieth_are_no_period():
     assert period(series(rows, noise=0)) == 2
     assert period(series(rows[:1])) == 1
     assert period(series(rows[:3], noise=0)) == 1
+
+
+@pytest.mark.parametrize(("height", "n"), [(4, 8), (5, 1)])
+def test_differences_of_half_a_squared_spread_are_no_period(height, n):
+    """Logs that rise and fall by steps: one step squared is 0.67 or 0.44 of their variance."""
+    logs = [*range(height), *range(height, 0, -1)] * 3
+    rows = [(np.exp(x), 1.0, 314.0, 1, 0.3) for x in logs]
+    assert period(series(rows, noise=0)) == n

@@ -83,3 +83,8 @@ def test_the_offset_is_the_median_of_four_pieces_at_least() -> None:
     means = np.array([1 + 1j, 2 + 9j, 3 + 2j, 90 + 3j])
     assert turning_offset(means) == 2.5 + 2.5j
     assert turning_offset(means[:3]) == 0j
+
+
+def test_motions_of_two_samples_turn_too() -> None:
+    pair = np.array([1, np.exp(1.5j)])
+    assert mean_over_turns([pair] * 300) == pytest.approx(pair.mean())

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from opamc_cli.signal.motion import reported
 from opamc_cli.signal.motion.reported import (
+    _probe,
     find_joint_motions,
     fluctuation_frequency,
     lacks_sign,
@@ -202,3 +204,17 @@ def test_the_frequency_of_fluctuations_is_that_of_the_first_zero_of_their_autoco
     x[3] = np.nan
     bridged = np.where(t == 3, (x[2] + x[4]) / 2, x)
     assert fluctuation_frequency(x, FS_HZ) == fluctuation_frequency(bridged, FS_HZ)
+
+
+def test_the_speed_is_the_highest_but_a_hundredth_of_the_motion():
+    velocity = np.concatenate([np.zeros(300), np.arange(200) ** 2 / 40_000, np.zeros(300)])
+    (motion,) = found(velocity)
+    # the largest on one side, the threshold's on the other: each sample counts
+    assert motion.speed_rad_s == np.quantile(velocity[motion.start : motion.stop], 0.99)
+
+
+def test_a_long_series_is_probed_in_four_places(monkeypatch):
+    monkeypatch.setattr(reported, "PROBE", 40)
+    places = [*range(10), *range(30, 40), *range(60, 70), *range(90, 100)]
+    assert _probe(np.arange(100.0)).tolist() == places
+    assert _probe(np.arange(40.0)).tolist() == list(range(40))

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from opamc_cli.errors import InputError, UsageError
-from opamc_cli.storage.files.atomic import ensure_directory, write_text
+from opamc_cli.storage.files.atomic import atomic_path, ensure_directory, write_text
 from opamc_cli.storage.runs import find_runs
 
 
@@ -19,6 +19,13 @@ def test_a_failed_write_leaves_the_old_file(tmp_path):
         write_text(path, 5)  # type: ignore[arg-type]
     assert path.read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == ["r.txt"]
+
+
+def test_an_unfinished_file_is_hidden_and_a_part(tmp_path):
+    with atomic_path(tmp_path / "r.txt") as temporary:
+        assert temporary.parent == tmp_path
+        assert temporary.name.startswith(".r.txt.")
+        assert temporary.suffix == ".part"
 
 
 KILLED = """

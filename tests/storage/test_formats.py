@@ -1,5 +1,6 @@
 """Which format an ending tells."""
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -23,6 +24,12 @@ def test_endings(kind, tmp_path):
     for ending in ENDINGS[kind].split():
         assert format_by_ending(tmp_path / f"a.b.{ending}") == kind
     assert format_by_ending(Path("a.xlsx")) is format_by_ending(Path("gz")) is None
+
+
+def test_what_a_format_needs_is_an_extra_of_the_package():
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    extras = tomllib.loads(text)["project"]["optional-dependencies"]
+    assert {one.extra for one in FORMATS.values()} - {None} <= extras.keys()
 
 
 def test_a_folder_with_its_index_is_a_bag(tmp_path):

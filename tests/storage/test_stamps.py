@@ -7,7 +7,7 @@ import pytest
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.time import stamps
-from opamc_cli.storage.ingest.time.stamps import examine, resolution_s
+from opamc_cli.storage.ingest.time.stamps import _is_line, examine, resolution_s
 
 FILE = Path("r.csv")
 
@@ -194,3 +194,10 @@ def test_stamps_that_are_looked_at_in_pieces_tell_the_same(chunk, monkeypatch):
         assert found.account.even is expected.account.even
         assert found.sampling_rate_hz == expected.sampling_rate_hz
         assert found.account.jitter_s == pytest.approx(expected.account.jitter_s, abs=1e-12)
+
+
+@pytest.mark.parametrize(("spread", "line"), [(0.99, True), (1.01, False)])
+def test_a_line_is_as_wide_as_the_stamps_rounding(spread, line):
+    times = np.arange(100) * 0.7
+    times[50] += 0.3 * spread
+    assert _is_line(times, 0.7, 0.3) == line
