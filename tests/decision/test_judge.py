@@ -17,8 +17,9 @@ from opamc_cli.decision.judge import (
 )
 from opamc_cli.decision.judge import judge as decide
 from opamc_cli.decision.significance.spread import Spread, moderated_spread
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision import known_fleet
-from tests.decision.fleet import Fleet, cells, judge
+from tests.decision.fleet import Fleet, cells, judge, spectra
 from tests.marks import long
 
 SEEDS = range(40)
@@ -299,3 +300,15 @@ def test_a_joint_among_its_siblings_of_one_session():
     blended = moderated_spread((1.4826 * 0.1) ** 2, 0.37 * 2, prior)
     assert beside.unit == blended.scale
     assert beside.spread == Spread(pytest.approx(blended.scale * np.sqrt(1 + 1 / 3)), blended.dof)
+
+
+def test_a_robot_of_one_motion_is_judged():
+    found = judge(cells(Fleet(n_motions=1, severity=0.5), 0))
+    assert [axis for axis, one in found.items() if one.state != "healthy"] == [3]
+
+
+def test_the_patterns_are_a_witness_by_name_and_alone_for_two_sessions():
+    for n_baseline, names in ((3, ["patterns", "spectrum"]), (2, ["patterns"])):
+        plan = Fleet(n_baseline=n_baseline)
+        witness = SpectrumEvidence(spectra(plan, 0)[1], n_baseline)
+        assert list(Bundle(cells(plan, 0)[1], {"spectrum": witness}).evidence()) == names

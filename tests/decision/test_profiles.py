@@ -109,3 +109,9 @@ def test_groups_differ_by_their_definition(n_baseline, n_target, scatter):
     np.testing.assert_allclose(between_groups(sessions, labels), expected, rtol=1e-9, atol=1e-12)
     # two groups of one session each have no scatter to be judged by
     assert np.isnan(between_groups(sessions[[0, 2]], np.array([[False, True]]))).all()
+
+
+def test_sessions_that_agree_have_a_thousandth_for_a_scatter():
+    sessions = np.array([[0.0, 0.0], [0.0, 0.0], [0.0, 0.0], [0.002, 0.001]])
+    distance = between_groups(sessions, np.array([[False, False, False, True]]))
+    assert distance == pytest.approx([2.5 / (1 + 1 / 3)])

@@ -162,7 +162,7 @@ def _extrapolate(
 ) -> int:
     """Trace the turn back to zero: as t^2 (constant acceleration) or t^3 (constant jerk)."""
     clear = max(CLEAR_TURN_RAD, 4 * least)
-    below_clear = np.flatnonzero(turned[: max(coarse, 1)] < clear)
+    below_clear = np.flatnonzero(turned[:coarse] < clear)
     t_clear = int(below_clear[-1]) + 1 if below_clear.size else 0
     t_clear = min(t_clear, turned.size - 1)
     below_least = np.flatnonzero(turned[:t_clear] < least)
