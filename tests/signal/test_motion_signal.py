@@ -7,6 +7,7 @@ import ssqueezepy
 from opamc_cli.signal.motion.motion_signal import (
     MotionBand,
     MotionStream,
+    _ridge,
     _smooth_at_least,
     join_frames,
     motion_frames,
@@ -122,3 +123,12 @@ def test_short_recordings_have_a_frame_for_every_started_step(n):
 def test_a_band_that_is_none_is_refused():
     with pytest.raises(ValueError, match="f_min_hz"):
         scale_frequencies(100, 50, 8)
+
+
+def test_a_ridge_is_refined_between_two_known_neighbours_only():
+    columns = np.array([[0, 2, 1], [1, 2, 0], [1, 2, 1], [1, 4, 2], [4, 2, 1], [1, 2, 4]])
+    strength, position = np.zeros((2, len(columns)), dtype=np.float32)
+    _ridge(columns.T.astype(np.complex64), strength, position)
+    assert strength.tolist() == columns.max(axis=1).tolist()
+    # the parabola through logs 0, 2 and 1 has its peak a sixth above the middle
+    assert position == pytest.approx([1, 1, 1, 1 + 1 / 6, 0, 2])
