@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -45,10 +45,6 @@ class TimeDelay(Effect):
 
         The coefficients of the unshifted fit would not do: they have already bent to the delay.
         """
-        return stack(self.parts(track, parameters).sum(axis=1))
-
-    def parts(self, track: Track, parameters: Parameters) -> Floats:
-        """Shift each regressor of the model: one clock delays them all alike."""
         rows = track.open_samples
         columns = track.static_columns
         if not columns.shape[1] or rows is None:
@@ -56,15 +52,18 @@ class TimeDelay(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
+        # Nobody looks at the other samples of an averaged track.
+        wanted = np.ones(track.size, dtype=bool) if track.full is None else rows
         if parameters.get("filtered"):
             late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
-            shifted = block_mean(np.concatenate(late), full.bounds, factor)
+            shifted = block_mean(np.concatenate(late), full.bounds, factor)[wanted]
         else:
-            shifted = late_means(track.static_sums, full.bounds, samples, factor)
-        part = shifted[rows]
+            shifted = late_means(track.static_sums, full.bounds, samples, factor, wanted)
+        part = shifted if track.full is not None else shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        parts: Floats = (shifted - track.static_means) * coefficients
-        return parts
+        moved = np.zeros(track.size)
+        moved[wanted] = (shifted - track.static_means[wanted]) @ coefficients
+        return stack(moved)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
@@ -83,7 +82,11 @@ class TimeDelay(Effect):
 
 
 def late_means(
-    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
+    sums: Floats,
+    bounds: tuple[tuple[int, int], ...],
+    samples: float,
+    factor: int,
+    wanted: Bools,
 ) -> Floats:
     """Means of blocks of columns that come later, the first and the last values held.
 
@@ -98,27 +101,35 @@ def late_means(
         Delay; between samples, what a straight line between them gives.
     factor : int
         Samples per block.
+    wanted : bool array of shape (n // factor per recording,)
+        Blocks that somebody looks at.
 
     Returns
     -------
-    array of shape (n // factor per recording, k)
+    array of shape (wanted blocks, k)
     """
     sizes = np.array([stop - start for start, stop in bounds])
-    counts = sizes // factor + 1
-    firsts = np.concatenate([[0], np.cumsum(sizes + 1)[:-1]])
-    places = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    edges = factor * places - samples
-    size = np.repeat(sizes, counts)
+    blocks = sizes // factor
+    number = np.repeat(np.arange(sizes.size), blocks)
+    # Edge j of a recording is where its block j begins; the last one is where the last block ends.
+    begins = np.zeros(int(blocks.sum()) + sizes.size, dtype=bool)
+    begins[np.flatnonzero(wanted) + number[wanted]] = True
+    needed = np.flatnonzero(begins | np.concatenate([[False], begins[:-1]]))
+    counts = blocks + 1
+    recording = np.repeat(np.arange(sizes.size), counts)[needed]
+    edges = factor * (needed - (np.cumsum(counts) - counts)[recording]) - samples
+    size = sizes[recording]
     inside = np.clip(edges, 0.0, size)
     whole = np.minimum(inside.astype(np.int64), size - 1)
     share = (inside - whole)[:, None]
-    whole += np.repeat(firsts, counts)
-    at_edges = (1 - share) * sums[whole] + share * sums[whole + 1]
+    whole += (np.cumsum(sizes + 1) - sizes - 1)[recording]
+    at_edges = sums[whole]
+    steps = sums[whole + 1] - at_edges
+    at_edges += share * steps
     outside = np.flatnonzero((edges < 0) | (edges > size))
     # Before the beginning and after the end the nearest step goes on.
-    steps = sums[whole[outside] + 1] - sums[whole[outside]]
-    at_edges[outside] += (edges - inside)[outside, None] * steps
-    means: Floats = np.diff(at_edges, axis=0)[np.diff(places) > 0] / factor
+    at_edges[outside] += (edges - inside)[outside, None] * steps[outside]
+    means: Floats = np.diff(at_edges, axis=0)[begins[needed][:-1]] / factor
     return means
 
 

@@ -17,9 +17,9 @@ from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged_blocks, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
-COARSE_SAMPLES = 20_000
-COARSE_OF_LONG = 12_000
-"""Likewise of a long recording, of which a sample stands for all: every round costs as many."""
+COARSE_SAMPLES = 12_000
+"""Slow effects are searched on averages at 100 Hz, or finer, until there are so many moving ones:
+every round costs as many."""
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
@@ -187,16 +187,14 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     sealed = whole_groups(track, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
     opened = Session(grid, grid, 1, grouping, groups)
-    session = _session(cut(track, pieces), grouping, groups, COARSE_OF_LONG)
+    session = _session(cut(track, pieces), grouping, groups)
     return replace(session, opened=opened)
 
 
-def _session(
-    track: Track, grouping: Grouping, groups: tuple[int, ...], coarse_samples: int = COARSE_SAMPLES
-) -> Session:
+def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Session:
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
-    factor = max(min(by_rate, inside // coarse_samples), 1)
+    factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
     coarse_track = coarsen(track, factor)
     fine = _grid(track, groups, grouping.sealed)
     coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)

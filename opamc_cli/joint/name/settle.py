@@ -50,24 +50,22 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
         Its named effects with their ties.
     """
     for _ in range(MOST_ROUNDS):
-        named: list[Named] = []
-        changed: Chain | None = None
-        for place in range(best.added):
-            changed, found = _asked_again(best, place, pool, unnamed)
-            if changed is not None:
-                break
-            named += found
+        changes = (_asked_again(best, place, pool, unnamed) for place in range(best.added))
+        changed = next((chain for chain in changes if chain is not None), None)
         if changed is None and "unnamed" not in pool.without:
             changed = _one_for_several(best, unnamed)
         if changed is None:
-            return best, named
+            break
         best = changed
     named = []
-    for place in range(best.added):
-        term = best.terms[place]
+    for place, term in enumerate(best.terms):
         if not term.effect.unnamed:
             parent = without(best, place)
-            named.append(Named(_trial(parent, best, term, pool), (), ()))
+            # What an effect ties with is of interest once nothing changes any more.
+            others = trials(parent, pool) if changed is None else []
+            ties = ties_of(best, term.effect.name, others)
+            told = tuple(other.told for other in others)
+            named.append(Named(_trial(parent, best, term, pool), told, ties))
     return best, named
 
 
@@ -80,27 +78,22 @@ def worth_their_price(chain: Chain) -> Chain:
     return chain
 
 
-def _asked_again(
-    best: Chain, place: int, pool: Pool, unnamed: Pool
-) -> tuple[Chain | None, list[Named]]:
-    """Return a better chain without one effect, or with another in its place; else its ties."""
+def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | None:
+    """Return a better chain without one effect, or with another in its place; None if none is."""
     term = best.terms[place]
     parent = without(best, place)
     if parent.score <= best.score:
-        return parent, []
+        return parent
     if term.effect.unnamed:
-        return None, []
-    trial = _trial(parent, best, term, pool)
-    others = trials(parent, pool)
-    if trial.why_not is not None:
-        passing = [other.chain for other in others if other.why_not is None]
-        return min(passing, key=lambda chain: chain.score, default=parent), []
+        return None
+    if _trial(parent, best, term, pool).why_not is not None:
+        passing = [other.chain for other in trials(parent, pool) if other.why_not is None]
+        return min(passing, key=lambda chain: chain.score, default=parent)
     if "unnamed" not in pool.without:
         for rival in trials(parent, _slow(unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
-                return rival.chain, []
-    ties = ties_of(best, term.effect.name, others)
-    return None, [Named(trial, tuple(other.told for other in others), ties)]
+                return rival.chain
+    return None
 
 
 def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:
