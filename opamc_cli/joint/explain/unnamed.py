@@ -6,6 +6,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
+from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
@@ -91,7 +92,11 @@ class Response(Effect):
 
 
 class Shift(Effect):
-    """What a delay or a lag makes of the model: its rates of change."""
+    """What a delay or a lag makes of the model: its rates of change.
+
+    Of the model as it fits without: one that is fitted beside its own rates of change need not
+    settle.
+    """
 
     unnamed = True
     of_its_recordings = True
@@ -103,8 +108,13 @@ class Shift(Effect):
     static = False
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """First and second rate of change of the fitted current."""
-        first = np.gradient(track.model_a)
+        """First and second rate of change of the static terms' current."""
+        rows = track.open_samples
+        if rows is None:
+            return np.zeros((track.size, 2))
+        columns = track.static_means
+        part = columns[rows]
+        first = np.gradient(columns @ solve(part.T @ part, part.T @ track.current_a[rows]))
         return stack(first, np.gradient(first))
 
 
