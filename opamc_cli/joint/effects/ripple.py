@@ -21,9 +21,6 @@ velocity loop answers as if nothing moved; and the highest one as a share of the
 FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 """From which power of a line on, in units of white noise's: each of their columns must earn its
 keep. Every other filter, and every fourth, are the smaller forms."""
-MOST_ANSWERED = 90_000
-"""Above so many moving samples lines are left plain: a hundred regressors of a recording of ten
-minutes would take gigabytes and minutes."""
 MOST_EXPANDED = 2
 """Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5
@@ -74,7 +71,7 @@ class Ripple(Effect):
         if order > highest_order(track):
             # Its frequency is not the one that the samples show.
             return 0.0
-        if top_hz <= LOWEST_HZ or np.count_nonzero(track.moving) > MOST_ANSWERED:
+        if top_hz <= LOWEST_HZ:
             return 0.0
         turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)
         for least, density in FILTERS_PER_OCTAVE.items():

@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Track, excerpt
 
-MOST_SAMPLES = 100_000
+MOST_SAMPLES = 50_000
 """Of more moving samples evenly spread parts of the open groups stand for all: so many, times the
 share of the open ones. What is shorter is then never dearer."""
 
@@ -40,7 +40,7 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     Returns
     -------
     list of (int, int)
-        Half-open pieces with some 100 000 moving samples times the open groups' share; more
+        Half-open pieces with some 50 000 moving samples times the open groups' share; more
         where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
