@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.noise.spectra import highest_order, order_lines, order_resolution
@@ -97,15 +97,20 @@ class Ripple(Effect):
         """Pairs of cosine and sine; those that follow the model come last."""
         angle = parameters["order"] * track.machine_angle_rad
         waves = [np.cos(angle), np.sin(angle)]
-        pairs = [*waves]
-        if parameters.get("speed"):
-            scale = np.abs(track.velocity) / track.speed_scale - 0.5
-            pairs += [scale * wave for wave in waves]
+        scale = np.abs(track.velocity) / track.speed_scale - 0.5
+        swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
         answers = drive_answers(track, waves, parameters) if parameters.get("answer") else []
-        pairs += answers
-        if parameters.get("direction"):
-            pairs += [track.direction * column for column in (*waves, *answers)]
-        return stack(*pairs, *_following_model(waves, track, parameters))
+        turned = 2 + len(answers) if parameters.get("direction") else 0
+        following = _following_model(waves, track, parameters)
+        pairs = (*waves, *swelling, *answers)
+        # A hundred columns: each is written once, where it stays.
+        columns = np.empty((len(pairs) + turned + len(following), track.size))
+        for row, column in zip(columns, pairs, strict=False):
+            row[:] = column
+        for row, column in zip(columns[len(pairs) :], (*waves, *answers)[:turned], strict=False):
+            np.multiply(track.direction, column, out=row)
+        columns[len(pairs) + turned :] = following or 0.0
+        return columns.T
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Without the dependences that the data do not ask for."""

@@ -80,7 +80,6 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     recordings, unit = recordings_of(runs, axis)
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
-    _check_motion(recordings, joint, axis, named)
 
     def on(session: Session) -> Declared:
         for effect, _ in declared:
@@ -96,8 +95,7 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
 
     fit = best_fit(recordings, joint, on)
     if fit is None:
-        msg = f"{named}: axis {axis} moves too little to seal a part off; record more motion"
-        raise NotEnoughDataError(msg)
+        raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
     return AxisModel(axis, fit, declared, allowed, unit)
 
@@ -148,18 +146,19 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str]
     return recordings, units.pop()
 
 
-def _check_motion(recordings: list[Recording], joint: Joint, axis: int, named: str) -> None:
-    track, grouping = grouped_track(recordings, joint)
+def _too_little_motion(
+    recordings: list[Recording], joint: Joint, axis: int, named: str
+) -> NotEnoughDataError:
+    track, _ = grouped_track(recordings, joint)
     if not is_moving(track):
         msg = (
             f"{named}: axis {axis} does not move (travel {np.ptp(track.position_rad):.2g} rad); "
             "give runs in which it does"
         )
-        raise NotEnoughDataError(msg)
-    if grouping is None:
-        moving = np.count_nonzero(track.moving) / track.rate_hz
-        msg = (
-            f"{named}: axis {axis} moves for {moving:.2g} s in all, too little to seal a part off; "
-            "record at least two cycles, or 3 s of motion"
-        )
-        raise NotEnoughDataError(msg)
+        return NotEnoughDataError(msg)
+    moving = np.count_nonzero(track.moving) / track.rate_hz
+    msg = (
+        f"{named}: axis {axis} moves for {moving:.2g} s in all, too little to seal a part off; "
+        "record at least two cycles, or 3 s of motion"
+    )
+    return NotEnoughDataError(msg)
