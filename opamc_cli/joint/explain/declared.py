@@ -7,8 +7,8 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import Fit, Session, Term, fit_terms, open_session
-from opamc_cli.joint.motion.kinematics import Recording, build_track, smoothings
-from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
+from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
@@ -50,22 +50,41 @@ def best_fit(
     track, grouping = grouped_track(recordings, joint)
     if grouping is None or not is_moving(track):
         return None
-
-    def fitted(track: Track) -> tuple[float, Fit]:
+    session = open_session(track, grouping)
+    model = declared(session)
+    ways = [] if "windows" in without_rules else smoothings(recordings)
+    smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
+    if smoothing is not None:
+        track = _judged_alike(build_track(recordings, joint, smoothing), track)
         session = open_session(track, grouping)
-        fit = declared_fit(session, declared(session))
-        parts = fit.sums.parts
-        samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
-        return float(fit.sums.held_out()[parts.judged].sum()) / max(samples, 1), fit
+    return declared_fit(session, model)
 
-    error, best = fitted(track)
-    for smoothing in () if "windows" in without_rules else smoothings(recordings):
-        other = build_track(recordings, joint, smoothing)
-        # All are judged by the same samples: where the first takes nothing from the acceleration.
-        found, fit = fitted(replace(other, **{name: getattr(track, name) for name in JUDGED}))
+
+def _best_of(
+    ways: list[Smoothing], recordings: list[Recording], joint: Joint, model: Declared
+) -> Smoothing | None:
+    """Return the way to differentiate that predicts best; None for what the noise asks for."""
+    track, grouping = grouped_track(recordings, joint)
+    if grouping is None:
+        return None
+
+    def held_out(track: Track) -> float:
+        sums = declared_fit(open_session(track, grouping), model).sums
+        parts = sums.parts
+        samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
+        return float(sums.held_out()[parts.judged].sum()) / max(samples, 1)
+
+    error, best = held_out(track), None
+    for smoothing in ways:
+        found = held_out(_judged_alike(build_track(recordings, joint, smoothing), track))
         if found < BETTER * error:
-            error, best = found, fit
+            error, best = found, smoothing
     return best
+
+
+def _judged_alike(other: Track, track: Track) -> Track:
+    """Judge both by the same samples: where the first takes nothing from the acceleration."""
+    return replace(other, **{name: getattr(track, name) for name in JUDGED})
 
 
 def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:

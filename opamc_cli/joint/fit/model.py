@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.fit.parts import Parts, Sums, parts_of
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
-from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned, whole_groups
+from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
@@ -93,7 +93,7 @@ class Session:
     fit_groups: tuple[int, ...]
     """Groups that may be looked at before the end."""
     opened: "Session | None" = None
-    """The same open samples with all sealed groups beside them, where `fine` has none."""
+    """The same open samples with some of every sealed group beside them, where `fine` has none."""
     cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
     """Regressors and products that fits share."""
 
@@ -184,7 +184,7 @@ def open_session(track: Track, grouping: Grouping) -> Session:
     if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
         return _session(track, grouping, groups)
     pieces = thinned(track, grouping, groups)
-    sealed = whole_groups(track, grouping.sealed)
+    sealed = thinned(track, grouping, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
     opened = Session(grid, grid, 1, grouping, groups)
     session = _session(cut(track, pieces), grouping, groups)
@@ -290,7 +290,7 @@ class Fit:
         """The same fit with the sealed samples beside the open ones: itself, if they are there.
 
         Of a long recording the fine grid holds a sample of the open groups alone; the terms are
-        fitted once more, to the same samples, where all sealed groups can be predicted.
+        fitted once more, to the same samples, where some of every sealed group can be predicted.
         """
         session = self.session.opened
         if session is None:

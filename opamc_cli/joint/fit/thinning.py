@@ -1,4 +1,4 @@
-"""A long recording's open groups by a sample of them: a track of its own, of bounded size."""
+"""A long recording's groups by a sample of them: a track of its own, of bounded size."""
 
 from collections.abc import Sequence
 
@@ -8,8 +8,8 @@ from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Track, excerpt
 
 MOST_SAMPLES = 50_000
-"""Of more moving samples evenly spread parts of the open groups stand for all: so many, times the
-share of the open ones. What is shorter is then never dearer."""
+"""Of more moving samples evenly spread parts stand for all, of the open groups and of the sealed
+ones alike. What is shorter is then never dearer."""
 
 FEWEST_GROUPS = 12
 """What happens at some time is consistent over groups only if there are some on both sides."""
@@ -24,7 +24,7 @@ Pieces = list[tuple[int, int]]
 
 
 def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
-    """Let a sample of the open groups stand for all of a long recording.
+    """Let a sample of some groups stand for all of them in a long recording.
 
     Parameters
     ----------
@@ -35,12 +35,12 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
         the first and the last part is taken, so that whatever changes at some time is seen on
         its own side of a sealed neighbour.
     groups : sequence of int
-        The open ones, in time order.
+        The open ones, or the sealed ones, in time order.
 
     Returns
     -------
     list of (int, int)
-        Half-open pieces with some 50 000 moving samples times the open groups' share; more
+        Half-open pieces with some 50 000 moving samples times these groups' share; more
         where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
@@ -59,15 +59,6 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
         else:
             pieces.append((int(rows[0]), int(rows[half - 1]) + 1))
             pieces.append((int(rows[-half]), int(rows[-1]) + 1))
-    return pieces
-
-
-def whole_groups(track: Track, groups: Sequence[int]) -> Pieces:
-    """Find the pieces of a track that groups take."""
-    pieces = []
-    for group in groups:
-        rows = np.flatnonzero(track.group == group)
-        pieces.append((int(rows[0]), int(rows[-1]) + 1))
     return pieces
 
 

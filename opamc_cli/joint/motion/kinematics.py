@@ -64,6 +64,21 @@ class Recording:
                 return int(values.shape[0])
         return 0
 
+    def cut(self, span: slice) -> "Recording":
+        """Return a part of its samples."""
+
+        def part(values: Floats | None) -> Floats | None:
+            return None if values is None else values[span]
+
+        return replace(
+            self,
+            current_a=part(self.current_a),
+            phases_a=part(self.phases_a),
+            position_rad=part(self.position_rad),
+            velocity_rad_s=part(self.velocity_rad_s),
+            temperature_c=part(self.temperature_c),
+        )
+
 
 WINDOWS_S = (0.01, 0.02, 0.05, 0.12)
 """Windows that compete with the one that the noise of the path asks for: where the drive itself

@@ -11,6 +11,8 @@ from opamc_cli.joint.motion.track import Joint, Track
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
 SHORTEST_PATH = 3.0
+ENOUGH_SAMPLES = 200_000
+"""Of a logged motion, by which the way to differentiate is chosen: all of 100 s at 2 kHz."""
 
 
 def grouped_track(
@@ -44,6 +46,34 @@ def grouped_track(
     track = replace(track, period_samples=period, channels=channels)
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:
+    """Enough of long recordings to choose by how they are differentiated, from the first motion on.
+
+    Parameters
+    ----------
+    recordings : list of Recording
+        In time order.
+    track : Track
+        All of them.
+
+    Returns
+    -------
+    list of Recording
+        Whole ones, evenly picked, and the beginning of one that is too long by itself.
+    """
+    count = min(max(len(recordings) * ENOUGH_SAMPLES // track.size, 1), len(recordings))
+    picks = np.linspace(0, len(recordings) - 1, count).round().astype(int)
+    found = []
+    for pick in picks:
+        start, stop = track.bounds[pick]
+        first = max(int(np.argmax(track.moving[start:stop])) - 1, 0)
+        span = (
+            slice(first, first + ENOUGH_SAMPLES) if stop - start > ENOUGH_SAMPLES else slice(None)
+        )
+        found.append(recordings[pick].cut(span))
+    return found
 
 
 def _revisits(track: Track) -> bool:

@@ -10,9 +10,9 @@ from opamc_cli.joint.fit.model import Session, Term
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Beside
 
-TRIALS_OF_ONE = 10
+TRIALS_OF_ONE = 7
 TRIALS_OF_MORE = 30
-"""Golden sections of a step to a hundredth of it; a simplex settles to about as much."""
+"""Parabolas settle a step to a hundredth of it; so does a simplex."""
 LOGARITHMIC = 5.0
 """Ratio of a parameter's limits from which on it is refined as a logarithm."""
 
