@@ -17,7 +17,7 @@ from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged_blocks, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
-COARSE_SAMPLES = 12_000
+COARSE_SAMPLES = 16_000
 """Slow effects are searched on averages at 100 Hz, or finer, until there are so many moving ones:
 every round costs as many."""
 MOST_ROUNDS = 12
