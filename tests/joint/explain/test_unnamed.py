@@ -7,10 +7,12 @@ import pytest
 from closing import joint_of, plain_fit
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulator import simulate
 
 from opamc_cli.joint.explain.saturated import ceiling, saturated, unnamed_library
 from opamc_cli.joint.explain.unnamed import SMOOTH, stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
+from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool
 
@@ -85,3 +87,16 @@ def test_the_ceiling_of_one_function_is_the_fall_of_the_sealed_error():
     # What predicts the sealed data worse is no ceiling.
     assert ceiling(after, before).share == 0.0
     assert ceiling(before, before).standard_error == 0.0
+
+
+def test_a_model_beside_its_own_rates_of_change_settles_at_once():
+    # Late by 15 times the noise, which it did not do when the last fit was shifted.
+    made = simulate(6, ("time_delay",), 15.0, rate=500.0, cycles=6)
+    before = plain_fit(
+        Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
+    )
+    terms = (*before.terms, Term(unnamed_library()["unnamed_shift"], {}))
+    after = fit_terms(before.session, terms)
+    assert after.rmse(sealed=False) < 0.75 * before.rmse(sealed=False)
+    again = fit_terms(after.session, terms)
+    assert again.rmse(sealed=False) == pytest.approx(after.rmse(sealed=False), rel=1e-9)

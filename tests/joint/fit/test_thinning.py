@@ -63,6 +63,8 @@ def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
         assert part[-1] == whole[-1]
     outside = fine.track.group == -1
     assert not (fine.fit & outside).any()
+    sealed = session.opened.fine.sealed
+    assert np.count_nonzero(sealed) == pytest.approx(LIMIT * 0.25, rel=0.02)
     # What comes before a piece lets the effects with a memory settle.
     for start, stop in fine.track.bounds[1:]:
         held = np.flatnonzero(fine.track.group[start:stop] >= 0)
