@@ -75,8 +75,8 @@ class Trial:
     def oracle_share(self) -> float:
         """Fall of the sealed error, as a share of the fall for who knows the effect's shape."""
         loop = self.loop
-        session = loop.before.opened.session
-        track, grid = session.fine.track, session.fine
+        dataset = loop.before.opened.dataset
+        track, grid = dataset.fine.track, dataset.fine
         known = self.simulated.effect
         declared = [term.columns(track) for term in loop.before.terms]
         design = np.concatenate([*declared, known[:, None]], axis=1)

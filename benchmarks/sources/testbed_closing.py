@@ -79,7 +79,7 @@ def declared_on_testbed(
     )
     library = built_in_library()
     terms = tuple((library[name], None) for name in DECLARED if name not in names)
-    fitted = best_fit([recording], joint, lambda session: terms)
+    fitted = best_fit([recording], joint, lambda dataset: terms)
     assert fitted is not None
     return fitted
 
@@ -97,7 +97,7 @@ def error_on(healthy_a: Floats, loop: Loop) -> float:
 
     Which samples corners of the motion spoil depends on the noise of the current.
     """
-    sealed = loop.after.session.sharp.sealed
+    sealed = loop.after.dataset.sharp.sealed
     return float(np.sqrt(np.mean(healthy_a[sealed] ** 2)))
 
 

@@ -138,10 +138,10 @@ def close_loop(
     Loop
     """
     start = chain_of(before, 0)
-    session = before.session
-    unnamed = Pool.of(session, unnamed_library(), without=without_rules)
+    dataset = before.dataset
+    unnamed = Pool.of(dataset, unnamed_library(), without=without_rules)
     explained = saturated(start, unnamed)
-    pool = Pool.of(session, library, without=without_rules)
+    pool = Pool.of(dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     # Beside a function without a name an effect may no longer be worth its price.
@@ -180,7 +180,7 @@ def _steps(
     by_term = {id(one.term): one for one in named}
     steps: list[Step] = []
     chain = start
-    track = final.fit.session.fine.track
+    track = final.fit.dataset.fine.track
     first = len(final.fit.terms) - final.added
     for place, term in enumerate(final.terms):
         following = extended(chain, term)
@@ -242,7 +242,7 @@ def _opened(
         left = without_name or [step for step in steps if step.approximate]
         unexplained = [term.effect.domain for term in explained.terms if term.effect.unnamed]
         domain = left[0].term.effect.domain if left else next(iter(unexplained), None)
-    track = after.session.fine.track
+    track = after.dataset.fine.track
     return Loop(
         before=before,
         after=after,
@@ -257,7 +257,7 @@ def _opened(
         r2_before=_r2(before),
         r2_after=_r2(after),
         floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
-        noise_a=measurement_noise(after.residual_a[after.session.sharp.fit]),
+        noise_a=measurement_noise(after.residual_a[after.dataset.sharp.fit]),
         explained_share=float(np.clip(reached, 0.0, 1.0)),
         remaining_domain=domain,
         orders_note=(
@@ -294,14 +294,14 @@ def _rejected(
 
 def untestable(before: Fit, library: Library) -> tuple[Untestable, ...]:
     """List the effects that the recordings cannot show."""
-    track = before.session.fine.track
+    track = before.dataset.fine.track
     reasons = ((name, effect.untestable(track)) for name, effect in library.items())
     return tuple(Untestable(name, why) for name, why in reasons if why is not None)
 
 
 def _r2(fitted: Fit) -> float:
     opened = fitted.opened
-    grid = opened.session.sharp
+    grid = opened.dataset.sharp
     current = grid.track.current_a[grid.sealed]
     power = float(np.sum((current - current.mean()) ** 2))
     rest = float(np.sum(opened.residual_a[grid.sealed] ** 2))

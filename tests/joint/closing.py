@@ -5,7 +5,7 @@ from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import best_fit
-from opamc_cli.joint.fit.model import Term, fit_terms, open_session
+from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track
@@ -34,14 +34,14 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
 def fit_declared(recordings, joint=None, base=DECLARED):
     library = built_in_library()
     terms = tuple((library[name], None) for name in base)
-    return best_fit(recordings, joint or Joint(), lambda session: terms)
+    return best_fit(recordings, joint or Joint(), lambda dataset: terms)
 
 
 def plain_fit(recording, base=DECLARED):
     """Fit the declared model to a motion differentiated as its own noise asks for."""
     track, grouping = grouped_track([recording], Joint())
     library = built_in_library()
-    return fit_terms(open_session(track, grouping), tuple(Term(library[name], {}) for name in base))
+    return fit_terms(dataset_of(track, grouping), tuple(Term(library[name], {}) for name in base))
 
 
 MODEL = {"coulomb": 0.5, "viscous": 0.3}

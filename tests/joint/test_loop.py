@@ -217,7 +217,7 @@ LEAK = pytest.mark.xfail(
 def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):
     recording = joint_of(motion, SHAPES["stribeck"], strength=3.0)
     known = close(recording)
-    grid = known.before.session.fine
+    grid = known.before.dataset.fine
     window = np.ones(1 + 2 * round(margin * grid.track.rate_hz))
     near = np.convolve(grid.fit, window, mode="same") > 0.5
     sealed = np.flatnonzero(grid.sealed & ~near)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.fit.model import Fit, Session, Term, fit_terms, open_session
+from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
@@ -26,7 +26,7 @@ Declared = tuple[tuple[Effect, Term | None], ...]
 def best_fit(
     recordings: list[Recording],
     joint: Joint,
-    declared: Callable[[Session], Declared],
+    declared: Callable[[Dataset], Declared],
     without_rules: Collection[str] = (),
 ) -> Fit | None:
     """Fit a declared model to recordings, differentiated in the way that predicts best.
@@ -38,7 +38,7 @@ def best_fit(
     joint : Joint
         Gear ratio and pole pairs, where known.
     declared : callable
-        Gives the model on a session.
+        Gives the model on a dataset.
     without_rules : collection of str
         Rules to switch off: "windows".
 
@@ -50,14 +50,14 @@ def best_fit(
     track, grouping = grouped_track(recordings, joint)
     if grouping is None or not is_moving(track):
         return None
-    session = open_session(track, grouping)
-    model = declared(session)
+    dataset = dataset_of(track, grouping)
+    model = declared(dataset)
     ways = [] if "windows" in without_rules else smoothings(recordings)
     smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
     if smoothing is not None:
         track = _judged_alike(build_track(recordings, joint, smoothing), track)
-        session = open_session(track, grouping)
-    return declared_fit(session, model)
+        dataset = dataset_of(track, grouping)
+    return declared_fit(dataset, model)
 
 
 def _best_of(
@@ -69,7 +69,7 @@ def _best_of(
         return None
 
     def held_out(track: Track) -> float:
-        sums = declared_fit(open_session(track, grouping), model).sums
+        sums = declared_fit(dataset_of(track, grouping), model).sums
         parts = sums.parts
         samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
         return float(sums.held_out()[parts.judged].sum()) / max(samples, 1)
@@ -87,12 +87,12 @@ def _judged_alike(other: Track, track: Track) -> Track:
     return replace(other, **{name: getattr(track, name) for name in JUDGED})
 
 
-def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
+def declared_fit(dataset: Dataset, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
     """Fit a declared model; non-linear parameters that are not given are searched first.
 
     Parameters
     ----------
-    session : Session
+    dataset : Dataset
         Recordings.
     declared : tuple of (Effect, Term or None)
         Effects with their terms where parameters are given.
@@ -108,20 +108,20 @@ def declared_fit(session: Session, declared: tuple[tuple[Effect, Term | None], .
         if term is not None:
             terms[place] = term
             continue
-        track = session.coarse.track
+        track = dataset.coarse.track
         fixed = not effect.limits(track) and not effect.several
         guesses = effect.guesses(track, np.zeros(track.size)) if fixed else []
         if len(guesses) == 1:
             terms[place] = Term(effect, guesses[0])
         else:
             open_places.append(place)
-    fitted = fit_terms(session, tuple(terms[place] for place in sorted(terms)))
+    fitted = fit_terms(dataset, tuple(terms[place] for place in sorted(terms)))
     for place in open_places:
         effect = declared[place][0]
         chain = chain_of(fitted, 0)
-        found = candidates(chain, Pool.of(session, {effect.name: effect}), every=True)
+        found = candidates(chain, Pool.of(dataset, {effect.name: effect}), every=True)
         if not found:
             continue
         terms[place] = found[0].term
-        fitted = fit_terms(fitted.session, tuple(terms[key] for key in sorted(terms)))
+        fitted = fit_terms(fitted.dataset, tuple(terms[key] for key in sorted(terms)))
     return fitted

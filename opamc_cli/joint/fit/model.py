@@ -80,7 +80,7 @@ class Grid:
 
 
 @dataclass(frozen=True)
-class Session:
+class Dataset:
     """Everything the loop works on: the fine and the coarse grid of the same recordings."""
 
     fine: Grid
@@ -92,7 +92,7 @@ class Session:
     """"""
     fit_groups: tuple[int, ...]
     """Groups that may be looked at before the end."""
-    opened: "Session | None" = None
+    opened: "Dataset | None" = None
     """The same open samples with some of every sealed group beside them, where `fine` has none."""
     cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
     """Regressors and products that fits share."""
@@ -154,7 +154,7 @@ class Session:
         """Return the grid on which fast effects are searched, or the coarse one."""
         return self.sharp if fine else self.coarse
 
-    def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Session":
+    def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Dataset":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
         fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
         if self.coarse is self.fine:
@@ -163,7 +163,7 @@ class Session:
         return replace(self, fine=fine, coarse=coarse)
 
 
-def open_session(track: Track, grouping: Grouping) -> Session:
+def dataset_of(track: Track, grouping: Grouping) -> Dataset:
     """Arrange a track for the loop.
 
     Parameters
@@ -175,23 +175,23 @@ def open_session(track: Track, grouping: Grouping) -> Session:
 
     Returns
     -------
-    Session
+    Dataset
     """
     track = replace(track, group=grouping.group)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
     groups = tuple(g for g in range(len(grouping.names)) if g not in grouping.sealed)
     if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
-        return _session(track, grouping, groups)
+        return _dataset(track, grouping, groups)
     pieces = thinned(track, grouping, groups)
     sealed = thinned(track, grouping, grouping.sealed)
     grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
-    opened = Session(grid, grid, 1, grouping, groups)
-    session = _session(cut(track, pieces), grouping, groups)
-    return replace(session, opened=opened)
+    opened = Dataset(grid, grid, 1, grouping, groups)
+    dataset = _dataset(cut(track, pieces), grouping, groups)
+    return replace(dataset, opened=opened)
 
 
-def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Session:
+def _dataset(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Dataset:
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
     factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
@@ -203,7 +203,7 @@ def _session(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Sessi
         sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
         touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
         coarse = _grid(replace(coarse_track, moving=coarse_track.moving & ~touched), groups, ())
-    return Session(fine, coarse, factor, grouping, groups)
+    return Dataset(fine, coarse, factor, grouping, groups)
 
 
 def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
@@ -225,7 +225,7 @@ class Fit:
     """What was fitted."""
     coefficients: tuple[Floats, ...]
     """One array per term."""
-    session: Session
+    dataset: Dataset
     """With the fitted load and model currents."""
     residual_a: Floats
     """Current less model on the whole fine grid (it means something where samples move); (n,)."""
@@ -239,9 +239,9 @@ class Fit:
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
         """
-        session = self.session
-        blocks = [session.columns(term, fine=False) for term in self.terms]
-        sums = session.sums_of(blocks, fine=False)
+        dataset = self.dataset
+        blocks = [dataset.columns(term, fine=False) for term in self.terms]
+        sums = dataset.sums_of(blocks, fine=False)
         widths = np.cumsum([0, *(block.shape[1] for block in blocks)])
         fast = [i for i, term in enumerate(self.terms) if term.effect.fast]
         known = [k for i in fast for k in range(widths[i], widths[i + 1])]
@@ -252,37 +252,37 @@ class Fit:
     @cached_property
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
-        session = self.session
-        shared = session.cache.shared
+        dataset = self.dataset
+        shared = dataset.cache.shared
         if "ones" not in shared:
-            shared["ones"] = np.ones((session.fine.track.size, 1))
-        blocks = [session.columns(term, fine=True) for term in self.terms]
-        error: Floats = session.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
+            shared["ones"] = np.ones((dataset.fine.track.size, 1))
+        blocks = [dataset.columns(term, fine=True) for term in self.terms]
+        error: Floats = dataset.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
         return error
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
         """Held-out error of each part, with the difference to other windows beside the terms."""
-        session = self.session
-        blocks = [session.columns(term, fine=True) for term in self.terms]
-        blur = session.fine.track.blur
+        dataset = self.dataset
+        blocks = [dataset.columns(term, fine=True) for term in self.terms]
+        blur = dataset.fine.track.blur
         beside = [] if blur is None else [blur]
-        error: Floats = session.sums_of([*blocks, *beside], True).held_out()
+        error: Floats = dataset.sums_of([*blocks, *beside], True).held_out()
         return error
 
     def forget(self) -> None:
         """Drop what is computed again where it is asked for: a search keeps many fits."""
-        self.session.fine.track.forget()
-        self.session.coarse.track.forget()
+        self.dataset.fine.track.forget()
+        self.dataset.coarse.track.forget()
         self.__dict__.pop("coarse_sums", None)
         self.sums.forget()
 
     def fast_part(self, fine: bool) -> Floats:
         """Compute the current of the fast terms on one of the grids."""
-        part = np.zeros(self.session.grid_of(fine).track.size)
+        part = np.zeros(self.dataset.grid_of(fine).track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:
-                part += self.session.columns(term, fine) @ values
+                part += self.dataset.columns(term, fine) @ values
         return part
 
     @cached_property
@@ -292,27 +292,27 @@ class Fit:
         Of a long recording the fine grid holds a sample of the open groups alone; the terms are
         fitted once more, to the same samples, where some of every sealed group can be predicted.
         """
-        session = self.session.opened
-        if session is None:
+        dataset = self.dataset.opened
+        if dataset is None:
             return self
         # This is the end: what is kept would only take memory from here on.
-        self.session.cache.clear()
-        return fit_terms(session, self.terms)
+        self.dataset.cache.clear()
+        return fit_terms(dataset, self.terms)
 
     def rmse(self, sealed: bool) -> float:
         """Root mean square residual on the open or on the sealed samples."""
         fit = self.opened if sealed else self
-        grid = fit.session.sharp
+        grid = fit.dataset.sharp
         values = fit.residual_a[grid.sealed if sealed else grid.fit]
         return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
+def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     """Fit all terms jointly; where some scale with the load or the model, until that settles.
 
     Parameters
     ----------
-    session : Session
+    dataset : Dataset
         Recordings.
     terms : tuple of Term
         Model.
@@ -322,32 +322,32 @@ def fit_terms(session: Session, terms: tuple[Term, ...]) -> Fit:
     Fit
     """
     circular = not all(term.is_constant for term in terms)
-    plain = not np.any(session.fine.track.model_a)
+    plain = not np.any(dataset.fine.track.model_a)
     fewest = 3 if plain else 2
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
-        fitted = _fit_once(session, terms)
+        fitted = _fit_once(dataset, terms)
         error = fitted.rmse(sealed=False)
         settled = number >= fewest and abs(before - error) <= SETTLED * error
         if not circular or settled:
             break
-        session, before = _with_newton_load(fitted), error
+        dataset, before = _with_newton_load(fitted), error
     return fitted
 
 
-def _with_newton_load(fitted: Fit) -> Session:
-    """Return the session with the load that Gauss-Newton steps through it find.
+def _with_newton_load(fitted: Fit) -> Dataset:
+    """Return the dataset with the load that Gauss-Newton steps through it find.
 
     To fit anew beside the last load alone may stay where it is: a gravity and an offset that have
     taken up the friction which grows with the load leave that load's zero in the wrong place.
     """
-    session, terms = fitted.session, fitted.terms
-    track = session.fine.track
+    dataset, terms = fitted.dataset, fitted.terms
+    track = dataset.fine.track
     if not any(term.effect.follows_load for term in terms):
-        return session
-    rows = np.flatnonzero(session.fine.fit)
+        return dataset
+    rows = np.flatnonzero(dataset.fine.fit)
     rows = rows[:: max(rows.size // LOAD_SAMPLES, 1)]
-    blocks = [session.columns(term, fine=True) for term in terms]
+    blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
     carries, follows = (
         np.repeat([getattr(term.effect, name) for term in terms], widths)
@@ -374,20 +374,20 @@ def _with_newton_load(fitted: Fit) -> Session:
         jacobian = columns.copy()
         jacobian[:, carries] *= 1 + (columns[:, follows] @ solution[follows] / over)[:, None]
         solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
-    return session.with_model(best, track.model_a, static_terms(terms))
+    return dataset.with_model(best, track.model_a, static_terms(terms))
 
 
-def _fit_once(session: Session, terms: tuple[Term, ...]) -> Fit:
-    grid = session.fine
+def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
+    grid = dataset.fine
     current = grid.track.current_a
-    blocks = [session.columns(term, fine=True) for term in terms]
+    blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
-    sums = session.sums_of(blocks, fine=True)
+    sums = dataset.sums_of(blocks, fine=True)
     solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     total, model, load = currents(terms, blocks, coefficients, current.size)
-    session = session.with_model(load, model, static_terms(terms))
-    return Fit(terms, coefficients, session, current - total, sums)
+    dataset = dataset.with_model(load, model, static_terms(terms))
+    return Fit(terms, coefficients, dataset, current - total, sums)
 
 
 def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:

@@ -10,7 +10,7 @@ from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
 MOST_BYTES = 250e6
-"""Regressors that are kept, with their rows in parts; a session has 1 GB for everything."""
+"""Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
 
 
 class RegressorCache:

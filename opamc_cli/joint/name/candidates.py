@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import COARSE_SAMPLES, Session, Term
+from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Floats
@@ -48,13 +48,13 @@ class Batch:
         return int(self.own.shape[-1])
 
 
-def batches_of(session: Session, terms: Sequence[Term], fine: bool) -> list[Batch]:
+def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batch]:
     """Compute the regressors of guesses and their products, by width."""
-    parts = session.parts[0 if fine else 1]
-    current = parts.taken(session.grid_of(fine).track.current_a)[:, None]
+    parts = dataset.parts[0 if fine else 1]
+    current = parts.taken(dataset.grid_of(fine).track.current_a)[:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = parts.taken(session.computed(term, fine))
+        columns = parts.taken(dataset.computed(term, fine))
         alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
     for (width, _), members in alike.items():
@@ -87,10 +87,10 @@ def judged(term: Term, drop: float, width: int, reference: float) -> Candidate:
     return Candidate(term, drop, float(np.log(left / reference)) + price_of(term, width))
 
 
-def best_form(session: Session, beside: "Beside", full: Term, reference: float) -> Candidate:
+def best_form(dataset: Dataset, beside: "Beside", full: Term, reference: float) -> Candidate:
     """Choose among the smaller forms of an effect the one that is worth its price."""
     effect = full.effect
-    (batch,) = batches_of(session, [full], fine=True)
+    (batch,) = batches_of(dataset, [full], fine=True)
     cross = beside.products(batch.columns)[:, None]
     best = None
     forms = [(full, tuple(range(batch.width)))]
@@ -111,25 +111,25 @@ class Beside:
     """A chain's own regressors on one grid, made ready to have candidates put beside them."""
 
     def __init__(self, chain: Chain, fine: bool) -> None:
-        session = chain.fit.session
-        self.fine = fine or session.coarse is session.fine
-        self.parts: Parts = session.parts[0 if self.fine else 1]
+        dataset = chain.fit.dataset
+        self.fine = fine or dataset.coarse is dataset.fine
+        self.parts: Parts = dataset.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
         if not self.fine:
             self.sums, blocks = chain.fit.coarse_sums
             self.fast_part = self.parts.taken(chain.fit.fast_part(False))
         else:
-            blocks = [session.columns(term, True) for term in chain.fit.terms]
+            blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             follows = not all(term.is_constant for term in chain.fit.terms)
-            self.sums = session.sums_of(blocks, True) if follows else chain.fit.sums
-        self.blocks = [session.cache.rows(block, self.parts, self.fine) for block in blocks]
-        current = session.grid_of(self.fine).track.current_a
+            self.sums = dataset.sums_of(blocks, True) if follows else chain.fit.sums
+        self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
+        current = dataset.grid_of(self.fine).track.current_a
         self.current = self.parts.taken(current)
         if self.fast_part is not None:
             self.current = self.current - self.fast_part
         self.step = max(self.current.size // COARSE_SAMPLES, 1)
-        self.weight = 1.0 if self.fine else float(session.factor)
+        self.weight = 1.0 if self.fine else float(dataset.factor)
         self.before = self.sums.held_out()
 
     def products(self, columns: Floats) -> Floats:

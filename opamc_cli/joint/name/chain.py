@@ -107,15 +107,15 @@ class Chain:
 
 def chain_of(fit: Fit, added: int) -> Chain:
     """Judge a fit by its held-out errors."""
-    session = fit.session
-    fine, coarse = session.parts
+    dataset = fit.dataset
+    fine, coarse = dataset.parts
     error = fit.sums.held_out()[fine.judged]
     samples = float(sum(b - a for (a, b), j in zip(fine.slices, fine.judged, strict=True) if j))
-    if not fine.judged.all() and not coarse.judged.all() and session.coarse is not session.fine:
+    if not fine.judged.all() and not coarse.judged.all() and dataset.coarse is not dataset.fine:
         sums, _ = fit.coarse_sums
         rest, count = _unclear(sums, coarse.judged)
-        error = np.concatenate([error, session.factor * rest])
-        samples += session.factor * count
+        error = np.concatenate([error, dataset.factor * rest])
+        samples += dataset.factor * count
     fit.forget()
     return Chain(fit, added, error, samples)
 
@@ -128,7 +128,7 @@ def _unclear(sums: Sums, clear: Bools) -> tuple[Floats, float]:
 
 def extended(chain: Chain, *terms: Term) -> Chain:
     """Add terms to a chain and fit all of it anew."""
-    fit = fit_terms(chain.fit.session, (*chain.fit.terms, *terms))
+    fit = fit_terms(chain.fit.dataset, (*chain.fit.terms, *terms))
     return chain_of(fit, chain.added + len(terms))
 
 
@@ -136,7 +136,7 @@ def without(chain: Chain, place: int) -> Chain:
     """Take one of the added terms out, and fit the rest anew."""
     declared = len(chain.fit.terms) - chain.added
     terms = [term for i, term in enumerate(chain.fit.terms) if i != declared + place]
-    return chain_of(fit_terms(chain.fit.session, tuple(terms)), chain.added - 1)
+    return chain_of(fit_terms(chain.fit.dataset, tuple(terms)), chain.added - 1)
 
 
 def signature_of(terms: tuple[Term, ...]) -> Signature:

@@ -92,11 +92,11 @@ def curve_of(fit: Fit, place: int) -> Curve:
     place : int
         Of the term in the fit.
     """
-    session = fit.session
-    grid = session.sharp
+    dataset = fit.dataset
+    grid = dataset.sharp
     term, values = fit.terms[place], fit.coefficients[place]
     rows = np.flatnonzero(grid.fit)
-    named = (session.columns(term, fine=True) @ values)[rows]
+    named = (dataset.columns(term, fine=True) @ values)[rows]
     both = named + fit.residual_a[rows]
     over, side = _covariate(grid.track, term)
     over, side = over[rows], side[rows]

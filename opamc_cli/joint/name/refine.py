@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize, minimize_scalar
 
 from opamc_cli.joint.effects.base import Parameters
-from opamc_cli.joint.fit.model import Session, Term
+from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Beside
 
@@ -17,19 +17,19 @@ LOGARITHMIC = 5.0
 """Ratio of a parameter's limits from which on it is refined as a logarithm."""
 
 
-def refined(session: Session, term: Term, beside: Beside) -> Term:
+def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
     """Refine the searched parameters of a candidate beside a chain.
 
     Parameters
     ----------
-    session : Session
+    dataset : Dataset
         Of the chain.
     term : Term
         A guess.
     beside : Beside
         The chain on the grid on which the candidate is searched.
     """
-    track = session.grid_of(beside.fine).track
+    track = dataset.grid_of(beside.fine).track
     limits = {k: v for k, v in term.effect.limits(track).items() if k in term.parameters}
     if not limits:
         return term
@@ -46,7 +46,7 @@ def refined(session: Session, term: Term, beside: Beside) -> Term:
 
     def lost(values: Floats) -> float:
         trial = Term(term.effect, outwards(np.atleast_1d(values)), term.keep)
-        columns = beside.refined_rows(session.computed(trial, beside.fine))
+        columns = beside.refined_rows(dataset.computed(trial, beside.fine))
         return -beside.fitted_drop(columns, whole=term.effect.whole)
 
     start = np.array(

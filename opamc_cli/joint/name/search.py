@@ -7,7 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.fit.model import Session, Term
+from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
 from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
 from opamc_cli.joint.name.refine import refined
@@ -44,21 +44,21 @@ class Pool:
     @classmethod
     def of(
         cls,
-        session: Session,
+        dataset: Dataset,
         library: Library,
         least_share: float = LEAST_SHARE,
         without: Collection[str] = (),
     ) -> "Pool":
-        """Lay every effect's grid of parameters on a session's coarse grid."""
-        track = session.coarse.track
+        """Lay every effect's grid of parameters on a dataset's coarse grid."""
+        track = dataset.coarse.track
         terms = [
             term
             for effect in library.values()
             if not effect.fast and effect.from_motion and not effect.untestable(track)
-            for term in guessed(effect, session)
+            for term in guessed(effect, dataset)
         ]
         share = 0.0 if "share" in without else least_share
-        return cls(batches_of(session, terms, fine=False), library, share, without)
+        return cls(batches_of(dataset, terms, fine=False), library, share, without)
 
 
 @dataclass(frozen=True)
@@ -107,9 +107,9 @@ class Trial:
         return Tried(self.term, score, self.gain, self.t_value, self.p_value, self.why_not)
 
 
-def guessed(effect: Effect, session: Session) -> list[Term]:
+def guessed(effect: Effect, dataset: Dataset) -> list[Term]:
     """Every guess of a slow effect, and the smaller forms of each."""
-    track = session.coarse.track
+    track = dataset.coarse.track
     terms = []
     for parameters in effect.guesses(track, np.zeros(track.size)):
         terms.append(Term(effect, parameters))
@@ -134,7 +134,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     list of Candidate
         Best first.
     """
-    session = chain.fit.session
+    dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
     reference = float(chain.error.sum())
     found: dict[tuple[str, float], Candidate] = {}
@@ -155,26 +155,26 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         for effect in free
         if not effect.fast
         and not effect.from_motion
-        and not effect.untestable(session.coarse.track)
-        for term in guessed(effect, session)
+        and not effect.untestable(dataset.coarse.track)
+        for term in guessed(effect, dataset)
     ]
-    for batch in (*pool.slow, *batches_of(session, following, fine=False)):
+    for batch in (*pool.slow, *batches_of(dataset, following, fine=False)):
         for term, drop in zip(batch.terms, slow.drops(batch), strict=True):
             if term.effect.name not in present:
                 note(judged(term, float(drop), batch.width, reference))
     fast = Beside(chain, fine=True) if any(effect.fast for effect in free) else slow
-    residual = np.where(session.sharp.fit, chain.fit.residual_a, 0.0)
+    residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
-        if effect.fast and not effect.untestable(session.fine.track):
-            for parameters in effect.guesses(session.fine.track, residual):
-                note(best_form(session, fast, Term(effect, parameters), reference))
+        if effect.fast and not effect.untestable(dataset.fine.track):
+            for parameters in effect.guesses(dataset.fine.track, residual):
+                note(best_form(dataset, fast, Term(effect, parameters), reference))
     ordered = sorted(found.values(), key=lambda candidate: candidate.score)
     least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
     better = []
     for candidate in [one for one in ordered if one.score < least][:REFINED]:
         beside = fast if candidate.term.effect.fast else slow
-        term = refined(session, candidate.term, beside)
-        (batch,) = batches_of(session, [term], beside.fine)
+        term = refined(dataset, candidate.term, beside)
+        (batch,) = batches_of(dataset, [term], beside.fine)
         trial = judged(term, float(beside.drops(batch)[0]), batch.width, reference)
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.drop > SAME * candidate.drop else candidate)
@@ -218,14 +218,14 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
     Beside the load that was fitted without it, a friction that has moved the load's zero shows
     as little.
     """
-    session = chain.fit.session
+    dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms}
     return [
-        guessed(effect, session)
+        guessed(effect, dataset)
         for effect in pool.library.values()
         if effect.follows_load
         and effect.name not in present
-        and not effect.untestable(session.coarse.track)
+        and not effect.untestable(dataset.coarse.track)
     ]
 
 

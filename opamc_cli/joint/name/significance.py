@@ -42,9 +42,9 @@ def decoy_gain(chain: Chain, term: Term, seed: int) -> float:
     float
         Share of the residual's sum of squares; mostly below 0.
     """
-    session = chain.fit.session
-    fine, _ = session.parts
-    columns = fine.taken(session.columns(term, fine=True))
+    dataset = chain.fit.dataset
+    fine, _ = dataset.parts
+    columns = fine.taken(dataset.columns(term, fine=True))
     residual = fine.taken(chain.fit.residual_a)[:, None]
     gram = fine.products(columns, columns)
     moment = fine.products(columns, residual)[:, :, 0]

@@ -16,7 +16,7 @@ from opamc_cli.joint.effects.library import (
 )
 from opamc_cli.joint.explain.declared import Declared, best_fit
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.fit.model import Fit, Session
+from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
@@ -41,9 +41,9 @@ class AxisModel:
     """Of the current: "A", or "Nm" where a torque stands for it."""
 
     @property
-    def session(self) -> Session:
+    def dataset(self) -> Dataset:
         """Recordings, groups, sealed ones."""
-        return self.fit.session
+        return self.fit.dataset
 
 
 def library_of(model: JointModelConfig) -> Library:
@@ -81,16 +81,16 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
 
-    def on(session: Session) -> Declared:
+    def on(dataset: Dataset) -> Declared:
         for effect, _ in declared:
-            why = None if effect.name == "load_friction" else effect.untestable(session.fine.track)
+            why = None if effect.name == "load_friction" else effect.untestable(dataset.fine.track)
             if why is not None:
                 msg = (
                     f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show "
                     f"it: {why}; log the channel or drop the effect from the model"
                 )
                 raise ConfigError(msg)
-        track = session.coarse.track
+        track = dataset.coarse.track
         return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
 
     fit = best_fit(recordings, joint, on)

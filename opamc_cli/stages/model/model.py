@@ -106,8 +106,8 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
     laid = lay(model, runs, axis)
     base = laid.fit
     start = chain_of(base, 0)
-    explained = saturated(start, Pool.of(base.session, unnamed_library()))
-    tried = trials(start, Pool.of(base.session, laid.library))
+    explained = saturated(start, Pool.of(base.dataset, unnamed_library()))
+    tried = trials(start, Pool.of(base.dataset, laid.library))
     entry = {
         "axis": axis,
         "unit": laid.unit,

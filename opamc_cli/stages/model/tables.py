@@ -10,7 +10,7 @@ import pyarrow as pa
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.intervals import Certainty
-from opamc_cli.joint.fit.model import Fit, Session, Term
+from opamc_cli.joint.fit.model import Dataset, Fit, Term
 from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
@@ -55,7 +55,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
     return {
         "axis": laid.axis,
         "unit": laid.unit,
-        "groups": _groups_entry(laid.session),
+        "groups": _groups_entry(laid.dataset),
         "condition_number": known.condition_number,
         "inseparable": [list(names) for names in known.inseparable],
         "rmse_a": result.rmse(sealed=False),
@@ -75,11 +75,11 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
     }
 
 
-def _groups_entry(session: Session) -> dict[str, Any]:
-    grouping = session.grouping
+def _groups_entry(dataset: Dataset) -> dict[str, Any]:
+    grouping = dataset.grouping
     return {
         "kind": grouping.kind,
-        "fit": [grouping.names[g] for g in session.fit_groups],
+        "fit": [grouping.names[g] for g in dataset.fit_groups],
         "sealed": [grouping.names[g] for g in grouping.sealed],
     }
 
@@ -155,14 +155,14 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
 
 def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
     """One axis's object in loop.json."""
-    grouping = laid.session.grouping
+    grouping = laid.dataset.grouping
     return {
         "axis": laid.axis,
         "unit": laid.unit,
         "declared": [effect.name for effect, _ in laid.declared],
         "sealed": [grouping.names[g] for g in grouping.sealed],
         "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
-        "steps": [step_entry(step, loop.steps, laid.session.fine.track) for step in loop.steps],
+        "steps": [step_entry(step, loop.steps, laid.dataset.fine.track) for step in loop.steps],
         "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
         "floor_a": loop.floor_a,
         "noise_a": loop.noise_a,
@@ -207,7 +207,7 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
             entry["columns"] = list(term.keep)
         entry["coefficients"] = [float(f"{value:.9g}") for value in values]
         effects.append(entry)
-    track = after.session.fine.track
+    track = after.dataset.fine.track
     warm = track.temperature_c is not None
     return {
         "joint": {"gear_ratio": model.joint.gear_ratio, "pole_pairs": model.joint.pole_pairs},
@@ -227,7 +227,7 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
 def residual_table(axis: int, loop: Loop) -> pa.Table:
     """Sealed residuals before and after, at most 20 000 rows."""
     before, after = loop.before.opened, loop.after.opened
-    grid = after.session.fine
+    grid = after.dataset.fine
     rows = np.flatnonzero(grid.sealed)
     rows = rows[:: max(-(-rows.size // MOST_RESIDUALS), 1)]
     track = grid.track
@@ -244,7 +244,7 @@ def residual_table(axis: int, loop: Loop) -> pa.Table:
 
 def spectrum_table(axis: int, loop: Loop) -> pa.Table:
     """Order spectrum of the open residual, before and after, at most 4 000 rows."""
-    grid = loop.after.session.fine
+    grid = loop.after.dataset.fine
     amplitudes = []
     orders = np.empty(0)
     for result in (loop.before, loop.after):

@@ -19,7 +19,7 @@ from opamc_cli.joint.name.search import Pool
 
 def explained(recording):
     start = chain_of(plain_fit(recording), 0)
-    return start, saturated(start, Pool.of(start.fit.session, unnamed_library()))
+    return start, saturated(start, Pool.of(start.fit.dataset, unnamed_library()))
 
 
 @settings(max_examples=60, deadline=None)
@@ -81,7 +81,7 @@ def test_of_pure_noise_nothing_can_be_explained(motion):
 def test_the_ceiling_of_one_function_is_the_fall_of_the_sealed_error():
     before = plain_fit(joint_of("cyclic", lambda q, v, a, t: v * np.abs(v), rate=100.0))
     speed = next(effect for effect in SMOOTH if effect.name == "unnamed_speed")
-    after = fit_terms(before.session, (*before.terms, Term(speed, {"degree": 4.0})))
+    after = fit_terms(before.dataset, (*before.terms, Term(speed, {"degree": 4.0})))
     share = 1 - (after.rmse(sealed=True) / before.rmse(sealed=True)) ** 2
     assert ceiling(before, after).share == pytest.approx(share, rel=1e-9)
     # What predicts the sealed data worse is no ceiling.
@@ -96,7 +96,7 @@ def test_a_model_beside_its_own_rates_of_change_settles_at_once():
         Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
     )
     terms = (*before.terms, Term(unnamed_library()["unnamed_shift"], {}))
-    after = fit_terms(before.session, terms)
+    after = fit_terms(before.dataset, terms)
     assert after.rmse(sealed=False) < 0.75 * before.rmse(sealed=False)
-    again = fit_terms(after.session, terms)
+    again = fit_terms(after.dataset, terms)
     assert again.rmse(sealed=False) == pytest.approx(after.rmse(sealed=False), rel=1e-9)

@@ -7,7 +7,7 @@ from simulator import simulate
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import declared_fit
 from opamc_cli.joint.fit import model, thinning
-from opamc_cli.joint.fit.model import Term, fit_terms, open_session
+from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.groups import group_samples
@@ -38,14 +38,14 @@ def terms(*effects):
 
 def test_cycles_are_taken_whole_and_begin_at_the_same_place(low_limit):
     track, grouping = long_track(cycles=30)
-    session = open_session(track, grouping)
-    taken = np.unique(session.fine.track.group[session.fine.fit])
+    dataset = dataset_of(track, grouping)
+    taken = np.unique(dataset.fine.track.group[dataset.fine.fit])
     assert grouping.kind == "cycles"
-    assert thinning.FEWEST_GROUPS <= taken.size < len(session.fit_groups)
+    assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.fit_groups)
     for group in taken:
-        there = np.count_nonzero(session.fine.fit & (session.fine.track.group == group))
+        there = np.count_nonzero(dataset.fine.fit & (dataset.fine.track.group == group))
         assert there == np.count_nonzero(track.moving & (grouping.group == group))
-    first = [session.fine.track.position_rad[start] for start, _ in session.fine.track.bounds]
+    first = [dataset.fine.track.position_rad[start] for start, _ in dataset.fine.track.bounds]
     np.testing.assert_allclose(first, first[0], atol=1e-6)
 
 
@@ -53,17 +53,17 @@ def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
     track, _ = long_track(cycles=30, kind="sines")
     blocks = group_samples(track.moving, track.bounds, None, track.rate_hz, ("run",))
     assert blocks.kind == "blocks"
-    session = open_session(replace(track, period_samples=None), blocks)
-    fine = session.fine
+    dataset = dataset_of(replace(track, period_samples=None), blocks)
+    fine = dataset.fine
     assert np.count_nonzero(fine.fit) == pytest.approx(LIMIT * 0.75, rel=0.02)
-    for group in session.fit_groups:
+    for group in dataset.fit_groups:
         whole = track.time_s[track.moving & (blocks.group == group)]
         part = fine.track.time_s[fine.fit & (fine.track.group == group)]
         assert part[0] == whole[0]
         assert part[-1] == whole[-1]
     outside = fine.track.group == -1
     assert not (fine.fit & outside).any()
-    sealed = session.opened.fine.sealed
+    sealed = dataset.opened.fine.sealed
     assert np.count_nonzero(sealed) == pytest.approx(LIMIT * 0.25, rel=0.02)
     # What comes before a piece lets the effects with a memory settle.
     for start, stop in fine.track.bounds[1:]:
@@ -73,13 +73,13 @@ def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
 
 def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end(low_limit):
     track, grouping = long_track(cycles=20)
-    session = open_session(track, grouping)
-    assert not session.fine.sealed.any()
-    fitted = fit_terms(session, terms(*((name, {}) for name in DECLARED)))
+    dataset = dataset_of(track, grouping)
+    assert not dataset.fine.sealed.any()
+    fitted = fit_terms(dataset, terms(*((name, {}) for name in DECLARED)))
     opened = fitted.opened
     sealed = track.moving & np.isin(grouping.group, grouping.sealed)
     np.testing.assert_array_equal(
-        opened.session.fine.track.current_a[opened.session.fine.sealed], track.current_a[sealed]
+        opened.dataset.fine.track.current_a[opened.dataset.fine.sealed], track.current_a[sealed]
     )
     np.testing.assert_allclose(
         np.concatenate(opened.coefficients), np.concatenate(fitted.coefficients), rtol=1e-9
@@ -91,10 +91,10 @@ def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells(monkeypatch):
     track, grouping = long_track(cycles=20)
     library = built_in_library()
     declared = tuple((library[name], None) for name in DECLARED)
-    whole = close_loop(declared_fit(open_session(track, grouping), declared), library)
+    whole = close_loop(declared_fit(dataset_of(track, grouping), declared), library)
     monkeypatch.setattr(thinning, "MOST_SAMPLES", LIMIT)
     monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
-    part = close_loop(declared_fit(open_session(track, grouping), declared), library)
+    part = close_loop(declared_fit(dataset_of(track, grouping), declared), library)
     assert [s.term.effect.name for s in part.steps] == [s.term.effect.name for s in whole.steps]
     assert part.verdict == whole.verdict == "closed"
     assert part.rmse_before_a == pytest.approx(whole.rmse_before_a, rel=0.02)
@@ -107,19 +107,19 @@ def test_fits_that_share_regressors_are_those_that_compute_their_own():
     everything = terms(
         *((name, {}) for name in DECLARED), ("load_friction", {}), ripple, ("offset", {})
     )
-    shared = own = fit_terms(open_session(track, grouping), everything[:4])
+    shared = own = fit_terms(dataset_of(track, grouping), everything[:4])
     for chosen in (everything[:5], everything[:6], everything, everything[:4] + everything[5:]):
-        shared = fit_terms(shared.session, chosen)
-        own = fit_terms(replace(own.session, cache=RegressorCache()), chosen)
+        shared = fit_terms(shared.dataset, chosen)
+        own = fit_terms(replace(own.dataset, cache=RegressorCache()), chosen)
         for ours, theirs in zip(shared.coefficients, own.coefficients, strict=True):
             np.testing.assert_allclose(ours, theirs, rtol=1e-8)
         for term in chosen:
             np.testing.assert_allclose(
-                shared.session.columns(term, fine=False),
-                term_columns(own.session, term),
+                shared.dataset.columns(term, fine=False),
+                term_columns(own.dataset, term),
                 atol=1e-9,
             )
 
 
-def term_columns(session, term):
-    return replace(session, cache=RegressorCache()).columns(term, fine=False)
+def term_columns(dataset, term):
+    return replace(dataset, cache=RegressorCache()).columns(term, fine=False)

@@ -7,7 +7,7 @@ import pytest
 from closing import close_on
 from simulator import simulate
 
-from opamc_cli.joint.fit.model import open_session
+from opamc_cli.joint.fit.model import dataset_of
 from opamc_cli.joint.motion.corners import clear_of_corners
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track
@@ -21,10 +21,10 @@ from opamc_cli.joint.motion.smoothing import (
 from opamc_cli.joint.motion.track import Joint
 
 
-def session_of(made, current):
+def dataset_from(made, current):
     recording = Recording("run", made.rate_hz, current_a=current, position_rad=made.position)
     track, grouping = grouped_track([recording], Joint(made.gear_ratio, made.pole_pairs))
-    return open_session(track, grouping)
+    return dataset_of(track, grouping)
 
 
 def trapezoid(rate, step=0.0):
@@ -96,17 +96,17 @@ def test_a_fine_encoder_costs_cubic_moves_no_samples(quantum):
 
 def test_residuals_are_looked_at_where_the_smoothed_acceleration_is_the_true_one():
     made = simulate(28, kind="trapezoid", rate=500.0, quantum=5e-4)
-    session = session_of(made, made.current)
-    error = np.abs(session.fine.track.acceleration - made.acceleration)
-    clear, spoilt = session.sharp.fit, session.fine.fit & ~session.sharp.fit
-    assert 0.2 < clear.sum() / session.fine.fit.sum() < 0.9
+    dataset = dataset_from(made, made.current)
+    error = np.abs(dataset.fine.track.acceleration - made.acceleration)
+    clear, spoilt = dataset.sharp.fit, dataset.fine.fit & ~dataset.sharp.fit
+    assert 0.2 < clear.sum() / dataset.fine.fit.sum() < 0.9
     assert np.quantile(error[clear], 0.9) < 0.2 * np.quantile(error[spoilt], 0.9)
 
 
 def test_all_samples_are_looked_at_where_the_encoder_is_fine_and_the_motion_smooth():
     made = simulate(28, kind="quintic", rate=500.0)
-    session = session_of(made, made.current)
-    assert session.sharp is session.fine
+    dataset = dataset_from(made, made.current)
+    assert dataset.sharp is dataset.fine
 
 
 BLOCKS = pytest.mark.xfail(reason="blocks are shorter than the noise of the speed asks for")
@@ -116,8 +116,8 @@ BLOCKS = pytest.mark.xfail(reason="blocks are shorter than the noise of the spee
 def test_speed_and_current_are_equally_smooth_on_the_coarse_grid(kind):
     made = simulate(28, kind=kind, rate=500.0, quantum=5e-4)
     # A current that is the speed itself: what differs is the smoothing.
-    session = session_of(made, made.velocity)
-    track, rows = session.coarse.track, session.coarse.fit
+    dataset = dataset_from(made, made.velocity)
+    track, rows = dataset.coarse.track, dataset.coarse.fit
     error = np.std((track.velocity - track.current_a)[rows])
     assert error < 2e-3 * np.std(track.current_a[rows])
 

@@ -35,12 +35,12 @@ def fast_chain():
 
 @pytest.mark.parametrize("name", MOTION)
 def test_the_drop_of_a_guess_is_that_of_the_chain_with_it(slow_chain, name):
-    session = slow_chain.fit.session
-    assert session.coarse is session.fine
-    terms = guessed(LIBRARY[name], session)
+    dataset = slow_chain.fit.dataset
+    assert dataset.coarse is dataset.fine
+    terms = guessed(LIBRARY[name], dataset)
     for fine in (True, False):
         beside = Beside(slow_chain, fine)
-        for batch in batches_of(session, terms, fine):
+        for batch in batches_of(dataset, terms, fine):
             drops = beside.drops(batch)
             for place in range(0, len(batch.terms), 7):
                 longer = extended(slow_chain, batch.terms[place])
@@ -52,13 +52,13 @@ def test_the_drop_of_a_guess_is_that_of_the_chain_with_it(slow_chain, name):
 
 def slow_drop(chain, columns, fine):
     """Leave units out one by one, with all regressors, by least squares."""
-    session = chain.fit.session
-    parts = session.parts[0 if fine else 1]
-    current = session.grid_of(fine).track.current_a
+    dataset = chain.fit.dataset
+    parts = dataset.parts[0 if fine else 1]
+    current = dataset.grid_of(fine).track.current_a
     known = list(zip(chain.fit.terms, chain.fit.coefficients, strict=True))
     blocks = []
     for term, values in known:
-        block = session.columns(term, fine)
+        block = dataset.columns(term, fine)
         if term.effect.fast and not fine:
             current = current - block @ values
         else:
@@ -75,17 +75,17 @@ def slow_drop(chain, columns, fine):
             scale = np.linalg.norm(design[rest], axis=0)
             values = np.linalg.lstsq(design[rest] / scale, target[rest], rcond=1e-6)[0] / scale
             drop += sign * float(np.sum((target[mine] - design[mine] @ values) ** 2))
-    return drop * (1 if fine else session.factor)
+    return drop * (1 if fine else dataset.factor)
 
 
 @pytest.mark.parametrize("fine", [True, False])
 @pytest.mark.parametrize("name", ["stribeck", "spring", "position_drag"])
 def test_the_drop_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chain, name, fine):
-    session = fast_chain.fit.session
-    assert session.factor > 1
-    terms = guessed(LIBRARY[name], session)[:: 40 if name == "position_drag" else 9]
+    dataset = fast_chain.fit.dataset
+    assert dataset.factor > 1
+    terms = guessed(LIBRARY[name], dataset)[:: 40 if name == "position_drag" else 9]
     total = float(fast_chain.error.sum())
-    for batch in batches_of(session, terms, fine):
+    for batch in batches_of(dataset, terms, fine):
         drops = Beside(fast_chain, fine).drops(batch)
         for place, drop in enumerate(drops):
             columns = batch.columns[:, place * batch.width : (place + 1) * batch.width]
@@ -94,16 +94,16 @@ def test_the_drop_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chai
 
 
 def test_what_the_model_holds_already_takes_nothing(slow_chain):
-    session = slow_chain.fit.session
+    dataset = slow_chain.fit.dataset
     for name in ("coulomb", "inertia"):
-        (batch,) = batches_of(session, [Term(LIBRARY[name], {})], True)
+        (batch,) = batches_of(dataset, [Term(LIBRARY[name], {})], True)
         assert abs(Beside(slow_chain, True).drops(batch)[0]) < 1e-3 * slow_chain.error.sum()
 
 
 def test_the_fitted_drop_is_the_fall_of_the_sum_of_squares(slow_chain):
-    session = slow_chain.fit.session
+    dataset = slow_chain.fit.dataset
     beside = Beside(slow_chain, True)
-    columns = beside.parts.taken(session.columns(Term(LIBRARY["spring"], {}), True))
+    columns = beside.parts.taken(dataset.columns(Term(LIBRARY["spring"], {}), True))
     known = np.concatenate(beside.blocks, axis=1)
     both = np.concatenate([known, columns], axis=1)
     left = [np.linalg.lstsq(design, beside.current, rcond=1e-9)[1][0] for design in (known, both)]
@@ -111,12 +111,12 @@ def test_the_fitted_drop_is_the_fall_of_the_sum_of_squares(slow_chain):
 
 
 def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
-    session = slow_chain.fit.session
+    dataset = slow_chain.fit.dataset
     beside = Beside(slow_chain, True)
     reference = float(slow_chain.error.sum())
     full = Term(LIBRARY["asymmetric_friction"], LIBRARY["asymmetric_friction"].guesses(
-        session.fine.track, np.zeros(session.fine.track.size))[0])  # fmt: skip
-    found = best_form(session, beside, full, reference)
+        dataset.fine.track, np.zeros(dataset.fine.track.size))[0])  # fmt: skip
+    found = best_form(dataset, beside, full, reference)
     forms = [full] + [
         Term(full.effect, parameters, keep)
         for parameters, keep in full.effect.variants(full.parameters)

@@ -21,7 +21,7 @@ def chain_on(motion, effect, **options):
 
 
 def pool_of(chain, *names, without=()):
-    return Pool.of(chain.fit.session, {name: LIBRARY[name] for name in names}, without=without)
+    return Pool.of(chain.fit.dataset, {name: LIBRARY[name] for name in names}, without=without)
 
 
 def names_of(chain):

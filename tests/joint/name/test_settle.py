@@ -21,10 +21,10 @@ def stribeck(q, v, a, t):
 def settle(effect, *terms, names=None, without=(), strength=5.0):
     recording = joint_of("cyclic", effect, strength=strength, rate=100.0)
     start = chain_of(plain_fit(recording), 0)
-    session = start.fit.session
+    dataset = start.fit.dataset
     library = LIBRARY if names is None else {name: LIBRARY[name] for name in names}
-    pool = Pool.of(session, library, without=without)
-    unnamed = Pool.of(session, unnamed_library(), without=without)
+    pool = Pool.of(dataset, library, without=without)
+    unnamed = Pool.of(dataset, unnamed_library(), without=without)
     return settled(extended(start, *terms), pool, unnamed)
 
 
