@@ -150,10 +150,6 @@ class Dataset:
         """Return the fine or the coarse grid."""
         return self.fine if fine else self.coarse
 
-    def grid(self, fine: bool) -> Grid:
-        """Return the grid on which fast effects are searched, or the coarse one."""
-        return self.sharp if fine else self.coarse
-
     def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Dataset":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
         fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
