@@ -158,13 +158,13 @@ def _diagnose(
     notes: list[str] = []
     if differing:
         watch, cause = progress("cause"), _cause()
-        starts = [cause.first_motions(side.patterns) for side in (sides.baseline, sides.target)]
+        moving = [cause.moving_samples(side.patterns) for side in (sides.baseline, sides.target)]
         for done, axis in enumerate(differing):
             watch(done, len(differing))
-            first = {**starts[0].get(axis, {}), **starts[1].get(axis, {})}
+            times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
             try:
                 found = cause.explain(
-                    axis, sides.baseline.sources, sides.target.sources, config.joint, first
+                    axis, sides.baseline.sources, sides.target.sources, config.joint, times
                 )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings

@@ -31,8 +31,8 @@ def axes_of(runs: Sequence[Run]) -> list[int]:
     return sorted(common)
 
 
-def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
-    """Read one axis of a run, up to sample `stop` (half-open) if that is given.
+def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None) -> Recording:
+    """Read samples start..stop (half-open; all by default) of one axis of a run.
 
     Raises
     ------
@@ -59,7 +59,7 @@ def read_recording(run: Run, axis: int, stop: int | None = None) -> Recording:
         for name, field in FIELDS.items()
         if name in channels.columns and not (three and name == "current")
     }
-    samples = run.read([*named.values(), *(channels.phases if three else ())], 0, stop)
+    samples = run.read([*named.values(), *(channels.phases if three else ())], start, stop)
     arrays = {key: np.asarray(samples[name], dtype=np.float64) for key, name in named.items()}
     phases = None
     if three:

@@ -20,6 +20,10 @@ MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
 much better from more."""
 
+BESIDE_S = 1.0
+"""Rest that is read before the first and after the last motion of the axis: of a program that moves
+one axis after the other most of a recording lies outside."""
+
 LEAST_HZ = 100.0
 """Slower logs are interpolated: the change of a joint is sought on a grid of this rate."""
 
@@ -34,7 +38,7 @@ def explain(
     baseline: Sequence[RunSource],
     target: Sequence[RunSource],
     config: JointConfig,
-    first_motion: Mapping[str, int] | None = None,
+    moving: Mapping[str, tuple[int, int]] | None = None,
 ) -> dict[str, Any] | None:
     """Trace the change of one joint to an effect of the library.
 
@@ -46,9 +50,8 @@ def explain(
         Runs in which the axis moves, in time order.
     config
         Gear ratio and pole pairs, effects of the user's own, and how much is looked at.
-    first_motion
-        Sample at which the axis first moves, by run; where it waits for others, what is looked
-        at is counted from there.
+    moving
+        Samples between which the axis moves (half-open), by run: nothing else is looked at.
 
     Returns
     -------
@@ -64,7 +67,7 @@ def explain(
     sides = []
     seconds = 60.0 * config.explain_minutes
     for sources in (baseline, target):
-        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, first_motion or {})
+        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, moving or {})
         if not recordings:
             return None
         sides.append(recordings)
@@ -86,26 +89,33 @@ def library_of(config: JointConfig) -> Library:
     return built_in_library() | {effect.name: effect for effect in own}
 
 
-def first_motions(patterns: pa.Table) -> dict[int, dict[str, int]]:
-    """Return, by axis and run, where the first identified motion of a pattern table starts."""
-    found: dict[int, dict[str, int]] = {}
-    for row in patterns.select(["axis", "run", "start"]).to_pylist():
+def moving_samples(patterns: pa.Table) -> dict[int, dict[str, tuple[int, int]]]:
+    """Return, by axis and run, from where to where the motions of a pattern table are."""
+    found: dict[int, dict[str, tuple[int, int]]] = {}
+    for row in patterns.select(["axis", "run", "start", "stop"]).to_pylist():
         runs = found.setdefault(row["axis"], {})
-        runs[row["run"]] = min(row["start"], runs.get(row["run"], row["start"]))
+        first, last = runs.get(row["run"], (row["start"], row["stop"]))
+        runs[row["run"]] = (min(first, row["start"]), max(last, row["stop"]))
     return found
 
 
 def _recordings(
-    axis: int, sources: Sequence[RunSource], seconds: float, first_motion: Mapping[str, int]
+    axis: int,
+    sources: Sequence[RunSource],
+    seconds: float,
+    moving: Mapping[str, tuple[int, int]],
 ) -> list[Recording]:
     found = []
     for source in sources:
+        rate_hz = source.info.sampling_rate_hz
+        beside = round(BESIDE_S * rate_hz)
+        first, last = moving.get(source.name, (0, source.n_samples))
         # minutes are those of a log of this rate: a slower one costs no more for being longer
-        stop = round(seconds / len(sources) * max(source.info.sampling_rate_hz, LEAST_HZ))
-        stop += first_motion.get(source.name, 0)
+        most = round(seconds / len(sources) * max(rate_hz, LEAST_HZ))
+        start, stop = max(first - beside, 0), min(last + beside, first + most)
         try:
             with source.open() as run:
-                found.append(interpolated(read_recording(run, axis, stop), LEAST_HZ))
+                found.append(interpolated(read_recording(run, axis, start, stop), LEAST_HZ))
         except OpamcError:
             continue  # the run served the chain but not a model, which needs motion beside current
     return found

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from opamc_cli.config.models import JointConfig
@@ -77,21 +78,45 @@ class Notch(Effect):
 """
 
 
-def pushed(folder, extra_a):
-    """Write three sessions of strokes with dry friction; the current of a notch in later ones."""
+def pushed(folder, extra_a, rest=0):
+    """Write three sessions of strokes with dry friction; the current of a notch in later ones.
+
+    Before and after them the joint is held for `rest` samples against another one's motion.
+    """
     rng = np.random.default_rng(1)
     time = np.arange(0, 24, 0.01)
     q = 1.2 * np.sin(time) + 0.3 * np.sin(2.3 * time)
     for k in range(3):
         current = (1 + 0.02 * rng.normal()) * np.sign(np.gradient(q)) + 0.8 * np.sin(q)
         current += extra_a * np.exp(-(((q - 0.4) / 0.1) ** 2)) + 0.05 * rng.normal(size=q.size)
-        columns = {"axis1_current": current.astype(np.float32), "axis1_position": q}
+        held = 3 * np.sin(0.05 * np.arange(rest))
+        columns = {
+            "axis1_current": np.concatenate([held, current, held]).astype(np.float32),
+            "axis1_position": np.pad(q, rest, mode="edge"),
+        }
         save_run(folder / f"{k}.parquet", RunInfo(sampling_rate_hz=100.0), columns)
     found = []
     for name, path in find_runs([folder]):
         with Run(path, name) as run:
             found.append(RunSource(name, path, "", run.n_samples, run.info))
     return found
+
+
+def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
+    found = []
+    for rest in (0, 1500):
+        sides = [
+            pushed(tmp_path / f"{rest} {extra_a}", extra_a, rest=rest) for extra_a in (0.0, 0.6)
+        ]
+        # a second beside these is looked at: all that is not rest
+        motions = [(rest + 1200, rest + 2300), (rest + 100, rest + 1100)] * 3
+        starts, stops = zip(*motions, strict=True)
+        runs = [str(k) for k in (0, 0, 1, 1, 2, 2)]
+        table = pa.table({"axis": [1] * 6, "run": runs, "start": starts, "stop": stops})
+        moving = cause.moving_samples(table)[1]
+        found.append(cause.explain(1, *sides, JointConfig(), moving))
+    assert found[0] is not None
+    assert found[0] == found[1]
 
 
 def test_an_effect_of_the_user_s_own_may_be_the_cause(tmp_path):
