@@ -147,8 +147,8 @@ def explain_change(
     units = [unit.with_model(terms, population.mean) for unit in before + after]
 
     slow = find_slow_causes(units, population, library)
-    plain, white = fast_residuals(units, terms, slow[-1].shift if slow else None)
-    periodic = find_periodic(units, white, plain, LINES_DIFFER if cycles else 0.0)
+    residuals = fast_residuals(units, terms, slow[-1].shift if slow else None)
+    periodic = find_periodic(units, residuals, LINES_DIFFER if cycles else 0.0)
     held = 0.0 if periodic is None else periodic.power
 
     energy = energy_of(units, population, slow_found=bool(slow))

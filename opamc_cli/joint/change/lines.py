@@ -13,7 +13,6 @@ from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 from opamc_cli.joint.noise.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
-from opamc_cli.joint.noise.whitening import autoregression, settled, whitened
 
 MOST_BINS = 2**19
 BINS_PER_WAVE = 16
@@ -31,7 +30,7 @@ NEIGHBOURHOOD = 12
 
 @dataclass(frozen=True)
 class OrderSpectra:
-    """Whitened power over order, one row per unit, on one grid."""
+    """Power over order, one row per unit, on one grid."""
 
     orders: Floats
     """Cycles per revolution of the machine angle; (k,)."""
@@ -62,35 +61,25 @@ class Line:
     """Corrected for the number of orders."""
 
 
-def fast_residuals(
-    units: list[Unit], terms: tuple[Term, ...], shift: Shift | None
-) -> tuple[list[Floats], list[Floats]]:
-    """Residuals of every unit's own fit on the full grid, plain and whitened; zero elsewhere.
+def fast_residuals(units: list[Unit], terms: tuple[Term, ...], shift: Shift | None) -> list[Floats]:
+    """Residuals of every unit's own fit on the full grid; zero where samples do not count.
 
     Parameters
     ----------
     units : list of Unit
-        Of both sides; the whitening filter is the baseline's.
+        Of both sides.
     terms : tuple of Term
         The joint's model.
     shift : Shift or None
         Slow effects that are taken from the target's current first.
     """
-    plain = []
+    residuals = []
     for unit in units:
         full = np.zeros(unit.fine.size)
         current = without(unit, shift)
         full[unit.fine_rows] = own_fit(unit, terms, fine=True, current=current)[1]
-        plain.append(full)
-    old = [k for k, unit in enumerate(units) if not unit.after]
-    taps = autoregression(
-        np.concatenate([plain[k] for k in old]), np.concatenate([units[k].fine_rows for k in old])
-    )
-    white = []
-    for unit, residual in zip(units, plain, strict=True):
-        ready = settled(unit.fine_rows, unit.fine.bounds, taps.size - 1)
-        white.append(np.where(ready, whitened(residual, taps), 0.0))
-    return plain, white
+        residuals.append(full)
+    return residuals
 
 
 def clocked(unit: Unit) -> Unit:
@@ -140,11 +129,11 @@ def _bridged(side: Floats, track: Track) -> Floats:
     return bridged
 
 
-def order_spectra(units: list[Unit], white: list[Floats]) -> OrderSpectra | None:
+def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | None:
     """Spectra of all units on one grid of orders; None where no stroke is long enough."""
     pieces = [
         (unit, residual, strokes(unit.fine, unit.fine_rows & (residual != 0)))
-        for unit, residual in zip(units, white, strict=True)
+        for unit, residual in zip(units, residuals, strict=True)
     ]
     pieces = [piece for piece in pieces if piece[2]]
     travels = [

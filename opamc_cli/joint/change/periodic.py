@@ -31,7 +31,7 @@ class Periodic:
 
 
 def find_periodic(
-    units: list[Unit], white: list[Floats], plain: list[Floats], between: float = 0.0
+    units: list[Unit], residuals: list[Floats], between: float = 0.0
 ) -> Periodic | None:
     """Read the lines that grew.
 
@@ -39,8 +39,8 @@ def find_periodic(
     ----------
     units : list of Unit
         Of both sides.
-    white, plain : lists of arrays
-        Residuals of every unit's own fit on its fine track, whitened and as they are.
+    residuals : list of arrays
+        Of every unit's own fit on its fine track.
     between : float
         See `grown_lines`.
 
@@ -49,12 +49,12 @@ def find_periodic(
     Periodic or None
         None where no line grew, or one that keeps its frequency and is not the mains'.
     """
-    spectra = order_spectra(units, white)
+    spectra = order_spectra(units, residuals)
     lines = [] if spectra is None else grown_lines(spectra, between)
     if spectra is None or not lines:
         return None
     timed = [clocked(unit) for unit in units]
-    hum = _picked_up(timed, white, plain, lines[0], between)
+    hum = _picked_up(timed, residuals, lines[0], between)
     if hum is not None:
         return hum
     reading = read_lines(lines, units[0].fine, spectra.resolution)
@@ -62,34 +62,35 @@ def find_periodic(
         return None
     if not reading.known:
         # An order that means nothing may be a frequency: hum, or a structure that rings.
-        clock = order_spectra(timed, white)
+        clock = order_spectra(timed, residuals)
         beats = grown_lines(clock, between) if clock is not None else []
         if clock is not None and beats and beats[0].excess > lines[0].excess:
             at = read_frequency(beats[0], clock.resolution)
-            return None if at is None else Periodic(at, comb_energy(timed, plain, at.fundamental))
-    return Periodic(reading, comb_energy(units, plain, reading.fundamental))
+            return (
+                None if at is None else Periodic(at, comb_energy(timed, residuals, at.fundamental))
+            )
+    return Periodic(reading, comb_energy(units, residuals, reading.fundamental))
 
 
 def _picked_up(
-    timed: list[Unit], white: list[Floats], plain: list[Floats], strongest: Line, between: float
+    timed: list[Unit], residuals: list[Floats], strongest: Line, between: float
 ) -> Periodic | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
-    spectra = _standing_spectra(timed, white)
+    sides = _quadratures(timed, residuals)
+    spectra = _standing_spectra(timed, sides)
     beats = [] if spectra is None else grown_lines(spectra, between)
     if spectra is None or not beats or beats[0].excess < STANDING * strongest.excess:
         return None
     reading = read_frequency(beats[0], spectra.resolution)
     if reading is None:
         return None
-    sides = _quadratures(timed, plain)
     # Half of it is there; the other half turns twice as fast as the field.
     held = 2 * sum(comb_energy(timed, side, reading.fundamental) for side in sides)
     return Periodic(reading, held)
 
 
-def _standing_spectra(timed: list[Unit], white: list[Floats]) -> OrderSpectra | None:
+def _standing_spectra(timed: list[Unit], sides: list[list[Floats]]) -> OrderSpectra | None:
     """Power over frequency in the phases' frame, summed over its two axes."""
-    sides = _quadratures(timed, white)
     if not sides:
         return None
     one, other = order_spectra(timed, sides[0]), order_spectra(timed, sides[1])

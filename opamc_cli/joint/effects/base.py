@@ -88,7 +88,7 @@ class Effect:
         track : Track
             The recording at the rate at which the effect is evaluated.
         residual : array of shape (n,)
-            Whitened residual, zero where samples do not count.
+            Zero where samples do not count.
         """
         return [{}]
 

@@ -52,7 +52,7 @@ class Ripple(Effect):
     forms = (*SWITCHES, "answer", "top_hz")
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Strongest orders of the whitened residual, with every dependence."""
+        """Strongest orders of the residual, with every dependence."""
         found: list[Parameters] = []
         lines = order_lines(track, residual, count=2)
         strongest = sorted(lines, key=lambda line: -line[1])[:MOST_EXPANDED]

@@ -69,7 +69,7 @@ def order_spectrum(
     track : Track
         Track at the full rate.
     residual : array of shape (n,)
-        Whitened residual; zero where samples do not count.
+        Zero where samples do not count.
     top : float, optional
         Highest order; that which is not folded at the median speed if missing.
 
@@ -128,7 +128,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     track : Track
         Track at the full rate.
     residual : array of shape (n,)
-        Whitened residual; zero where samples do not count.
+        Zero where samples do not count.
     count : int
         Strongest peaks, and so many of those that stand out most of their surroundings.
 
@@ -189,7 +189,7 @@ def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floa
     track : Track
         With the phases' electrical angle, where they were logged.
     residual : array of shape (n,)
-        Whitened residual.
+        Of a fit.
 
     Returns
     -------
@@ -219,7 +219,7 @@ def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
     track : Track
         Gives the rate, and the time that passes between its recordings or pieces.
     residual : array of shape (n,)
-        Whitened residual, zero where samples do not count.
+        Zero where samples do not count.
 
     Returns
     -------
