@@ -16,7 +16,7 @@ from opamc_cli.joint.name.search import Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
-from opamc_cli.joint.noise.spectra import highest_order, order_resolution
+from opamc_cli.joint.spectra import highest_order, order_resolution
 
 CLOSED_SHARE = 0.9
 """Of the ceiling that has to be reached."""

@@ -18,7 +18,7 @@ from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, averaged, block_mean, coarsen
-from opamc_cli.joint.noise.spectra import order_lines, order_resolution
+from opamc_cli.joint.spectra import order_lines, order_resolution
 
 VOCABULARY = [
     "inertia",

@@ -8,7 +8,7 @@ from opamc_cli.joint.change.lines import strokes
 from opamc_cli.joint.change.slow import Population, Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.joint.noise.spectra import highest_order
+from opamc_cli.joint.spectra import highest_order
 
 MOST_HARMONICS = 4
 KNOTS = 6

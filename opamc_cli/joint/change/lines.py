@@ -12,7 +12,7 @@ from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.noise.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
+from opamc_cli.joint.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
 
 MOST_BINS = 2**19
 BINS_PER_WAVE = 16

@@ -6,7 +6,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.noise.spectra import LEAST_LINE, line_power, standing_views
+from opamc_cli.joint.spectra import LEAST_LINE, line_power, standing_views
 
 MAINS_HZ = (50.0, 60.0)
 HIGHEST_HARMONIC = 12

@@ -8,7 +8,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.noise.spectra import highest_order, order_lines, order_resolution
+from opamc_cli.joint.spectra import highest_order, order_lines, order_resolution
 
 SWITCHES = ("speed", "direction", "load", "current")
 DAMPING = 0.4

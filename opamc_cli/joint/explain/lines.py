@@ -4,7 +4,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.noise.spectra import LEAST_LINE, line_power, order_lines, order_resolution
+from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines, order_resolution
 
 LOWEST_HZ = 1.0
 HIGHEST_SHARE = 0.48

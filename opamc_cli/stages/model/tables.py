@@ -15,7 +15,7 @@ from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
-from opamc_cli.joint.noise.spectra import order_resolution, order_spectrum
+from opamc_cli.joint.spectra import order_resolution, order_spectrum
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 

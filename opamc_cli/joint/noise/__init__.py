@@ -1,1 +1,0 @@
-"""Spectra and colour of what is left."""
