@@ -199,6 +199,8 @@ def _dataset(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Datas
         sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
         touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
         coarse = _grid(replace(coarse_track, moving=coarse_track.moving & ~touched), groups, ())
+        # Of a second of motion a long moving average may leave nothing.
+        coarse = coarse if coarse.fit.any() else fine
     return Dataset(fine, coarse, factor, grouping, groups)
 
 
@@ -339,7 +341,9 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     """
     dataset, terms = fitted.dataset, fitted.terms
     track = dataset.fine.track
-    if not any(term.effect.follows_load for term in terms):
+    follow = any(term.effect.follows_load for term in terms)
+    # What carried the load may have been taken out again.
+    if not follow or not any(term.effect.carries_load for term in terms):
         return dataset
     rows = np.flatnonzero(dataset.fine.fit)
     rows = rows[:: max(rows.size // LOAD_SAMPLES, 1)]

@@ -123,3 +123,14 @@ def test_fits_that_share_regressors_are_those_that_compute_their_own():
 
 def term_columns(dataset, term):
     return replace(dataset, cache=RegressorCache()).columns(term, fine=False)
+
+
+def test_friction_that_follows_the_load_finds_none_where_nothing_carries_one():
+    track, grouping = long_track(cycles=6)
+    dataset = dataset_of(track, grouping)
+    with_load = fit_terms(
+        dataset, terms(("coulomb", {}), ("spring", {}), ("load_friction", {"inertia_share": 1.0}))
+    )
+    left = fit_terms(with_load.dataset, (with_load.terms[0], with_load.terms[2]))
+    alone = fit_terms(dataset, with_load.terms[:1])
+    assert left.rmse(sealed=False) == pytest.approx(alone.rmse(sealed=False), rel=1e-9)
