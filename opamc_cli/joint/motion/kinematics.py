@@ -103,7 +103,9 @@ def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
         for window in WINDOWS_S
     }
     ways = [False, True] if speeds else [False]
-    return [Smoothing(window, way) for window in windows.values() for way in ways]
+    shortest = min(recording.size for recording in recordings)
+    kept = [window for samples, window in windows.items() if samples <= shortest]
+    return [Smoothing(window, way) for window in kept for way in ways]
 
 
 @dataclass(frozen=True)
