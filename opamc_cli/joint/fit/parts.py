@@ -12,6 +12,8 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 FEWEST_UNITS = 8
 """Units that are left out in turn: fewer groups than that are halved until they suffice."""
+ROUNDING = 1e-12
+"""Share of a sum of products below which a difference of two is their rounding."""
 PARTS_PER_UNIT = 4
 """So many drops per unit make the standard error of a drop: 9 units have 36."""
 
@@ -174,7 +176,11 @@ class Sums:
     @cached_property
     def inverses(self) -> Floats:
         """Pseudo-inverse of the products outside each unit, shape (units, k, k)."""
-        return inverse(self.parts.elsewhere(self.gram))
+        rest = self.parts.elsewhere(self.gram)
+        sizes = np.diagonal(rest, axis1=1, axis2=2)
+        # What only one unit excites is nothing but rounding outside of it, of any sign.
+        excited = sizes > ROUNDING * np.diagonal(self.gram.sum(axis=0))
+        return inverse(rest * (excited[:, :, None] & excited[:, None, :]))
 
     @cached_property
     def coefficients(self) -> Floats:

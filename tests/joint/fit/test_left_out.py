@@ -99,6 +99,17 @@ def test_collinear_columns_and_empty_ones_change_no_error(seed, width, units):
     np.testing.assert_allclose(fast, slow_held_out(columns, signal, parts), rtol=1e-5, atol=1e-9)
 
 
+def test_what_one_unit_alone_excites_has_no_coefficient_from_elsewhere():
+    _, parts, columns, signal = drawn(3, 3, 9)
+    alone = parts.unit == 4
+    columns[parts.rows[unit_of_rows(parts) != 4], 0] *= 1e-9
+    fast = sums_of(columns, signal, parts).held_out()
+    with_it = slow_held_out(columns, signal, parts)
+    without_it = slow_held_out(columns[:, 1:], signal, parts)
+    np.testing.assert_allclose(fast[~alone], with_it[~alone], rtol=1e-6)
+    np.testing.assert_allclose(fast[alone], without_it[alone], rtol=1e-6)
+
+
 def test_a_model_of_nothing_leaves_the_current():
     _, parts, columns, signal = drawn(1, 2, 8)
     power = [np.sum(signal[parts.rows][a:b] ** 2) for a, b in parts.slices]
