@@ -199,6 +199,31 @@ def test_wrong_declarations_end_in_one_sentence(folder, capsys, model, axis, cod
         assert "model.yaml:" in error
 
 
+def with_gaps(folder, share):
+    """The current without a number in so much of every second."""
+    table = pq.read_table(folder / "run.parquet")
+    current = table.column("axis1_current").to_numpy().copy()
+    current[np.arange(current.size) % 250 < share * 250] = np.nan
+    table = table.set_column(0, "axis1_current", pa.array(current, from_pandas=False))
+    pq.write_table(table, folder / "run.parquet")
+    return int(np.isnan(current).sum())
+
+
+def test_gaps_are_said(folder, capsys):
+    missing = with_gaps(folder, 0.02)
+    assert close(folder, "--axis", "1") == 0
+    said = f"{missing} of 10972 samples lack a number and are left out"
+    assert said in capsys.readouterr().err
+    assert said in json.loads((folder / "out" / "loop.json").read_text())["axes"][0]["notes"][0]
+
+
+def test_a_channel_that_is_mostly_gaps_is_refused_also_if_quiet(folder, capsys):
+    with_gaps(folder, 0.6)
+    assert close(folder, "--axis", "1", "--quiet") == 3
+    assert "column axis1_current holds no number in 60% of its samples" in capsys.readouterr().err
+    assert not (folder / "out" / "loop.json").exists()
+
+
 def test_too_little_motion_to_seal_anything_off(folder, capsys):
     made = simulate(3, (), 0.0, rate=250.0, cycles=6)
     write_run(

@@ -120,9 +120,7 @@ def close(
         *(shown for result in outcome.results for shown in loop_tables(result)),
         *(str(published(path)) for path in outcome.written),
     )
-    raise typer.Exit(
-        output.failures([str(error) for error in outcome.errors], len(outcome.results))
-    )
+    _end(outcome, output)
 
 
 @app.command()
@@ -171,6 +169,12 @@ def _on_axes(
         *(line for result in outcome.results for line in shown(result)),
         *(str(path) for path in outcome.written),
     )
+    _end(outcome, output)
+
+
+def _end(outcome: "Outcome", output: Output) -> None:
+    """Say what the recordings lack and what failed, and end."""
+    output.notes(list(dict.fromkeys(note for one in outcome.results for note in one["notes"])))
     raise typer.Exit(
         output.failures([str(error) for error in outcome.errors], len(outcome.results))
     )

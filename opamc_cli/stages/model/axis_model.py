@@ -21,7 +21,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.model.declared_terms import declared_term
-from opamc_cli.stages.recordings.axis_recording import read_recording
+from opamc_cli.stages.recordings.axis_recording import gaps, read_recording
 from opamc_cli.storage.runs import Run
 
 
@@ -39,6 +39,8 @@ class AxisModel:
     """Effects that may be added."""
     unit: str
     """Of the current: "A", or "Nm" where a torque stands for it."""
+    notes: list[str]
+    """What the recordings lack."""
 
     @property
     def dataset(self) -> Dataset:
@@ -77,7 +79,7 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     """
     library = library_of(model)
     declared = declared_effects(model, library)
-    recordings, unit = recordings_of(runs, axis)
+    recordings, unit, notes = recordings_of(runs, axis)
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
 
@@ -97,7 +99,7 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, fit, declared, allowed, unit)
+    return AxisModel(axis, fit, declared, allowed, unit, notes)
 
 
 def declared_effects(
@@ -115,8 +117,8 @@ def declared_effects(
     return tuple((effect_named(known, d.effect), d) for d in model.declared())
 
 
-def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str]:
-    """Read one axis of some runs, in time order; return the unit of its current beside it.
+def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str, list[str]]:
+    """Read one axis of some runs, in time order; return also its current's unit, and what lacks.
 
     Raises
     ------
@@ -141,9 +143,10 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str]
         if recording.size < 64:
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
+    notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return recordings, units.pop()
+    return recordings, units.pop(), notes
 
 
 def _too_little_motion(

@@ -61,7 +61,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     closed = model.closed
     assert closed is not None
     effects = declared_effects(model, library_of(model))
-    recordings, unit = recordings_of(runs, axis)
+    recordings, unit, notes = recordings_of(runs, axis)
     if unit != closed.unit:
         msg = f"{runs[0].path}: is in {unit}, the model was closed in {closed.unit}; give such runs"
         raise InputError(msg)
@@ -97,6 +97,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             for place, recording in enumerate(recordings)
         ],
         "not_applied": left_out,
+        "notes": notes,
     }
 
 

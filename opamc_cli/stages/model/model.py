@@ -124,6 +124,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
             }
             for trial in tried
         ],
+        "notes": laid.notes,
         "untestable": [
             {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
         ],

@@ -57,6 +57,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
         "unit": laid.unit,
         "groups": _groups_entry(laid.dataset),
         "condition_number": known.condition_number,
+        "notes": laid.notes,
         "inseparable": [list(names) for names in known.inseparable],
         "rmse_a": result.rmse(sealed=False),
         "terms": [
@@ -192,6 +193,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         },
         "groups": grouping.kind,
         "orders": loop.orders_note,
+        "notes": laid.notes,
     }
 
 

@@ -19,6 +19,9 @@ UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
 """Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
 SAME_RATIO = 0.03
 
+MOST_MISSING = 0.5
+"""Share of a channel's samples that may lack a number: beyond it more is bridged than recorded."""
+
 FIELDS = {"current": "current_a"} | {name: channel.field for name, channel in LOGGED.items()}
 """What `Recording` calls a channel."""
 
@@ -37,7 +40,8 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
     Raises
     ------
     InputError
-        If the run has no such axis, or neither a signed current nor three phases.
+        If the run has no such axis, neither a signed current nor three phases, or no number in most
+        samples of what is needed.
     """
     channels = run.channels(axis)
     run.check_time()
@@ -79,6 +83,24 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
     return replace(recording, current_a=_with_sign(recording))
 
 
+def gaps(run: Run, recording: Recording) -> list[str]:
+    """Say how much of a recording is left out because a channel that is needed lacks a number."""
+    channels = (
+        recording.current_a,
+        recording.phases_a,
+        recording.position_rad,
+        recording.velocity_rad_s,
+    )
+    missing = np.zeros(recording.size, dtype=bool)
+    for values in channels:
+        if values is not None:
+            missing |= ~np.isfinite(values).reshape(recording.size, -1).all(axis=1)
+    count = np.count_nonzero(missing)
+    if not count:
+        return []
+    return [f"{run.path}: {count} of {missing.size} samples lack a number and are left out"]
+
+
 def interpolated(recording: Recording, least_hz: float) -> Recording:
     """Return a slow recording with samples between its own, by straight lines.
 
@@ -112,8 +134,14 @@ def _with_sign(recording: Recording) -> Array | None:
 
 def _check_channel(run: Run, name: str, values: Array) -> None:
     known = np.isfinite(values)
-    if not known.any():
-        msg = f"{run.path}: column {name} holds no number; check the sensor or leave the column out"
+    # a slow temperature is logged now and then
+    most = 1.0 if quantity_of(name) == "temperature" else MOST_MISSING
+    if not known.any() or np.mean(~known) > most:
+        where = f" in {np.mean(~known):.0%} of its samples" if known.any() else ""
+        msg = (
+            f"{run.path}: column {name} holds no number{where}; check the sensor or leave the "
+            "column out"
+        )
         raise InputError(msg)
     if quantity_of(name) == "current" and np.ptp(values[known]) == 0:
         level = f"{float(values[known][0]):g} {run.info.current_unit}"

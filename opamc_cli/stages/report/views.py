@@ -120,6 +120,7 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
         "experiments": wording.experiments(entry),
         "rejected": [wording.set_aside(item) for item in entry.get("rejected", ())],
         "untestable": [wording.set_aside(item) for item in entry.get("untestable", ())],
+        "notes": [str(note) for note in entry.get("notes", ())],
     }
 
 
