@@ -111,7 +111,7 @@ def simulate(
     Raises
     ------
     ValueError
-        If the program, the faults or the effects do not fit the robot.
+        If the program, the faults or the effects do not fit the robot, or a joint runs away.
     """
     faults = dict(faults or {})
     effects = tuple(complete(effect) for effect in effects)
@@ -224,6 +224,10 @@ def _record_axis(
         np.ascontiguousarray(sections),
         n_total,
     )[settle:]
+    if not np.isfinite(out).all():
+        names = ", ".join(f"{effect.name} {effect.magnitude:g}" for effect in effects)
+        msg = f"axis {axis} runs away ({names or 'nothing undeclared'}): its control is not stable"
+        raise ValueError(msg)
     return _measure(joint, robot, out, session, effects, rate_hz, rng)
 
 

@@ -118,6 +118,7 @@ def test_what_cannot_be_simulated_is_refused(override: str, message: str) -> Non
     "options",
     [
         ["--set", "effects=[{axis: 1, name: gremlin, magnitude: 1}]"],
+        ["--set", "effects=[{axis: 2, name: thermal_viscous, magnitude: 50}]"],
         ["--fault", "three"],
         ["--fault", "3:much"],
     ],

@@ -69,6 +69,11 @@ def run(
     -------
     Outcome
         Per run its entry in `truth.json`.
+
+    Raises
+    ------
+    ConfigError
+        If no session can be recorded.
     """
     sessions = range(
         config.recording.first_session,
@@ -76,6 +81,8 @@ def run(
     )
     orders = [SessionOrder(config, seed, session, out, truth_signals) for session in sessions]
     outcome = map_items(record_session, orders, jobs, watch)
+    if not outcome.results:
+        raise outcome.errors[0]
     truth = {
         "seed": seed,
         "robot": config.robot.name,
