@@ -133,14 +133,18 @@ class Sums:
             _summed(values, halves) for values in (self.gram, self.moment, self.power)
         )
         number = np.maximum(gram[:, -1, -1], 1.0)
-        total, mean = gram[:, :-1, -1], moment[:, -1] / number
+        own, total, mean = gram[:, :-1, :-1], gram[:, :-1, -1], moment[:, -1] / number
+        left = own - np.einsum("pi,pj,p->pij", total, total, 1 / number)
+        # Of what is an offset in every half only rounding is left, of any sign.
+        size, whole = (np.diagonal(one, axis1=1, axis2=2) for one in (left, own))
+        varies = size > ROUNDING * whole
         unit = np.zeros(count, dtype=np.int64)
         unit[halves] = self.parts.unit
         none = np.zeros(0, dtype=np.int64)
         parts = Parts(none, ((0, 0),) * count, unit, np.ones(count, dtype=bool))
         return Sums(
-            gram[:, :-1, :-1] - np.einsum("pi,pj,p->pij", total, total, 1 / number),
-            moment[:, :-1] - total * mean[:, None],
+            left * (varies[:, :, None] & varies[:, None, :]),
+            (moment[:, :-1] - total * mean[:, None]) * varies,
             power - number * mean**2,
             parts,
         )

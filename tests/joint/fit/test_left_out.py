@@ -178,3 +178,16 @@ def test_a_group_of_two_samples_gives_units_of_one():
     parts = parts_of(SimpleNamespace(rows=rows), np.ones(100, dtype=bool))
     assert parts.units == 6
     np.testing.assert_array_equal(parts.rows[:2], [3, 4])
+
+
+def test_what_is_an_offset_in_every_half_has_no_part_beside_the_offsets():
+    rng = np.random.default_rng(4)
+    grid = SimpleNamespace(rows=[np.arange(k * 40, k * 40 + 40) for k in range(8)])
+    parts = parts_of(grid, np.ones(320, dtype=bool))
+    half = np.repeat(parts.halves, [stop - start for start, stop in parts.slices])
+    steps = rng.normal(size=half.max() + 1)[half]
+    ramp, ones = rng.normal(size=320), np.ones(320)
+    current = 2 * ramp + 5 * steps + 0.1 * rng.normal(size=320)
+    plain = sums_of(np.stack([ramp, ones], axis=1), current, parts).without_drift()
+    beside = sums_of(np.stack([ramp, steps, ones], axis=1), current, parts).without_drift()
+    np.testing.assert_allclose(beside.held_out(), plain.held_out(), rtol=1e-9)
