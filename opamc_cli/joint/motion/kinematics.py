@@ -434,10 +434,8 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         channels |= {"temperature"}
     n = motion.velocity.size
     moving = moving_samples(motion, usable)
-    uncertain = motion.taken_noise
-    if motion.window <= SHORTEST_WINDOW:
-        # Without an encoder's noise vibration shows, of which the window takes a little everywhere.
-        uncertain = max(uncertain, LEAST_CORNER * float(np.std(motion.acceleration)))
+    # Of vibration the window takes a little everywhere.
+    uncertain = max(motion.taken_noise, LEAST_CORNER * float(np.std(motion.acceleration)))
     clear = clear_of_corners(motion.acceleration, current, moving, motion.kernel, uncertain)
     if motion.window <= SHORTEST_WINDOW:
         # The coarse grid has no counterpart for so short an average.

@@ -9,7 +9,7 @@ from simulator import simulate
 
 from opamc_cli.joint.fit.model import dataset_of
 from opamc_cli.joint.motion.corners import clear_of_corners
-from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.smoothing import (
     averaging_kernel,
@@ -127,3 +127,21 @@ def test_nothing_is_added_to_a_joint_with_a_coarse_encoder(seed):
     _, loop = close_on(seed, (), ratio=0.0, quantum=5e-4)
     assert loop.steps == ()
     assert loop.verdict == "nothing-missing"
+
+
+@pytest.mark.parametrize("sway", [0.02, 0.3])
+def test_vibration_is_no_corner(sway):
+    """A joint that a ripple shakes all along: the ripple's current is no inertia's."""
+    rate, window = 2000.0, 11
+    t, steps, _ = trapezoid(rate)
+    acceleration = steps + sway * np.sin(2 * np.pi * 25 * t)
+    path = np.cumsum(np.cumsum(acceleration)) / rate**2
+    # in the current the ripple is larger than the inertia's part of it
+    current = 0.2 * steps + 0.5 * sway * np.cos(2 * np.pi * 25 * t)
+    current += np.random.default_rng(0).normal(0, 0.001, t.size)
+    recording = Recording("run", rate, current_a=current, position_rad=path)
+    track = build_track([recording], Joint(), Smoothing(window / rate, from_velocity=False))
+    rows = track.moving
+    assert np.mean(track.clear[rows]) > 0.9
+    at_corners = np.abs(t[:, None] - [0.5, 1.5, 2.0]).min(axis=1) < 0.5 * window / rate
+    assert not track.clear[rows & at_corners].any()
