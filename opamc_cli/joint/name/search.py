@@ -1,7 +1,7 @@
 """Follow several chains of effects side by side, and keep the one that is worth its price."""
 
 from collections.abc import Collection
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -158,9 +158,10 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         and not effect.untestable(dataset.coarse.track)
         for term in guessed(effect, dataset)
     ]
+    names = {effect.name for effect in free}
     for batch in (*pool.slow, *batches_of(dataset, following, fine=False)):
         for term, drop in zip(batch.terms, slow.drops(batch), strict=True):
-            if term.effect.name not in present:
+            if term.effect.name in names:
                 note(judged(term, float(drop), batch.width, reference))
     fast = Beside(chain, fine=True) if any(effect.fast for effect in free) else slow
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
@@ -210,6 +211,22 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         share, t_value = child.gain_over(chain)
         found.append(Trial(chain, child, share, t_value, objection(child, chain, pool)))
     return found
+
+
+def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
+    """Return the trials that may be added.
+
+    What takes most off is no measure of what is promising where it is not physical: the others are
+    looked at again without it.
+    """
+    while found := trials(chain, pool, known):
+        possible = [trial for trial in found if trial.why_not is None]
+        refused = {one.term.effect.name for one in found if one.gain >= pool.least_share}
+        if possible or not refused:
+            return possible
+        library = {name: one for name, one in pool.library.items() if name not in refused}
+        pool = replace(pool, library=library)
+    return []
 
 
 def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
@@ -266,12 +283,7 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
     best = start
     known: set[Signature] = set()
     for _ in range(MOST_STEPS):
-        following = [
-            trial.chain
-            for chain in chains
-            for trial in trials(chain, pool, known)
-            if trial.why_not is None
-        ]
+        following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
         if not following:
             break
         chains = sorted(following, key=lambda chain: chain.score)[:width]

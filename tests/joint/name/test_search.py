@@ -69,6 +69,20 @@ def why_not(chain, term, *without):
     return objection(extended(chain, term), chain, pool)
 
 
+def test_what_is_not_physical_hides_nothing(monkeypatch):
+    """The best guess was refused, and what fell by less than a quarter of it was not looked at."""
+
+    def both(q, v, a, t):
+        return 2 * one(np.sin(7 * q)) + one(np.sign(v) * np.exp(-((v / 0.1) ** 2)))
+
+    chain = chain_on("cyclic", both, strength=20.0)
+    pool = pool_of(chain, "ripple", "stribeck")
+    assert "ripple" in names_of(beam(chain, pool))
+    monkeypatch.setattr(type(LIBRARY["ripple"]), "plausible", lambda self, values, names: False)
+    assert names_of(beam(chain, pool)) == ["stribeck"]
+    assert names_of(beam(chain, pool_of(chain, "ripple"))) == []
+
+
 def test_an_effect_has_to_take_its_share():
     chain = chain_on("cyclic", bump, strength=2.0)
     assert why_not(chain, drag()) is None
