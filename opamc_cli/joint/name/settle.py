@@ -1,5 +1,6 @@
 """What a chain keeps when each effect is asked again beside the others."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
@@ -90,7 +91,7 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
         passing = [other.chain for other in trials(parent, pool) if other.why_not is None]
         return min(passing, key=lambda chain: chain.score, default=parent)
     if "unnamed" not in pool.without:
-        for rival in trials(parent, _slow(unnamed)):
+        for rival in trials(parent, _rivals_of([term], unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain
     return None
@@ -112,15 +113,26 @@ def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:
         parent = best
         for place in reversed(group):
             parent = without(parent, place)
-        for rival in trials(parent, _slow(unnamed)):
+        for rival in trials(parent, _rivals_of([best.terms[i] for i in group], unnamed)):
             if rival.why_not is None and rival.chain.score < best.score:
                 return rival.chain
     return None
 
 
-def _slow(pool: Pool) -> Pool:
-    slow = {name: effect for name, effect in pool.library.items() if not effect.fast}
-    return replace(pool, library=slow)
+def _rivals_of(terms: Sequence[Term], unnamed: Pool) -> Pool:
+    """Return the functions without a name that may stand in the place of some effects.
+
+    A line that shakes the joint is in the measured acceleration, too: what looks at that, or
+    filters it, is no rival.
+    """
+    library = {name: one for name, one in unnamed.library.items() if not one.fast}
+    if any(term.effect.fast for term in terms):
+        library = {
+            name: one
+            for name, one in library.items()
+            if one.domain != "acceleration" and not one.as_smoothing
+        }
+    return replace(unnamed, library=library)
 
 
 def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> bool:

@@ -1,13 +1,16 @@
 """What a chain keeps when each effect is asked again beside all others, and what ties with it."""
 
 import numpy as np
+import pytest
 from closing import joint_of, plain_fit
+from scipy.signal import bilinear, lfilter
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
-from opamc_cli.joint.name.search import Pool
+from opamc_cli.joint.name.search import Pool, beam, trials
 from opamc_cli.joint.name.settle import settled
 
 LIBRARY = built_in_library()
@@ -72,3 +75,25 @@ def test_a_name_that_holds_nine_tenths_of_a_function_keeps_its_place():
     chain, named = settle(bent, term("stribeck", **SPEED), names=("stribeck",), strength=20.0)
     assert [one.term.effect.name for one in named] == ["stribeck"]
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
+
+
+@pytest.mark.parametrize("resonance_hz", [6.0, 12.0])
+def test_a_ripple_that_shakes_the_measured_motion_keeps_its_name(resonance_hz):
+    """What looks at the acceleration fits the current better: the acceleration is the ripple's."""
+    rng, rate, order, w = np.random.default_rng(2), 1000.0, 60.0, 2 * np.pi * resonance_hz
+    t = np.arange(round(20 * rate)) / rate
+    speed = 0.6 * np.clip(3 * np.sin(2 * np.pi * t / 5), -1, 1)
+    path = np.cumsum(speed) / rate
+    swelling = 1 + np.interp(t, np.arange(30) * 0.7, rng.normal(size=30))
+    torque = 0.3 * swelling * np.cos(order * path)
+    shaken = path + 0.2 * lfilter(*bilinear([1.0], [1.0, 0.6 * w, w**2], rate), torque)
+    rigid = 0.2 * np.gradient(speed) * rate + np.sin(path) + 0.5 * np.sign(speed) + 0.3 * speed
+    current = rigid + torque + rng.normal(0, 0.01, t.size)
+    recording = Recording("run", rate, current_a=current, position_rad=shaken)
+    start = chain_of(plain_fit(recording), 0)
+    pool = Pool.of(start.fit.dataset, {"ripple": LIBRARY["ripple"]})
+    unnamed = Pool.of(start.fit.dataset, unnamed_library())
+    best = beam(start, pool)
+    assert min(trial.chain.score for trial in trials(start, unnamed)) < best.score - 0.2
+    _, named = settled(best, pool, unnamed)
+    assert "ripple" in [one.term.effect.name for one in named]
