@@ -43,6 +43,19 @@ def test_speed_is_the_electrical_one():
     assert np.median(np.abs(error)) < 0.01 * np.abs(true).max()
 
 
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3])
+def test_a_sensor_s_zero_error_does_not_turn_the_angle(share):
+    """A third of the current: what was told of it in one round left swings of half a turn."""
+    made = simulate(3, rate=2048.0)
+    error = share * float(np.quantile(np.abs(made.current), 0.9))
+    angle = follow_phases(made.phases + error * np.array([1.0, -0.3, -0.7]), made.rate_hz)
+    true = made.velocity * made.gear_ratio * made.pole_pairs
+    clear = angle.strong & (np.abs(true) > 0.2 * np.abs(true).max())
+    side = np.sign(np.dot(angle.velocity_rad_s, true))
+    wrong = np.abs(side * angle.velocity_rad_s - true)[clear] > 0.05 * np.abs(true).max()
+    assert np.mean(wrong) < 0.01
+
+
 def test_delay_of_the_phase_sensors_does_not_turn_the_torque_axis():
     rate, delay_s, poles, ratio = 2048.0, 1e-3, 5, 100.0
     time_s = np.arange(int(8 * rate)) / rate
