@@ -1,0 +1,63 @@
+"""The current vector is followed through its zeros, and freed of what sensors add to it."""
+
+import numpy as np
+import pytest
+from simulator import simulate
+
+from opamc_cli.joint.motion.phases.following import (
+    averaged_angle,
+    follow_phases,
+    without_sensor_errors,
+)
+
+
+def test_speed_is_the_electrical_one():
+    made = simulate(3, rate=2048.0)
+    angle = follow_phases(made.phases, made.rate_hz)
+    true = made.velocity * made.gear_ratio * made.pole_pairs
+    clear = np.abs(true) > 0.2 * np.abs(true).max()
+    side = np.sign(np.dot(angle.velocity_rad_s, true))
+    error = (side * angle.velocity_rad_s - true)[clear & angle.strong]
+    assert np.median(np.abs(error)) < 0.01 * np.abs(true).max()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.3])
+def test_a_sensor_s_zero_error_does_not_turn_the_angle(share):
+    """A third of the current: what was told of it in one round left swings of half a turn."""
+    made = simulate(3, rate=2048.0)
+    error = share * float(np.quantile(np.abs(made.current), 0.9))
+    angle = follow_phases(made.phases + error * np.array([1.0, -0.3, -0.7]), made.rate_hz)
+    true = made.velocity * made.gear_ratio * made.pole_pairs
+    clear = angle.strong & (np.abs(true) > 0.2 * np.abs(true).max())
+    side = np.sign(np.dot(angle.velocity_rad_s, true))
+    wrong = np.abs(side * angle.velocity_rad_s - true)[clear] > 0.05 * np.abs(true).max()
+    assert np.mean(wrong) < 0.01
+
+
+def test_zero_errors_and_unequal_gains_are_taken_out_of_the_vector():
+    angle = np.linspace(0, 300, 5000)
+    torque = 2 + np.sin(angle / 40)
+    clean = torque * np.exp(1j * angle)
+    vector = clean + (0.1 - 0.2j) + (0.03 + 0.02j) * np.conj(clean)
+    every = np.ones(angle.size, dtype=bool)
+    mended = without_sensor_errors(vector, angle, every)
+    assert np.std(np.angle(vector * np.exp(-1j * angle))) > 0.05
+    assert np.std(np.angle(mended * np.exp(-1j * angle))) < 0.005
+    assert without_sensor_errors(vector, angle, ~every) is vector
+
+
+def test_weak_currents_tell_their_angle_together():
+    rng = np.random.default_rng(10)
+    angle = np.linspace(0, 400, 4000)
+    size = np.where(np.arange(4000) < 2000, 0.25, 0.0)
+    noise = 0.1
+    vector = size * np.exp(1j * angle) + noise * (
+        rng.normal(size=4000) + 1j * rng.normal(size=4000)
+    )
+    strong, measured = averaged_angle(vector, angle + 0.2, noise, 0.0, 2048.0)
+    assert np.mean(strong[50:1950]) > 0.95
+    assert np.mean(strong[2050:]) < 0.02
+    error = np.angle(np.exp(2j * (measured - angle)))[50:1950] / 2
+    assert np.std(error[strong[50:1950]]) < 0.2
+    # One by one they would be off by more.
+    assert np.std(np.angle((vector * np.exp(-1j * angle)) ** 2)[50:1950] / 2) > 0.3
