@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_left_out import random_parts
+from test_parts import random_parts
 
 from opamc_cli.joint.fit import regressor_cache
 from opamc_cli.joint.fit.regressor_cache import RegressorCache

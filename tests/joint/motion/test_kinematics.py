@@ -168,3 +168,14 @@ def test_what_cannot_be_a_recording_is_refused():
         build_track([recorded()], Joint())
     with pytest.raises(ValueError, match="signed current or three phase"):
         build_track([Recording("run", RATE, position_rad=PLACE)], Joint())
+
+
+def test_no_window_is_longer_than_the_shortest_recording():
+    place = np.sin(np.arange(400) / 50)
+    recordings = [
+        Recording(name, 4000.0, current_a=place[:size], position_rad=place[:size])
+        for name, size in (("long", 400), ("short", 300))
+    ]
+    assert [one.window_s for one in smoothings(recordings)] == [0.01, 0.02, 0.05]
+    for smoothing in smoothings(recordings):
+        assert build_track(recordings, Joint(), smoothing).size == 700

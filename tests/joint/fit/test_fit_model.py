@@ -1,0 +1,192 @@
+"""The joint fit on two grids, and terms that follow what was fitted."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closing import joint_of, plain_fit
+
+from opamc_cli.joint.effects.base import Effect, stack
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit import model
+from opamc_cli.joint.fit.model import Term, currents, dataset_of, fit_terms, static_terms
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
+from opamc_cli.joint.motion.recordings import grouped_track
+from opamc_cli.joint.motion.track import Joint
+
+LIBRARY = built_in_library()
+
+
+def term(name, **parameters):
+    return Term(LIBRARY[name], parameters)
+
+
+def rigid():
+    return tuple(term(name) for name in ("inertia", "gravity", "coulomb", "viscous"))
+
+
+def dataset_from(recording):
+    track, grouping = grouped_track([recording], Joint())
+    return dataset_of(track, grouping)
+
+
+def test_the_fit_is_least_squares_of_the_open_samples():
+    dataset = dataset_from(joint_of("cyclic", None, rate=1000.0))
+    fitted = fit_terms(dataset, rigid())
+    rows = dataset.fine.fit
+    assert not (rows & dataset.fine.sealed).any()
+    design = np.concatenate([one.columns(dataset.fine.track) for one in rigid()], axis=1)
+    current = dataset.fine.track.current_a
+    known = np.linalg.lstsq(design[rows], current[rows])[0]
+    np.testing.assert_allclose(np.concatenate(fitted.coefficients), known, rtol=1e-6)
+    np.testing.assert_allclose(fitted.residual_a, current - design @ known, atol=1e-9)
+    rest = fitted.residual_a[dataset.sharp.fit]
+    assert fitted.rmse(sealed=False) == pytest.approx(np.sqrt(np.mean(rest**2)))
+    rest = fitted.residual_a[dataset.sharp.sealed]
+    assert fitted.rmse(sealed=True) == pytest.approx(np.sqrt(np.mean(rest**2)))
+
+
+def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(monkeypatch):
+    monkeypatch.setattr(model, "COARSE_SAMPLES", 6000)
+    dataset = dataset_from(joint_of("one stroke", None, rate=1000.0))
+    assert dataset.factor == 4
+    assert dataset.coarse.track.rate_hz == 1000.0 / dataset.factor
+    assert not dataset.coarse.sealed.any()
+    fine = np.flatnonzero(dataset.fine.sealed)
+    blocks = np.unique(fine // dataset.factor)
+    assert not dataset.coarse.fit[blocks[blocks < dataset.coarse.track.size]].any()
+    # A grid that is as coarse as the recording is the recording.
+    slow = dataset_from(joint_of("cyclic", None, rate=100.0))
+    assert slow.coarse is slow.fine
+
+
+def test_groups_come_one_after_the_other():
+    dataset = dataset_from(joint_of("cyclic", None, rate=250.0))
+    group = dataset.fine.track.group
+    assert [set(group[rows].tolist()) for rows in dataset.fine.rows] == [
+        {number} for number in dataset.fit_groups
+    ]
+    assert sum(rows.size for rows in dataset.fine.rows) == np.count_nonzero(dataset.fine.fit)
+
+
+def test_what_is_not_clear_is_fitted_and_not_looked_at():
+    track, grouping = grouped_track([joint_of("cyclic", None, rate=250.0)], Joint())
+    clear = track.clear.copy()
+    clear[1000:1100] = False
+    dataset = dataset_of(replace(track, clear=clear), grouping)
+    assert dataset.fine.fit[1000:1100].any()
+    assert not dataset.sharp.fit[1000:1100].any()
+    assert dataset_of(replace(track, clear=np.ones_like(clear)), grouping).sharp is not None
+    whole = dataset_of(replace(track, clear=np.ones_like(clear)), grouping)
+    assert whole.sharp is whole.fine
+
+
+def test_a_load_friction_is_found_together_with_the_load_whose_zero_it_moves():
+    """Beside the load fitted without it, it stays where it is: 0.1 is fitted, not 0.3."""
+
+    def by_load(q, v, a, t):
+        return 0.3 * np.abs(0.2 * a + np.sin(q) + 0.4 * np.cos(q)) * np.sign(v)
+
+    recording = joint_of("cyclic", None, noise_a=0.01)
+    track, _ = grouped_track([recording], Joint())
+    q = recording.position_rad
+    v = np.gradient(q) * 250
+    extra = by_load(q, v, np.gradient(v) * 250, None)
+    recording = replace(recording, current_a=recording.current_a + extra)
+    terms = (*rigid(), term("load_friction", inertia_share=1.0))
+    fitted = fit_terms(dataset_from(recording), terms)
+    assert fitted.coefficients[-1][0] == pytest.approx(0.3, abs=0.02)
+    assert fitted.coefficients[2][0] == pytest.approx(0.5, abs=0.02)
+    # The dataset that comes back holds the load that was fitted.
+    load = fitted.dataset.fine.track.load_a
+    columns = [LIBRARY[name].columns(track, {}) for name in ("inertia", "gravity")]
+    parts = [c @ k for c, k in zip(columns, fitted.coefficients, strict=False)]
+    np.testing.assert_allclose(load[dataset_rows(fitted)], sum(parts)[dataset_rows(fitted)],
+                               atol=0.02)  # fmt: skip
+
+
+def dataset_rows(fitted):
+    return fitted.dataset.fine.fit
+
+
+class Following(Effect):
+    """Takes half of what the static terms say: settles in a few rounds."""
+
+    name, domain, static = "following", "time", False
+    rounds = 0
+
+    def columns(self, track, parameters):
+        type(self).rounds += 1
+        return stack(np.tanh(track.model_a) * np.sign(np.sin(7 * track.time_s)))
+
+
+def test_terms_that_follow_the_model_are_fitted_until_that_settles(monkeypatch):
+    dataset = dataset_from(joint_of("cyclic", lambda q, v, a, t: np.sin(7 * t) * np.sin(q)))
+    terms = (*rigid(), Term(Following(), {}))
+    Following.rounds = 0
+    fitted = fit_terms(dataset, terms)
+    assert 2 < Following.rounds < model.MOST_ROUNDS
+    again = fit_terms(fitted.dataset, terms)
+    assert again.rmse(sealed=False) == pytest.approx(fitted.rmse(sealed=False), rel=1e-3)
+    monkeypatch.setattr(model, "SETTLED", -1.0)
+    Following.rounds = 0
+    fit_terms(dataset, terms)
+    assert Following.rounds == model.MOST_ROUNDS
+
+
+def test_a_current_is_added_up_by_what_it_is():
+    blocks = [np.full((4, 1), 10.0**k) for k in range(4)]
+    terms = (term("gravity"), term("coulomb"), term("ripple", order=2.0), Term(Following(), {}))
+    total, static, load = currents(terms, blocks, [np.ones(1)] * 4, 4)
+    assert (total[0], static[0], load[0]) == (1111.0, 11.0, 1.0)
+    assert static_terms(terms) == terms[:2]
+
+
+def test_a_term_keeps_some_of_its_columns_and_is_known_by_that():
+    track = dataset_from(joint_of("cyclic", None)).fine.track
+    whole = term("gravity")
+    sine = Term(LIBRARY["gravity"], {}, keep=(0,))
+    np.testing.assert_array_equal(sine.columns(track), whole.columns(track)[:, :1])
+    assert whole.key != sine.key
+    assert whole.key == term("gravity").key
+
+
+def test_fast_terms_are_taken_as_fitted_on_the_coarse_grid():
+    recording = joint_of("cyclic", lambda q, v, a, t: np.sin(40 * q), rate=1000.0)
+    terms = (*rigid(), term("ripple", order=40.0))
+    fitted = fit_terms(dataset_from(recording), terms)
+    sums, slow = fitted.coarse_sums
+    assert sum(block.shape[1] for block in slow) == sums.moment.shape[1] == 5
+    part = fitted.fast_part(True)
+    np.testing.assert_allclose(
+        part, terms[-1].columns(fitted.dataset.fine.track) @ fitted.coefficients[-1]
+    )
+    assert fitted.fast_part(False).size == fitted.dataset.coarse.track.size
+    fitted.forget()
+    assert "coarse_sums" not in vars(fitted)
+
+
+def test_drift_and_smoothing_stand_beside_a_fit():
+    plain = plain_fit(joint_of("cyclic", None))
+    drifting = plain_fit(joint_of("cyclic", lambda q, v, a, t: t, strength=10.0))
+    assert drifting.sums.held_out().sum() > 10 * plain.sums.held_out().sum()
+    error = drifting.drift_free_error
+    # What is left within a half of a unit is a slope.
+    assert error.sum() < 0.05 * drifting.sums.held_out().sum()
+    assert plain.unsmoothed_error.size == plain.sums.held_out().size
+
+
+def test_a_motion_of_a_third_of_a_second_has_samples_to_fit_after_a_long_window_too():
+    rate = 2000.0
+    time = np.arange(round(1.35 * rate)) / rate
+    place = 2 * np.clip(time - 0.5, 0.0, 0.35)
+    noise = np.random.default_rng(0).normal(size=time.size)
+    current = np.sign(np.gradient(place)) + 0.01 * noise
+    recording = Recording("run", rate, current_a=current, position_rad=place)
+    track, grouping = grouped_track([recording], Joint())
+    other = build_track([recording], Joint(), Smoothing(0.12, from_velocity=False))
+    dataset = dataset_of(replace(other, moving=track.moving, clear=track.clear), grouping)
+    # Its moving average carries every open block's samples into sealed ones.
+    assert other.kernel.size > 200
+    fine, coarse = dataset.parts
+    assert coarse.rows.size == fine.rows.size > 0

@@ -1,0 +1,71 @@
+"""Standard errors that allow for correlation inside a unit, and terms that cannot be told apart."""
+
+import numpy as np
+import pytest
+from closing import joint_of, plain_fit
+from scipy.stats import t as student
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit.intervals import certainty
+from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
+from opamc_cli.joint.motion.recordings import grouped_track
+from opamc_cli.joint.motion.track import Joint
+
+LIBRARY = built_in_library()
+BASE = ("inertia", "gravity", "coulomb", "viscous")
+
+
+def slow_errors(fitted):
+    """Compute the cluster sandwich from the regressors themselves."""
+    grid = fitted.dataset.fine
+    design = np.concatenate([one.columns(grid.track) for one in fitted.terms], axis=1)
+    parts = fitted.dataset.parts[0]
+    unit = np.repeat(parts.unit, [stop - start for start, stop in parts.slices])
+    design, rest = design[parts.rows], fitted.residual_a[parts.rows]
+    bread = np.linalg.inv(design.T @ design)
+    scores = [design[unit == u].T @ rest[unit == u] for u in range(parts.units)]
+    meat = sum(np.outer(one, one) for one in scores) * parts.units / (parts.units - 1)
+    return np.sqrt(np.diag(bread @ meat @ bread))
+
+
+def test_errors_are_those_of_the_cluster_sandwich():
+    fitted = plain_fit(joint_of("cyclic", lambda q, v, a, t: np.sin(3 * q), strength=2.0))
+    known = certainty(fitted)
+    found = np.concatenate(known.standard_errors)
+    np.testing.assert_allclose(found, slow_errors(fitted), rtol=1e-6)
+    assert [one.size for one in known.standard_errors] == [1, 2, 1, 1]
+    units = fitted.sums.parts.units
+    assert known.factor == pytest.approx(student.ppf(0.975, units - 1))
+    assert known.inseparable == ()
+
+
+def test_noise_that_lasts_is_less_certain_than_noise_that_does_not():
+    def drifting(q, v, a, t):
+        return np.cumsum(np.random.default_rng(3).normal(size=t.size))
+
+    def rough(q, v, a, t):
+        return np.random.default_rng(3).normal(size=t.size)
+
+    slow, fast = (
+        certainty(plain_fit(joint_of("cyclic", noise, strength=10.0)))
+        for noise in (drifting, rough)
+    )
+    assert slow.standard_errors[1][0] > 3 * fast.standard_errors[1][0]
+
+
+def test_terms_that_replace_one_another_are_named():
+    recording = joint_of("cyclic", None, rate=100.0)
+    track, grouping = grouped_track([recording], Joint())
+    dataset = dataset_of(track, grouping)
+    terms = [Term(LIBRARY[name], {}) for name in BASE]
+    lone = certainty(fit_terms(dataset, tuple(terms)))
+    twice = certainty(fit_terms(dataset, (*terms, Term(LIBRARY["sublinear_friction"],
+                                                       {"exponent": 0.999}))))  # fmt: skip
+    assert twice.condition_number > 30 * lone.condition_number
+    assert twice.inseparable == (("sublinear_friction", "viscous"),)
+
+
+def test_nothing_fitted_is_nothing_to_be_certain_of():
+    fitted = plain_fit(joint_of("cyclic", None, rate=100.0), ())
+    known = certainty(fitted)
+    assert (known.standard_errors, known.inseparable, known.condition_number) == ((), (), 1.0)
