@@ -7,11 +7,14 @@ import pytest
 from closing import close_recording
 from scipy.signal import bilinear, lfilter
 from simulator import simulate
+from track_of import track_of
 
-from opamc_cli.joint.effects.ripple import Ripple
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.effects.ripple import Ripple, order_ties, read_order
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import build_track
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.spectra import order_resolution
 from tests.marks import long
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
@@ -63,3 +66,47 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     assert [step.term.effect.name for step in loop.steps] == ["ripple"]
     assert loop.steps[0].term.parameters["order"] == pytest.approx(160.0, rel=1e-3)
     assert loop.rmse_after_a < 1.1 * made.noise_rms
+
+
+@pytest.mark.parametrize(
+    ("order", "reading"),
+    [
+        (1.0, "eccentricity"),
+        (2.0, "kinematic error, twice"),
+        (2.02, "flexspline tooth damage (2(N+1)/N)"),
+        (1.98, "flexspline tooth damage (2(N-1)/N)"),
+        (4.0, "kinematic error, four"),
+        (5.0, "electrical, 1p"),
+        (30.0, "electrical, 6p"),
+        (60.0, "cogging of 12 slots"),
+        (17.3, "unknown periodic source, order 17.3 per motor"),
+    ],
+)
+def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
+    _, track = track_of(Joint(100.0, 5))
+    assert reading in read_order(order, track)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.98, 2.0, 2.01, 2.02, 4.0])
+def test_lines_of_healthy_gears_are_called_so_without_a_comparison(order):
+    _, track = track_of(Joint(100.0, 5))
+    told = built_in_library()["ripple"].interpretation({"order": order}, track)
+    assert "healthy gears" in told
+    assert "earlier recording" in told
+    assert "inspect" not in told
+    assert "check" not in told
+
+
+def test_orders_closer_than_the_resolution_are_tied():
+    _, track = track_of(Joint(100.0, 5))
+    width = order_resolution(track)
+    tied = order_ties(2.02, track)
+    assert any("kinematic error (order 2)" in name for name in tied) == (width > 0.02)
+    assert order_ties(3.3, track) == []
+    assert order_ties(2.02, track_of(Joint())[1]) == []
+
+
+def test_without_gear_ratio_orders_are_counted_per_joint_revolution():
+    _, track = track_of(Joint())
+    assert track.angle_kind == "joint"
+    assert "per joint revolution" in read_order(202.0, track)
