@@ -9,7 +9,7 @@ import pytest
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL, TABLES, UNITS
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 FORMATS = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
 HEADINGS = re.compile(r"^### (.*parquet.*)$", re.MULTILINE)
 NAMES = {name: value for name, value in vars(files).items() if name.isupper()}

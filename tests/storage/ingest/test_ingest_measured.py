@@ -10,7 +10,7 @@ from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.runs import Run
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 DATA = ROOT.parent / "shared" / "data"
 MAPS = ROOT / "configs" / "maps"
 

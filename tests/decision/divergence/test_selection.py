@@ -12,7 +12,7 @@ from opamc_cli.errors import NotEnoughDataError
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.tuning import select
 
-SAMPLE = Path(__file__).parents[2] / "data" / "samples" / "normal" / "session-000.parquet"
+SAMPLE = Path(__file__).parents[3] / "data" / "samples" / "normal" / "session-000.parquet"
 
 
 def drawn(rng, n_motions=4, n_cycles=5, n=200, difference=1.0, n_patterns=24):

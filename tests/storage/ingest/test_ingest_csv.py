@@ -287,7 +287,7 @@ def test_overrides_reach_into_the_map(tmp_path):
 
 
 def test_the_maps_in_the_documentation_are_maps(tmp_path):
-    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "docs" / "formats.md").read_text(encoding="utf-8")
     maps = re.findall(r"```yaml\n(.*?)```", text, re.DOTALL)
     assert maps
     for content in maps:
@@ -295,7 +295,7 @@ def test_the_maps_in_the_documentation_are_maps(tmp_path):
         load_map(tmp_path / "map.yaml")
 
 
-@pytest.mark.parametrize("path", sorted((Path(__file__).parents[2] / "configs/maps").glob("*")))
+@pytest.mark.parametrize("path", sorted((Path(__file__).parents[3] / "configs/maps").glob("*")))
 def test_shipped_maps_are_maps(path):
     load_map(path)
 

@@ -27,7 +27,7 @@ def test_endings(kind, tmp_path):
 
 
 def test_what_a_format_needs_is_an_extra_of_the_package():
-    text = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[3] / "pyproject.toml").read_text(encoding="utf-8")
     extras = tomllib.loads(text)["project"]["optional-dependencies"]
     assert {one.extra for one in FORMATS.values()} - {None} <= extras.keys()
 

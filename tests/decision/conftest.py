@@ -1,0 +1,1 @@
+"""What these tests share is found from the folders below it, too."""
