@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from simulator import simulate
 
-from opamc_cli.joint.change.lines import Line, order_spectra, strokes
-from opamc_cli.joint.change.reading import read_lines
+from opamc_cli.joint.change.lines import order_spectra, strokes
 from opamc_cli.joint.change.units import read_side
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -58,33 +57,3 @@ def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units
     assert strokes(unit.fine, rows)[0] == (start, stop)
     followed = replace(unit.fine, channels=unit.fine.channels - {"logged"})
     assert strokes(followed, rows)[0][1] <= middle - 5
-
-
-def line(order, reference=None, error=0.001):
-    return Line(order, error, reference, 0.001, growth=40.0, excess=1.0, p_value=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("found", "resolution", "order", "says", "ties"),
-    [
-        ([line(2.021, 2.0)], 0.02, 2.02, "inspect the flexspline", 0),
-        ([line(2.021, 2.0)], 0.08, 2.02, "inspect the flexspline", 1),
-        # The baseline's own line at 2 shows that all lines lie 0.006 too low.
-        ([line(2.014, 1.994)], 0.02, 2.02, "inspect the flexspline", 0),
-        ([line(2.0, 2.0)], 0.02, 2.0, "kinematic error", 1),
-        ([line(3.3), line(4.04), line(6.06), line(8.08)], 0.03, 2.02, "flexspline", 0),
-        ([line(3.3)], 0.03, 3.3, "unknown periodic source", 0),
-        # The third harmonic alone, which turns with the flexspline; and a whole order like it.
-        ([line(6.06)], 0.04, 2.02, "inspect the flexspline", 1),
-        ([line(6.0)], 0.04, 6.0, "unknown periodic source", 0),
-        ([line(7.0)], 0.03, 7.0, "unknown periodic source", 0),
-    ],
-)
-def test_lines_are_read_in_the_frame_that_they_can_be_told_to_turn_in(
-    units, found, resolution, order, says, ties
-):
-    reading = read_lines(found, units[0].fine, resolution)
-    assert reading.effect == "ripple"
-    assert reading.parameters["order"] == pytest.approx(order)
-    assert says in reading.interpretation
-    assert len(reading.ties) == ties

@@ -1,25 +1,18 @@
-"""Functions without a name: where they begin, what they explain, and that they explain no noise."""
+"""Functions without a name: how a covariate is stretched, and where travel begins anew."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from closing import joint_of, plain_fit
+from closing import plain_fit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import simulate
 
-from opamc_cli.joint.explain.saturated import ceiling, saturated, unnamed_library
-from opamc_cli.joint.explain.unnamed import SMOOTH, stretched, travel_since_reversal
+from opamc_cli.joint.explain.saturated import unnamed_library
+from opamc_cli.joint.explain.unnamed import stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.name.chain import chain_of
-from opamc_cli.joint.name.search import Pool
-
-
-def explained(recording):
-    start = chain_of(plain_fit(recording), 0)
-    return start, saturated(start, Pool.of(start.fit.dataset, unnamed_library()))
 
 
 @settings(max_examples=60, deadline=None)
@@ -52,41 +45,6 @@ def test_travel_since_reversal_of_a_zigzag():
     )
     # A rest is no reversal; a reversal counts from the sample at which the direction is another.
     np.testing.assert_array_equal(travel_since_reversal(track), [0, 1, 2, 3, 0, 1, 1, 2, 0, 2])
-
-
-@pytest.mark.parametrize(
-    ("effect", "domain"),
-    [
-        (lambda q, v, a, t: np.sign(v) * np.sin(9 * np.abs(v)), "velocity"),
-        (lambda q, v, a, t: np.sin(7 * q) ** 2, "joint-angle"),
-    ],
-)
-def test_a_smooth_function_that_no_effect_has_is_explained_in_its_domain(effect, domain):
-    start, found = explained(joint_of("cyclic", effect, strength=5.0, rate=100.0))
-    assert found.terms[0].effect.domain == domain
-    limit = ceiling(start.fit, found.fit)
-    # Of 26 parts 25 are the effect's.
-    assert limit.certain
-    assert limit.share == pytest.approx(25 / 26, abs=0.03)
-
-
-@pytest.mark.parametrize("motion", ["one stroke", "cyclic", "steps of torque"])
-def test_of_pure_noise_nothing_can_be_explained(motion):
-    start, found = explained(joint_of(motion, None, rate=100.0))
-    limit = ceiling(start.fit, found.fit)
-    assert not limit.certain
-    assert limit.share <= 2 * limit.standard_error
-
-
-def test_the_ceiling_of_one_function_is_the_fall_of_the_sealed_error():
-    before = plain_fit(joint_of("cyclic", lambda q, v, a, t: v * np.abs(v), rate=100.0))
-    speed = next(effect for effect in SMOOTH if effect.name == "unnamed_speed")
-    after = fit_terms(before.dataset, (*before.terms, Term(speed, {"degree": 4.0})))
-    share = 1 - (after.rmse(sealed=True) / before.rmse(sealed=True)) ** 2
-    assert ceiling(before, after).share == pytest.approx(share, rel=1e-9)
-    # What predicts the sealed data worse is no ceiling.
-    assert ceiling(after, before).share == 0.0
-    assert ceiling(before, before).standard_error == 0.0
 
 
 def test_a_model_beside_its_own_rates_of_change_settles_at_once():

@@ -1,0 +1,160 @@
+"""What lines over the motor angle and over time mean."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from opamc_cli.joint.change.lines import Line
+from opamc_cli.joint.change.reading import read_frequency, read_lines
+from opamc_cli.joint.motion.track import Joint
+
+
+def track_of(kind="motor", ratio=100.0, poles=5, *channels):
+    return SimpleNamespace(
+        angle_kind=kind,
+        joint=Joint(ratio, poles),
+        machine_angle_rad=np.linspace(0, 400.0, 50),
+        moving=np.ones(50, dtype=bool),
+        channels=frozenset(channels),
+    )
+
+
+MOTOR = track_of()
+
+
+def line(order, reference=None, error=0.001, growth=40.0):
+    return Line(order, error, reference, 0.001, growth, excess=1.0, p_value=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("found", "resolution", "order", "says", "ties"),
+    [
+        ([line(2.021, 2.0)], 0.02, 2.02, "inspect the flexspline", 0),
+        ([line(2.021, 2.0)], 0.08, 2.02, "inspect the flexspline", 1),
+        # The baseline's own line at 2 shows that all lines lie 0.006 too low.
+        ([line(2.014, 1.994)], 0.02, 2.02, "inspect the flexspline", 0),
+        ([line(2.0, 2.0)], 0.02, 2.0, "kinematic error", 1),
+        ([line(3.3), line(4.04), line(6.06), line(8.08)], 0.03, 2.02, "flexspline", 0),
+        ([line(3.3)], 0.03, 3.3, "unknown periodic source", 0),
+        # The third harmonic alone, which turns with the flexspline; and a whole order like it.
+        ([line(6.06)], 0.04, 2.02, "inspect the flexspline", 1),
+        ([line(6.0)], 0.04, 6.0, "unknown periodic source", 0),
+        ([line(7.0)], 0.03, 7.0, "unknown periodic source", 0),
+    ],
+)
+def test_lines_are_read_in_the_frame_that_they_can_be_told_to_turn_in(
+    found, resolution, order, says, ties
+):
+    reading = read_lines(found, MOTOR, resolution)
+    assert reading.effect == "ripple"
+    assert reading.parameters["order"] == pytest.approx(order)
+    assert says in reading.interpretation
+    assert len(reading.ties) == ties
+    assert reading.mesh == reading.known
+
+
+def test_nothing_is_read_in_no_lines():
+    assert read_lines([], MOTOR, 0.02) is None
+
+
+def test_what_was_measured_is_told_with_its_error():
+    strong, harmonic = line(2.021, 2.001, 0.003, 9.0), line(4.04, growth=30.0)
+    reading = read_lines([strong, harmonic, line(3.3)], MOTOR, 0.02)
+    assert reading.lines == (strong, harmonic)
+    assert reading.evidence == {
+        "measured_order": pytest.approx(2.02),
+        "order_error": pytest.approx(np.sqrt(0.003**2 + 0.001**2 + 0.005**2)),
+        "order_resolution": 0.02,
+        "power_ratio": 30.0,
+    }
+    assert reading.fundamental == reading.parameters["order"]
+    alone = read_lines([line(3.3, 5.0, 0.004)], MOTOR, 0.03)
+    assert alone.evidence["measured_order"] == 3.3
+    assert alone.evidence["order_error"] == pytest.approx(np.sqrt(0.004**2 + 0.001**2 + 0.0075**2))
+    assert (alone.fundamental, alone.known, alone.mesh) == (3.3, False, False)
+
+
+def test_a_baseline_line_far_from_a_whole_order_corrects_nothing():
+    # 0.006 of 2 is the loop's lag, 0.03 is another line.
+    near = read_lines([line(2.0, 1.994)], MOTOR, 0.02).evidence["measured_order"]
+    far = read_lines([line(2.0, 1.97)], MOTOR, 0.02).evidence["measured_order"]
+    assert (near, far) == (pytest.approx(2.006), pytest.approx(2.0))
+
+
+def test_without_a_gear_ratio_the_order_is_as_measured():
+    reading = read_lines([line(2.021, 2.0)], track_of(ratio=None), 0.02)
+    assert reading.mesh
+    assert reading.parameters["order"] == pytest.approx(2.021)
+    # What only a ratio would tell from the motor's own orders is not the mesh's.
+    assert not read_lines([line(6.06)], track_of(ratio=None), 0.04).mesh
+    # Up to the smallest gear ratio, 30, a line may be twice per turn: and at a side of it.
+    assert read_lines([line(2.06)], track_of(ratio=None), 0.01).mesh
+    assert not read_lines([line(2.2)], track_of(ratio=None), 0.01).mesh
+
+
+def test_lines_beside_the_passage_belong_to_it_within_four_resolutions():
+    near, far = line(2.05), line(2.08)
+    reading = read_lines([line(2.02), near, far, line(4.2)], MOTOR, 0.01)
+    assert reading.lines == (line(2.02), near)
+
+
+def test_a_weaker_passage_needs_a_comb():
+    strange = line(3.3)
+    assert not read_lines([strange, line(2.02)], MOTOR, 0.03).mesh
+    assert not read_lines([strange, line(2.02), line(4.04)], MOTOR, 0.03).mesh
+    assert read_lines([strange, line(2.02), line(4.04), line(6.06)], MOTOR, 0.03).mesh
+    # Odd multiples are the motor's as well: they are no passage, but in the comb.
+    assert not read_lines([strange, line(3.0), line(5.0), line(7.0)], MOTOR, 0.03).mesh
+
+
+@pytest.mark.parametrize("poles", [2, 4, 12])
+def test_over_the_electrical_angle_pole_pairs_are_tried(poles):
+    reading = read_lines([line(2.02 / poles)], track_of("electrical", poles=None), 0.02 / poles)
+    assert reading.mesh
+    assert f"if it has {poles} pole pairs" in reading.interpretation
+    assert reading.parameters["order"] == pytest.approx(2.02 / poles)
+    assert reading.evidence["measured_order"] == pytest.approx(2.02 / poles)
+
+
+def test_over_the_joint_angle_or_far_from_two_per_turn_no_mesh_is_told():
+    assert not read_lines([line(2.02)], track_of("joint"), 0.02).mesh
+    # 1.9 and 2.1 per turn are too far from 2 for every number of pole pairs.
+    for order in (0.13, 1.9 / 2, 2.1 / 2):
+        assert not read_lines([line(order)], track_of("electrical", poles=None), 0.02).mesh
+
+
+@pytest.mark.parametrize(
+    ("order", "effect"),
+    [(5.0, "sensor_offset"), (10.0, "sensor_gain"), (30.0, "dead_time"), (30.02, "dead_time")],
+)
+def test_an_electrical_order_of_phases_is_the_current_measurement_s(order, effect):
+    reading = read_lines([line(order), line(2.02)], track_of("motor", 100.0, 5, "phases"), 0.04)
+    assert (reading.effect, reading.ties, reading.mesh) == (effect, ("ripple",), False)
+    assert "not the gear" in reading.interpretation
+    assert reading.parameters == {"order": order}
+    # Of a signed current it is a ripple, and no other effect's.
+    alone = read_lines([line(order), line(2.02)], MOTOR, 0.04)
+    assert (alone.effect, alone.ties, alone.mesh) == ("ripple", (), False)
+    assert "electrical," in alone.interpretation
+
+
+@pytest.mark.parametrize(
+    ("hz", "named"), [(50.4, 50.0), (49.6, 50.0), (60.2, 60.0), (100.0, 100.0), (359.8, 360.0)]
+)
+def test_a_frequency_within_a_resolution_of_the_mains_is_hum(hz, named):
+    reading = read_frequency(line(hz, growth=7.0), 0.5)
+    assert (reading.effect, reading.known, reading.mesh) == ("mains_hum", True, False)
+    assert reading.parameters == {"frequency_hz": named}
+    assert reading.fundamental == hz
+    assert reading.evidence == {
+        "measured_frequency_hz": hz,
+        "frequency_resolution_hz": 0.5,
+        "power_ratio": 7.0,
+    }
+
+
+def test_any_other_frequency_is_nobody_s():
+    assert read_frequency(line(50.6), 0.5) is None
+    assert read_frequency(line(49.4), 0.5) is None
+    assert read_frequency(line(420.0), 0.5) is None

@@ -1,0 +1,102 @@
+"""A declared model: terms that are given or searched, and the window that predicts best."""
+
+import numpy as np
+import pytest
+from closing import MODEL, joint_of, plain_fit
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.explain.declared import best_fit, declared_fit
+from opamc_cli.joint.fit.model import Term, fit_terms
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import Joint
+
+LIBRARY = built_in_library()
+BASE = ("inertia", "gravity", "coulomb", "viscous", "offset")
+
+
+def stribeck(q, v, a, t):
+    return np.sign(v) * np.exp(-((v / 0.15) ** 2))
+
+
+def declared(*names):
+    return tuple((LIBRARY[name], None) for name in names)
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return plain_fit(joint_of("cyclic", stribeck, strength=20.0, rate=100.0)).dataset
+
+
+def names_of(fit):
+    return [term.effect.name for term in fit.terms]
+
+
+def test_effects_without_parameters_are_fitted_as_they_are(dataset):
+    fit = declared_fit(dataset, declared(*BASE))
+    direct = fit_terms(dataset, tuple(Term(LIBRARY[name], {}) for name in BASE))
+    assert names_of(fit) == list(BASE)
+    for found, known in zip(fit.coefficients, direct.coefficients, strict=True):
+        np.testing.assert_allclose(found, known)
+
+
+def test_parameters_that_are_not_given_are_searched_and_the_order_stays(dataset):
+    fit = declared_fit(dataset, declared("stribeck", *BASE))
+    assert names_of(fit) == ["stribeck", *BASE]
+    assert fit.terms[0].parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.1)
+    # A fifth of the speed's noise is left.
+    without = declared_fit(dataset, declared(*BASE))
+    assert fit.rmse(sealed=True) < 0.1 * without.rmse(sealed=True)
+
+
+def test_parameters_that_are_given_are_believed(dataset):
+    given = Term(LIBRARY["stribeck"], {"stribeck_speed": 0.4, "exponent": 2.0})
+    fit = declared_fit(dataset, (*declared(*BASE), (LIBRARY["stribeck"], given)))
+    assert fit.terms[-1] is given
+
+
+def test_two_effects_are_searched_one_beside_the_other(dataset):
+    fit = declared_fit(dataset, declared("position_drag", *BASE, "stribeck"))
+    assert names_of(fit) == ["position_drag", *BASE, "stribeck"]
+    assert fit.terms[-1].parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.1)
+
+
+def test_an_effect_that_cannot_be_shown_is_left_out(dataset):
+    fit = declared_fit(dataset, declared(*BASE, "thermal_viscous", "dead_time"))
+    assert names_of(fit)[: len(BASE)] == list(BASE)
+    assert "dead_time" not in names_of(fit)
+
+
+def rest(seconds=10.0):
+    t = np.arange(round(seconds * 100)) / 100
+    rng = np.random.default_rng(0)
+    return Recording("rest", 100.0, current_a=rng.normal(size=t.size), position_rad=0 * t)
+
+
+def test_a_joint_at_rest_has_no_fit():
+    assert best_fit([rest()], Joint(), lambda dataset: declared(*BASE)) is None
+
+
+@pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
+def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(motion):
+    made = joint_of(motion, None, noise_a=1e-3, seconds=20.0)
+    seen = 1e-4 * np.round(made.position_rad / 1e-4)
+    recording = Recording("run", made.rate_hz, current_a=made.current_a, position_rad=seen)
+    ask = [recording], Joint(), lambda dataset: declared(*BASE)
+    best, plain = best_fit(*ask), best_fit(*ask, without_rules=("windows",))
+    one, other = best.dataset.fine.track, plain.dataset.fine.track
+    assert one.kernel.size != other.kernel.size
+    np.testing.assert_array_equal(one.moving, other.moving)
+    np.testing.assert_array_equal(one.clear, other.clear)
+    assert one.period_samples == other.period_samples
+    parts = best.sums.parts
+    errors = [fit.sums.held_out()[parts.judged].sum() for fit in (best, plain)]
+    assert errors[0] < 0.97 * errors[1]
+
+
+def test_without_a_reason_the_window_stays():
+    ask = [joint_of("cyclic", None)], Joint(), lambda dataset: declared(*BASE)
+    best, plain = best_fit(*ask), best_fit(*ask, without_rules=("windows",))
+    assert best.dataset.fine.track.kernel.size == plain.dataset.fine.track.kernel.size
+    coulomb, viscous = best.coefficients[2], best.coefficients[3]
+    assert coulomb == pytest.approx(MODEL["coulomb"], rel=0.02)
+    assert viscous == pytest.approx(MODEL["viscous"], rel=0.05)

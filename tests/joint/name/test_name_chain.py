@@ -1,0 +1,184 @@
+"""What a chain gains over another, what it costs, and what it keeps."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from closing import joint_of, plain_fit
+from simulator import DECLARED
+
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
+from opamc_cli.joint.motion.recordings import grouped_track
+from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.name.chain import (
+    Chain,
+    chain_of,
+    extended,
+    price_of,
+    signature_of,
+    without,
+)
+
+LIBRARY = built_in_library()
+CHARGE = 0.02
+
+
+def stribeck(q, v, a, t):
+    return np.sign(v) * np.exp(-((v / 0.1) ** 2))
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return chain_of(plain_fit(joint_of("cyclic", stribeck, strength=5.0, rate=100.0)), 0)
+
+
+def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
+    return SimpleNamespace(
+        name=name,
+        unnamed=unnamed,
+        follows_load=follows_load,
+        plausible=lambda values, parameters: plausible,
+        searched=lambda parameters: searched,
+    )
+
+
+def made(*terms, added=1, error=(1.0, 1.0), samples=2.0, widths=None, **fit):
+    terms = tuple(SimpleNamespace(effect=one, parameters={}) for one in terms)
+    widths = widths or [1] * len(terms)
+    fit = SimpleNamespace(terms=terms, coefficients=[np.ones(w) for w in widths], **fit)
+    return Chain(fit, added, np.array(error), samples)
+
+
+@pytest.mark.parametrize(
+    ("unnamed", "width", "searched", "units"),
+    [(False, 1, 0, 2), (False, 16, 0, 17), (False, 33, 2, 19), (True, 33, 2, 36)],
+)
+def test_a_price_is_for_the_effect_its_coefficients_and_what_was_searched(
+    unnamed, width, searched, units
+):
+    term = SimpleNamespace(effect=effect("one", True, unnamed, searched), parameters={})
+    assert price_of(term, width) == pytest.approx(CHARGE * units)
+
+
+def test_only_what_was_added_is_paid_for():
+    chain = made(effect("declared"), effect("first", searched=1), effect("second"),
+                 added=2, error=(3.0, 5.0), samples=4.0, widths=[7, 2, 3])  # fmt: skip
+    assert [term.effect.name for term in chain.terms] == ["first", "second"]
+    assert chain.mean_square == 2.0
+    assert chain.price == pytest.approx(CHARGE * (4 + 4))
+    assert chain.score == pytest.approx(np.log(2.0) + chain.price)
+    assert made(added=0).price == 0.0
+    assert np.isfinite(made(added=0, error=(0.0, 0.0)).score)
+
+
+def test_a_gain_is_a_share_of_the_other_s_error_and_its_t():
+    before, after = made(error=(4.0, 4.0, 4.0), added=0), made(error=(1.0, 2.0, 3.0), added=0)
+    # Drops of 3, 2, 1 have a variance of 1, their sum one of 3.
+    assert after.gain_over(before) == pytest.approx((0.5, 6 / np.sqrt(3)))
+    assert before.gain_over(after) == pytest.approx((-1.0, -6 / np.sqrt(3)))
+    share, t_value = before.gain_over(before)
+    assert (share, t_value) == (0.0, 0.0)
+
+
+def test_beside_drift_or_smoothing_a_gain_is_that_of_the_errors_there():
+    before = made(drift_free_error=np.array([2.0, 4.0]), unsmoothed_error=np.array([5.0, 5.0]))
+    after = made(drift_free_error=np.array([1.0, 2.0]), unsmoothed_error=np.array([4.0, 4.0]))
+    # Drops of 1 and 2.
+    assert after.gain_beside_drift(before) == pytest.approx((0.5, 3.0))
+    assert after.gain_beside_smoothing(before) == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("beside", "left", "is_drift"),
+    [
+        (1.9, 3.0, True),  # nothing more beside the offsets, which alone leave 2
+        (1.9, 2.0, False),  # it explains as much as they do
+        (1.7, 3.0, False),  # it helps beside them
+    ],
+)
+def test_a_change_that_offsets_explain_as_well_is_drift(beside, left, is_drift):
+    other = made(drift_free_error=np.array([1.0, 1.0]))
+    sums = SimpleNamespace(held_out=lambda: np.array([left / 2, left / 2]))
+    chain = made(drift_free_error=np.array([1.0, beside - 1]), sums=sums)
+    assert chain.no_more_than_drift(other, 0.1) is is_drift
+
+
+def test_an_added_term_has_to_have_its_sign():
+    start = made(effect("declared"), added=0)
+    assert made(effect("declared"), effect("new")).plausible_beside(start)
+    assert not made(effect("declared"), effect("new", plausible=False)).plausible_beside(start)
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "follows_load", "plausible"),
+    [
+        (True, False, True, False),
+        (True, False, False, True),  # only what follows the load may not turn it
+        (False, False, True, True),  # it was so before
+        (True, True, True, True),
+    ],
+)
+def test_a_declared_sign_may_not_be_turned_by_what_follows_the_load(
+    before, now, follows_load, plausible
+):
+    start = made(effect("declared", before), added=0)
+    longer = made(effect("declared", now), effect("new", follows_load=follows_load))
+    assert longer.plausible_beside(start) is plausible
+
+
+def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
+    def term(name, **parameters):
+        return SimpleNamespace(effect=effect(name), parameters=parameters)
+
+    one = signature_of((term("a", x=1.234, y=2.0), term("b")))
+    assert one == signature_of((term("b"), term("a", y=2.0, x=1.22)))
+    assert one != signature_of((term("b"), term("a", y=2.0, x=1.26)))
+    assert one != signature_of((term("a", x=1.234, y=2.0),))
+
+
+def test_what_is_put_in_can_be_taken_out_again(chain):
+    spring, speed = (
+        Term(LIBRARY["spring"], {}),
+        Term(LIBRARY["stribeck"], {"stribeck_speed": 0.1, "exponent": 2.0}),
+    )
+    longer = extended(extended(chain, spring), speed)
+    assert (longer.added, longer.terms) == (2, (spring, speed))
+    assert longer.signature == signature_of((spring, speed))
+    for place, kept in ((0, speed), (1, spring)):
+        shorter, direct = without(longer, place), extended(chain, kept)
+        assert (shorter.added, shorter.terms) == (1, (kept,))
+        np.testing.assert_allclose(shorter.error, direct.error)
+    assert extended(chain, spring, speed).error == pytest.approx(longer.error)
+
+
+def test_on_one_grid_the_error_is_that_of_the_parts_that_are_judged(chain):
+    dataset = chain.fit.dataset
+    parts, sums = dataset.parts[0], chain.fit.sums
+    assert dataset.coarse is dataset.fine
+    np.testing.assert_allclose(chain.error, sums.held_out()[parts.judged])
+    judged = parts.rows[np.repeat(parts.judged, [b - a for a, b in parts.slices])]
+    assert chain.samples == judged.size
+
+
+def test_on_two_grids_what_is_not_clear_is_judged_on_the_coarse_one():
+    recording = joint_of("cyclic", stribeck, rate=1000.0, seconds=40.0)
+    track, grouping = grouped_track([recording], Joint())
+    spoilt = np.arange(track.size) % 1000 < 100
+    dataset = dataset_of(replace(track, clear=track.clear & ~spoilt), grouping)
+    fit = fit_terms(dataset, tuple(Term(LIBRARY[name], {}) for name in DECLARED))
+    fine, coarse = dataset.parts
+    assert dataset.factor > 1
+    assert not fine.judged.all()
+    chain = chain_of(fit, 0)
+    clear = fit.sums.held_out()[fine.judged]
+    rest = fit_terms(dataset, fit.terms).coarse_sums[0].held_out()[~coarse.judged]
+    np.testing.assert_allclose(chain.error, [*clear, *dataset.factor * rest])
+    counts = [
+        sum(b - a for (a, b), kept in zip(grid.slices, chosen, strict=True) if kept)
+        for grid, chosen in ((fine, fine.judged), (coarse, ~coarse.judged))
+    ]
+    assert chain.samples == counts[0] + dataset.factor * counts[1]
+    # Every moving sample once, but for those at the ends of blocks.
+    assert chain.samples == pytest.approx(np.count_nonzero(dataset.fine.fit), rel=0.1)
