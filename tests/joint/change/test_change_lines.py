@@ -1,4 +1,4 @@
-"""Order spectra of strokes against the sum that they stand for, and how their lines are read."""
+"""Order spectra of strokes against the sum that they stand for, and the lines that grew."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -7,12 +7,24 @@ import numpy as np
 import pytest
 from simulator import simulate
 
-from opamc_cli.joint.change.lines import order_spectra, strokes
-from opamc_cli.joint.change.units import read_side
+from opamc_cli.joint.change.lines import (
+    OrderSpectra,
+    clocked,
+    fast_residuals,
+    grown_lines,
+    order_spectra,
+    strokes,
+    turned_back,
+)
+from opamc_cli.joint.change.slow import Shift
+from opamc_cli.joint.change.units import own_fit, read_side
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 
 JOINT = Joint(100.0, 5)
+LIBRARY = built_in_library()
 
 
 @pytest.fixture(scope="module")
@@ -57,3 +69,152 @@ def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units
     assert strokes(unit.fine, rows)[0] == (start, stop)
     followed = replace(unit.fine, channels=unit.fine.channels - {"logged"})
     assert strokes(followed, rows)[0][1] <= middle - 5
+
+
+def spectra_of(after_line=None, before_line=None, size=400, resolution=0.04, seed=0, units=4):
+    """Return noise of mean 1 over orders 1 to 5, with lines of (order, power) in either side."""
+    orders = 1 + 0.01 * np.arange(size)
+    rng = np.random.default_rng(seed)
+
+    def side(count, line):
+        power = rng.gamma(20.0, 1 / 20.0, size=(count, size))
+        if line is not None:
+            place, height = line
+            power += height * np.sinc((orders - place) / resolution) ** 2
+        return power
+
+    return OrderSpectra(orders, side(units, before_line), side(3, after_line), resolution)
+
+
+def test_a_line_that_grew_is_found_with_its_order_and_power():
+    (found,) = grown_lines(spectra_of((2.5, 50.0)))
+    assert found.order == pytest.approx(2.5, abs=0.005)
+    assert found.reference is None
+    # Averaged over four orders, a resolution, a line shows with most of its power.
+    assert 30 < found.excess < 51
+    assert found.growth == pytest.approx(found.excess + 1, rel=0.1)
+    assert found.p_value < 1e-3
+    assert found.error == pytest.approx(0.05 * 0.04 / np.sqrt(3))
+
+
+def test_what_was_there_before_or_everywhere_has_not_grown():
+    assert grown_lines(spectra_of()) == []
+    assert grown_lines(spectra_of((2.5, 50.0), (2.5, 50.0))) == []
+    # All orders alike are no line.
+    flat = spectra_of()
+    assert grown_lines(replace(flat, after=5 * flat.after)) == []
+    # Too few orders have no neighbourhood.
+    assert grown_lines(spectra_of((1.1, 50.0), size=23)) == []
+
+
+def test_a_baseline_s_own_line_is_the_reference():
+    (found,) = grown_lines(spectra_of((2.52, 200.0), (2.5, 20.0)))
+    assert found.order == pytest.approx(2.52, abs=0.005)
+    assert found.reference == pytest.approx(2.5, abs=0.005)
+    assert found.reference_error < 0.25 * 0.04
+
+
+def test_a_line_has_to_double():
+    assert grown_lines(spectra_of((2.5, 60.0), (2.5, 40.0))) == []
+    assert len(grown_lines(spectra_of((2.5, 120.0), (2.5, 40.0)))) == 1
+
+
+def test_what_cycles_of_one_session_cannot_show_is_allowed_for():
+    strong, weak = spectra_of((2.5, 50.0)), spectra_of((2.5, 3.0))
+    assert [len(grown_lines(weak, between)) for between in (0.0, 1.0)] == [1, 0]
+    first, second = (grown_lines(strong, between)[0].p_value for between in (0.0, 0.1))
+    assert first < second
+
+
+def test_the_largest_come_first_and_no_more_than_are_asked_for():
+    spectra = spectra_of((2.0, 30.0))
+    far = spectra_of((4.0, 90.0), seed=1)
+    both = replace(spectra, after=spectra.after + far.after)
+    orders = [line.order for line in grown_lines(both)]
+    assert orders == pytest.approx([4.0, 2.0], abs=0.01)
+    assert len(grown_lines(both, most=1)) == 1
+
+
+def test_side_lobes_are_no_lines_but_a_line_beside_is():
+    spectra = spectra_of((2.5, 5000.0))
+    assert len(grown_lines(spectra)) == 1
+    beside = replace(spectra, after=spectra.after + spectra_of((2.7, 3000.0), seed=2).after)
+    orders = [line.order for line in grown_lines(beside)]
+    assert orders == pytest.approx([2.5, 2.7], abs=0.01)
+
+
+def test_more_orders_that_are_looked_at_make_a_line_less_sure():
+    few, many = (
+        grown_lines(replace(spectra_of((2.5, 6.0)), resolution=width))[0].p_value
+        for width in (0.04, 0.02)
+    )
+    assert many == pytest.approx(2 * few, rel=1e-6)
+
+
+def test_over_time_a_line_s_order_is_its_frequency(units):
+    timed = [clocked(unit) for unit in units]
+    tone = [
+        np.where(unit.fine_rows, np.cos(2 * np.pi * 40.0 * unit.fine.run_time_s), 0.0)
+        for unit in units
+    ]
+    spectra = order_spectra(timed, tone)
+    assert spectra.orders[np.argmax(spectra.after[0])] == pytest.approx(40.0, abs=0.2)
+    assert spectra.orders[0] >= 8.0  # the lowest of the joint's orders
+
+
+def test_spectra_need_two_units_before_and_one_after(units):
+    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
+    assert order_spectra(units[1:], white[1:]) is None
+    assert order_spectra(units[:2], white[:2]) is None
+    assert order_spectra(units, [0 * one for one in white]) is None
+    # A unit without a long stroke is left out.
+    short = [*white[:2], 0 * white[0], white[2]]
+    spectra = order_spectra([*units[:2], units[0], units[2]], short)
+    assert (len(spectra.before), len(spectra.after)) == (2, 1)
+    still = [
+        replace(unit, fine=replace(unit.fine, machine_angle_rad=0 * unit.fine.machine_angle_rad))
+        for unit in units
+    ]
+    assert order_spectra(still, white) is None
+
+
+def test_a_stroke_is_long_and_goes_one_way(units):
+    unit = units[0]
+    found = strokes(unit.fine, unit.fine_rows)
+    assert len(found) > 2
+    assert strokes(unit.fine, np.zeros_like(unit.fine_rows)) == []
+    for start, stop in found:
+        inside = unit.fine.direction[start:stop][unit.fine_rows[start:stop]]
+        assert len(set(inside)) == 1
+        # 0.4 cycles of the lowest order, 0.4 per turn of the motor: a turn.
+        assert np.ptp(unit.fine.machine_angle_rad[start:stop]) >= 2 * np.pi
+        assert stop - start >= 50
+    slow = replace(unit.fine, machine_angle_rad=1e-3 * unit.fine.machine_angle_rad)
+    assert strokes(slow, unit.fine_rows) == []
+    few = np.zeros_like(unit.fine_rows)
+    few[found[0][0] : found[0][0] + 49] = True
+    assert strokes(unit.fine, few) == []
+
+
+def test_a_residual_is_turned_back_where_phases_were_logged(units):
+    residual = np.arange(units[0].fine.size, dtype=float)
+    assert turned_back(units[0], residual) is None
+    field = 0.3 * residual
+    fine = replace(units[0].fine, electrical_rad=field)
+    assert turned_back(replace(units[0], fine=fine), residual) is None
+    fine = replace(fine, channels=fine.channels | {"phases"})
+    along, across = turned_back(replace(units[0], fine=fine), residual)
+    np.testing.assert_allclose(along, residual * np.cos(field))
+    np.testing.assert_allclose(across, residual * np.sin(field))
+
+
+def test_a_fast_residual_is_the_own_fit_s_without_a_shift(units):
+    coulomb, offset = (Term(LIBRARY[name], {}) for name in ("coulomb", "offset"))
+    shift = Shift((offset,), np.array([0.7]), np.eye(1), 0.0, 1)
+    plain = fast_residuals(units, (coulomb,), None)
+    shifted = fast_residuals(units, (coulomb,), shift)
+    for unit, residual, other in zip(units, plain, shifted, strict=True):
+        assert not residual[~unit.fine_rows].any()
+        own = own_fit(unit, (coulomb,), fine=True)[1]
+        np.testing.assert_array_equal(residual[unit.fine_rows], own)
+        assert np.array_equal(residual, other) is not unit.after

@@ -1,0 +1,141 @@
+"""Which slow effect of the library the target has and the baseline has not."""
+
+import numpy as np
+import pytest
+from sessions import LIBRARY, TERMS, units_of
+
+from opamc_cli.joint.change.search import find_slow_causes
+from opamc_cli.joint.change.slow import learn
+
+FEW = {name: LIBRARY[name] for name in (
+    "payload_change", "offset", "coulomb", "viscous", "sublinear_friction", "quadratic_friction",
+    "spring", "asymmetric_friction", "thermal_viscous",
+)}  # fmt: skip
+
+
+def causes_of(extra, library=FEW, colder=None, **options):
+    units = units_of(extra, colder=colder, **options)
+    healthy = [unit for unit in units if not unit.after]
+    population = learn(healthy, TERMS)
+    units = [unit.with_model(TERMS, population.mean) for unit in units]
+    return find_slow_causes(units, population, library)
+
+
+def only(*names):
+    return {name: LIBRARY[name] for name in names}
+
+
+def payload(q, v, a, t):
+    return 0.1 * a + 0.3 * np.sin(q) + 0.1 * np.cos(q)
+
+
+def heavy(q, v, a, t):
+    return 0.15 * np.sign(v)
+
+
+def thick(q, v, a, t):
+    return 0.15 * v
+
+
+def stiff(q, v, a, t):
+    return 1.5 * q + 0.5
+
+
+def test_healthy_sessions_have_no_cause():
+    assert causes_of(None) == []
+    assert causes_of(payload, library={}) == []
+
+
+def test_another_payload_is_told_from_a_gear():
+    (cause,) = causes_of(payload)
+    assert cause.effect == "payload_change"
+    assert cause.parameters == {}
+    assert "check the tool, not the gear" in cause.note
+    assert cause.p_value < 1e-3
+    np.testing.assert_allclose(cause.shift.coefficients, [0.3, 0.1, 0.1], atol=0.05)
+
+
+def test_an_offset_is_told():
+    (cause,) = causes_of(lambda q, v, a, t: 0.2 + 0 * q)
+    assert (cause.effect, cause.note) == ("offset", "")
+    assert cause.shift.coefficients == pytest.approx([0.2], abs=0.03)
+
+
+def test_dry_friction_is_no_grease():
+    (cause,) = causes_of(heavy)
+    assert cause.effect == "coulomb"
+    assert not set(cause.ties) & {"thermal_viscous", "payload_change"}
+
+
+def test_a_change_that_is_too_small_is_of_no_interest():
+    (cause,) = causes_of(lambda q, v, a, t: 0.05 + 0 * q, noise_a=0.001, spread=0.0)
+    assert cause.effect == "offset"
+    assert causes_of(lambda q, v, a, t: 0.005 + 0 * q, noise_a=0.001, spread=0.0) == []
+
+
+def test_friction_that_grows_with_the_speed_may_be_grease_where_no_temperature_is_logged():
+    (cause,) = causes_of(thick)
+    assert cause.effect == "thermal_viscous"
+    assert cause.parameters == {}
+    assert "no temperature was logged" in cause.note
+    assert "viscous" in cause.ties
+    # By a factor of two at most.
+    assert causes_of(lambda q, v, a, t: 0.5 * v)[0].effect == "viscous"
+    assert causes_of(lambda q, v, a, t: -0.2 * v)[0].effect == "viscous"
+    assert causes_of(thick, library=only("viscous"))[0].effect == "viscous"
+
+
+@pytest.mark.parametrize(
+    ("colder", "size", "effect", "word"),
+    [
+        (15.0, 0.15, "thermal_viscous", "colder grease (by 15 °C"),
+        (-15.0, -0.1, "thermal_viscous", "warmer grease (by 15 °C"),
+        (0.0, 0.15, "viscous", ""),  # as warm as ever
+        (1.5, 0.15, "viscous", ""),
+        (-15.0, 0.15, "viscous", ""),  # warmer, and stiffer
+        (4.0, 0.15, "viscous", ""),  # half as stiff again for four degrees
+    ],
+)
+def test_grease_of_another_temperature_is_stiffer_when_cold_and_not_by_more(
+    colder, size, effect, word
+):
+    cause = causes_of(lambda q, v, a, t: size * v, colder=colder)[0]
+    assert cause.effect == effect
+    assert word in cause.note
+    if effect == "thermal_viscous":
+        assert cause.parameters["warmer_c"] == pytest.approx(-colder, abs=0.1)
+        assert "viscous" in cause.ties
+
+
+def test_cold_grease_that_stiffens_dry_friction_a_little_is_one_cause():
+    both = causes_of(lambda q, v, a, t: 0.25 * v + 0.18 * np.sign(v), colder=15.0, spread=0.0)
+    assert [cause.effect for cause in both] == ["thermal_viscous"]
+    names = [term.effect.name for term in both[0].shift.terms]
+    assert names == ["viscous", "coulomb"]
+    assert both[0].shift.coefficients == pytest.approx([0.25, 0.18], abs=0.03)
+
+
+def test_two_causes_are_fitted_together():
+    found = causes_of(lambda q, v, a, t: payload(q, v, a, t) + heavy(q, v, a, t))
+    assert {cause.effect for cause in found} == {"payload_change", "coulomb"}
+    assert [len(cause.shift.terms) for cause in found] == [1, 2]
+    names = [term.effect.name for term in found[1].shift.terms]
+    assert names == [cause.effect for cause in found]
+
+
+def test_four_things_at_once_are_no_more_than_three_causes():
+    def many(q, v, a, t):
+        drag = np.sign(v) * np.exp(-0.5 * ((q - 0.3) / 0.1) ** 2)
+        return 2 * payload(q, v, a, t) + 0.2 + heavy(q, v, a, t) + drag
+
+    assert len(causes_of(many)) == 3
+
+
+def test_what_is_no_cause_of_a_change_is_not_asked():
+    names = ("inertia", "gravity", "elasticity", "time_delay", "warmup", "stribeck", "ripple")
+    assert causes_of(payload, library=only(*names)) == []
+
+
+def test_a_spring_is_named_where_no_payload_can_be():
+    (cause,) = causes_of(stiff, library=only("spring"))
+    assert cause.effect == "spring"
