@@ -22,6 +22,7 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.spectra import highest_order
 
 JOINT = Joint(100.0, 5)
 LIBRARY = built_in_library()
@@ -218,3 +219,41 @@ def test_a_fast_residual_is_the_own_fit_s_without_a_shift(units):
         own = own_fit(unit, (coulomb,), fine=True)[1]
         np.testing.assert_array_equal(residual[unit.fine_rows], own)
         assert np.array_equal(residual, other) is not unit.after
+
+
+def test_the_resolution_is_that_of_the_long_strokes_and_orders_begin_at_two_of_it(units):
+    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
+    spectra = order_spectra(units, white)
+    travels = np.array(
+        [
+            np.ptp(unit.fine.machine_angle_rad[start:stop])
+            for unit in units
+            for start, stop in strokes(unit.fine, unit.fine_rows)
+        ]
+    )
+    assert spectra.resolution == pytest.approx(2 * np.pi * travels.sum() / (travels**2).sum())
+    lowest = max(0.4, 2 * spectra.resolution)
+    spacing = spectra.orders[1] - spectra.orders[0]
+    assert lowest <= spectra.orders[0] < lowest + spacing
+    assert spectra.orders[-1] == pytest.approx(
+        min(highest_order(unit.fine) for unit in units), abs=2 * spacing
+    )
+
+
+def test_a_travel_of_more_bins_than_memory_allows_has_no_spectrum(units, monkeypatch):
+    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
+    assert order_spectra(units, white) is not None
+    monkeypatch.setattr("opamc_cli.joint.change.lines.MOST_BINS", 100)
+    assert order_spectra(units, white) is None
+
+
+def test_an_order_s_error_is_the_scatter_of_the_target_s_units():
+    spectra = spectra_of()
+    places = [2.48, 2.5, 2.52]
+    lines = [60.0 * np.sinc((spectra.orders - place) / 0.04) ** 2 for place in places]
+    scattered = replace(spectra, after=spectra.after + np.stack(lines))
+    (found,) = grown_lines(scattered)
+    assert found.order == pytest.approx(2.5, abs=0.003)
+    assert found.error == pytest.approx(0.02 / np.sqrt(3), rel=0.1)
+    (alone,) = grown_lines(replace(scattered, after=scattered.after[1:2]))
+    assert alone.error == pytest.approx(0.1 * 0.04)

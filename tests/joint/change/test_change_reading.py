@@ -158,3 +158,24 @@ def test_any_other_frequency_is_nobody_s():
     assert read_frequency(line(50.6), 0.5) is None
     assert read_frequency(line(49.4), 0.5) is None
     assert read_frequency(line(420.0), 0.5) is None
+
+
+@pytest.mark.parametrize(
+    ("order", "says"),
+    [
+        (10.02, "electrical, 2p"),
+        (9.98, "electrical, 2p"),
+        (10.035, "unknown"),  # farther than three quarters of a resolution
+    ],
+)
+def test_an_order_is_read_as_the_nearest_that_has_a_meaning(order, says):
+    reading = read_lines([line(order)], track_of(ratio=None), 0.04)
+    assert says in reading.interpretation
+    assert reading.parameters == {"order": order}
+
+
+def test_a_joint_s_or_an_electrical_order_is_told_as_it_is():
+    text = read_lines([line(2.02)], track_of("joint"), 0.02).interpretation
+    assert "order 2.02 per joint" in text
+    text = read_lines([line(0.13)], track_of("electrical", poles=None), 0.02).interpretation
+    assert "order 0.13 per electrical" in text

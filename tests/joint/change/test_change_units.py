@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from closing import moved
 from sessions import COEFFICIENTS, DECLARED, JOINT, LIBRARY, RATE, TERMS, recordings, units_of
 
 from opamc_cli.joint.change.units import followed, own_fit, read_side, usable_terms
@@ -114,6 +115,18 @@ def test_a_term_is_usable_where_every_unit_can_show_it(units):
     ]
     assert len(usable_terms(warm, effects)) == len(TERMS) + 1
     assert usable_terms([*warm, units[0]], effects) == TERMS
+
+
+def test_by_phases_alone_the_joint_angle_s_zero_is_the_middle_of_its_travel():
+    q, t = moved("cyclic", 500.0, 16.0)[0], np.arange(8000) / 500.0
+    field = 4 * 50.0 * q + 1.0
+    current = 1.0 + 0.1 * np.sin(t)
+    phases = current[:, None] * np.cos(field[:, None] - np.arange(3) * 2 * np.pi / 3)
+    (unit,) = read_side([Recording("phases", 500.0, phases_a=phases)], JOINT, False, cycles=False)
+    assert "logged" not in unit.fine.channels
+    inside = unit.fine.position_rad[unit.fine.moving]
+    assert inside.max() == pytest.approx(-inside.min())
+    assert np.ptp(inside) == pytest.approx(np.ptp(q), rel=0.1)
 
 
 def by_phases(unit, current=None):

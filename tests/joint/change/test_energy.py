@@ -70,10 +70,10 @@ def test_what_the_own_fits_leave_more_is_fast_where_it_is_clear():
 
 
 def test_sessions_that_agree_by_chance_differ_by_a_twentieth():
-    before = [(1.0, 0.0)] * 3
-    limit = 2.5 * 0.05 * np.sqrt(1 / 3 + 1)
-    assert energy(before, [(1 + 0.99 * limit, 0.0)]).fast == 0.0
-    assert energy(before, [(1 + 1.01 * limit, 0.0)]).fast > 0.0
+    before = [(2.0, 0.0)] * 3
+    limit = 2.5 * 0.05 * 2 * np.sqrt(1 / 3 + 1)
+    assert energy(before, [(2 + 0.99 * limit, 0.0)]).fast == 0.0
+    assert energy(before, [(2 + 1.01 * limit, 0.0)]).fast > 0.0
 
 
 def stiff(q, v, a, t):

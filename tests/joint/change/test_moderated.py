@@ -25,7 +25,7 @@ def test_a_t_by_hand(between):
     # Variances 1, 4 and 9 of three units each are drawn towards 4 with twice their weight.
     before = np.array([[-1.0, -2.0, -3.0], [0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
     after = np.array([[1.0, 1.0, -1.0], [3.0, 1.0, -1.0]])
-    t_values, p_values = moderated_t(before, after, between)
+    t_values, p_values = moderated_t(before + 7, after + 7, between)
     for k, (variance, mean) in enumerate(((1.0, 2.0), (4.0, 1.0), (9.0, -1.0))):
         drawn = (2 * variance + 4 * 4.0) / 6
         t_value = mean / np.sqrt(drawn * (1 / 3 + 1 / 2) + 2 * between)

@@ -119,3 +119,21 @@ def test_strokes_that_are_too_short_tell_nothing(units):
         for unit in units
     ]
     assert found(short, lambda track: np.cos(3 * track.machine_angle_rad)) is None
+
+
+def test_another_frequency_of_one_phase_is_no_hum(units):
+    def picked_up(track):
+        field = POLES * RATIO * track.position_rad
+        return np.cos(2 * np.pi * 72.0 * track.run_time_s) * np.cos(field)
+
+    other = found(from_phases(units), picked_up)
+    assert other is None or other.reading.effect != "mains_hum"
+
+
+def test_hum_that_is_weaker_than_a_ripple_is_not_named_first(units):
+    def both(track):
+        field = POLES * RATIO * track.position_rad
+        hum = np.cos(2 * np.pi * 50.0 * track.run_time_s) * np.cos(field)
+        return 0.3 * hum + np.cos(2.04 * track.machine_angle_rad)
+
+    assert found(from_phases(units), both).reading.effect == "ripple"

@@ -43,9 +43,14 @@ def test_a_population_has_the_mean_and_the_noise_of_its_units(units, population)
     assert learn(units[:4], TERMS, 0.01).between == 0.01
 
 
-@pytest.mark.parametrize("spread", [0.0, 0.3])
-def test_healthy_sessions_are_expected_to_differ_by_friction_and_gain(spread):
-    units = units_of(before=4, after=0, spread=spread)
+def scaled(unit, gain):
+    return replace(unit, coarse=replace(unit.coarse, current_a=gain * unit.coarse.current_a))
+
+
+@pytest.mark.parametrize("gains", [(1.0, 1.0, 1.0, 1.0), (0.7, 1.0, 1.1, 1.4)])
+def test_healthy_sessions_are_expected_to_differ_by_friction_and_gain(gains):
+    units = units_of(before=4, after=0)
+    units = [scaled(unit, gain) for unit, gain in zip(units, gains, strict=True)]
     found = learn(units, TERMS)
     sample = np.stack([own_fit(unit, TERMS)[0] for unit in units])
     centre = np.median(sample, axis=0)
@@ -53,6 +58,7 @@ def test_healthy_sessions_are_expected_to_differ_by_friction_and_gain(spread):
     own = FRICTION * centre * [0, 0, 0, 1, 1, 1]
     prior = np.diag(own**2 + COMMON**2 * found.power / sizes) + GAIN**2 * np.outer(centre, centre)
     ratio = max(np.median(sample.var(axis=0, ddof=1) / np.diag(prior)), 1.0)
+    assert (ratio > 1) == (gains[0] < 1)
     # What differs more than is expected is friction.
     prior[3:5, 3:5] *= ratio
     expected = (3 * np.cov(sample.T) + BORROWED * prior) / (3 + BORROWED)
@@ -139,6 +145,21 @@ def test_how_units_differ_beyond_noise_widens_what_is_expected(between, wander):
     covariance, p_value, _ = slow_shift(ready, population, SPRING, max(ratio, 1.0))
     np.testing.assert_allclose(found.covariance, covariance, rtol=1e-5)
     assert found.p_value == pytest.approx(p_value, rel=1e-4)
+
+
+def test_declared_friction_is_not_expected_to_differ_by_what_no_effect_holds():
+    units = units_of(lifted)
+    sizes = 0.2 * np.random.default_rng(3).normal(size=len(units))
+    units = [wandering(unit, size) for unit, size in zip(units, sizes, strict=True)]
+    population = learn(units[:4], TERMS)
+    ready = prepared(units, population)
+    both = [SPRING, Term(LIBRARY["viscous"], {}), QUADRATIC]
+    inflation = np.median([slow_shift(ready, population, term, 1.0)[2] for term in both])
+    assert inflation > 1
+    found = {shift.terms[-1].key: shift.covariance for shift in shifts(ready, population, (), both)}
+    for term, expected in zip(both, (inflation, 1.0, inflation), strict=True):
+        covariance = slow_shift(ready, population, term, expected)[0]
+        np.testing.assert_allclose(found[term.key], covariance, rtol=1e-5)
 
 
 def test_what_too_few_samples_or_no_number_carries_is_no_candidate(units, population):

@@ -1,16 +1,18 @@
 """Functions without a name: how a covariate is stretched, and where travel begins anew."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from closing import plain_fit
+from closing import joint_of, plain_fit
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import simulate
 
+from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.explain.unnamed import stretched, travel_since_reversal
+from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 
@@ -58,3 +60,77 @@ def test_a_model_beside_its_own_rates_of_change_settles_at_once():
     assert after.rmse(sealed=False) < 0.75 * before.rmse(sealed=False)
     again = fit_terms(after.dataset, terms)
     assert again.rmse(sealed=False) == pytest.approx(after.rmse(sealed=False), rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def track():
+    made = joint_of("cyclic", None, rate=250.0, seconds=8.0)
+    return plain_fit(made).dataset.fine.track
+
+
+@pytest.mark.parametrize(
+    ("name", "covariate", "modifiers", "first"),
+    [
+        ("speed", lambda t: np.abs(t.velocity), lambda t: [t.direction], 0),
+        ("speed_and_direction", lambda t: np.abs(t.velocity), lambda t: [1.0], 0),
+        ("angle", lambda t: t.position_rad, lambda t: [1.0], 0),
+        ("angle_and_direction", lambda t: t.position_rad, lambda t: [t.direction], 0),
+        ("load", lambda t: np.abs(t.load_a), lambda t: [t.direction], 0),
+        ("acceleration", lambda t: t.acceleration, lambda t: [1.0], 1),
+        ("time", lambda t: t.time_s, lambda t: [1.0], 0),
+        ("time_and_speed", lambda t: t.time_s, lambda t: [t.direction, t.velocity], 0),
+        ("time_and_load", lambda t: t.time_s,
+         lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration], 0),
+    ],
+)  # fmt: skip
+def test_a_smooth_function_is_cosines_of_its_covariate_times_what_it_changes(
+    track, name, covariate, modifiers, first
+):
+    effect = unnamed_library()[f"unnamed_{name}"]
+    place = np.pi * stretched(covariate(track), track.moving)
+    waves = [np.cos(k * place) for k in range(first, 5)]
+    expected = np.stack([part * wave for part in modifiers(track) for wave in waves], axis=1)
+    np.testing.assert_allclose(effect.columns(track, {"degree": 4.0}), expected)
+    assert [guess["degree"] for guess in effect.guesses(track, track.time_s)] == [2, 4, 8, 16]
+    assert effect.from_motion is (name != "load")
+    assert effect.changes_in_time is name.startswith("time")
+
+
+def test_a_response_is_low_and_band_passes_of_the_acceleration(track):
+    effect = Response()
+    counts = [guess["filters"] for guess in effect.guesses(track, track.time_s)]
+    assert counts == [3.0, 6.0, 12.0]
+    columns = effect.columns(track, {"filters": 3.0})
+    frequencies = [1.5, np.sqrt(1.5 * 60.0), 60.0]
+    expected = [
+        answer
+        for frequency in frequencies
+        for answer in answers(
+            [track.acceleration], 2 * np.pi * frequency, 0.3, track.rate_hz, track.bounds
+        )
+    ]
+    np.testing.assert_allclose(columns, np.stack(expected, axis=1))
+    # A slower recording has no room for 60 Hz.
+    slow = replace(track, rate_hz=90.0)
+    highest = answers([slow.acceleration], 2 * np.pi * 30.0, 0.3, 90.0, slow.bounds)
+    last = effect.columns(slow, {"filters": 3.0})[:, -len(list(highest)) :]
+    np.testing.assert_allclose(last, np.stack(list(highest), axis=1))
+
+
+def test_a_shift_is_the_rates_of_change_of_the_open_samples_fit(track):
+    static = fit_terms(plain_fit(joint_of("cyclic", None, rate=100.0)).dataset, ())
+    empty = static.dataset.fine.track
+    np.testing.assert_array_equal(
+        Shift().columns(replace(empty, open_samples=None), {}), np.zeros((empty.size, 2))
+    )
+    columns = track.static_means
+    rows = track.open_samples
+    model = columns @ np.linalg.lstsq(columns[rows], track.current_a[rows])[0]
+    expected = np.stack([np.gradient(model), np.gradient(np.gradient(model))], axis=1)
+    np.testing.assert_allclose(Shift().columns(track, {}), expected, atol=1e-9)
+
+
+def test_of_no_samples_nothing_is_stretched():
+    values = np.arange(3.0)
+    np.testing.assert_array_equal(stretched(values, np.zeros(3, dtype=bool)), np.zeros(3))
+    np.testing.assert_array_equal(stretched(np.ones(3), np.ones(3, dtype=bool)) <= 1, True)
