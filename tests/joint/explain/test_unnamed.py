@@ -26,7 +26,8 @@ def test_a_covariate_is_stretched_within_0_and_1_in_its_own_order(values, seed):
     assert np.all((place >= 0) & (place <= 1))
     order = np.argsort(values, kind="stable")
     assert np.all(np.diff(place[order]) >= 0)
-    if members.any() and np.ptp(values[members]) > 0:
+    # A range below 1e-300 is none.
+    if members.any() and np.ptp(values[members]) > 1e-300:
         # Of equal values all have the rank of the last.
         assert place[members].max() == 1
 
@@ -134,3 +135,11 @@ def test_of_no_samples_nothing_is_stretched():
     values = np.arange(3.0)
     np.testing.assert_array_equal(stretched(values, np.zeros(3, dtype=bool)), np.zeros(3))
     np.testing.assert_array_equal(stretched(np.ones(3), np.ones(3, dtype=bool)) <= 1, True)
+
+
+def test_what_is_fitted_to_its_own_recordings_or_smooths_the_motion_says_so():
+    library = unnamed_library()
+    own = {name for name, effect in library.items() if effect.of_its_recordings}
+    assert own == set(library) - {"unnamed_response", "unnamed_order", "unnamed_tone"}
+    smooth = {name for name, effect in library.items() if effect.as_smoothing}
+    assert smooth == {"unnamed_response", "unnamed_shift"}
