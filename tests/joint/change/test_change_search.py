@@ -139,3 +139,11 @@ def test_what_is_no_cause_of_a_change_is_not_asked():
 def test_a_spring_is_named_where_no_payload_can_be():
     (cause,) = causes_of(stiff, library=only("spring"))
     assert cause.effect == "spring"
+
+
+def test_what_is_expected_of_the_cold_needs_less_proof():
+    def little(q, v, a, t):
+        return 0.02 * v
+
+    assert causes_of(little) == causes_of(little, colder=0.0) == []
+    assert [cause.effect for cause in causes_of(little, colder=15.0)] == ["thermal_viscous"]
