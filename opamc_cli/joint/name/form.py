@@ -71,11 +71,8 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
         for name, effect in unnamed.library.items()
         if effect.domain == term.effect.domain and not effect.fast
     }
-    slow = [
-        batch for batch in unnamed.slow if all(one.effect.name in library for one in batch.terms)
-    ]
     more = 0.0
-    for trial in trials(best, replace(unnamed, library=library, slow=slow, least_share=0.0)):
+    for trial in trials(best, replace(unnamed, library=library, least_share=0.0)):
         gained = float((best.error - trial.chain.error).sum())
         if trial.t_value > LEAST_T and trial.chain.score < best.score:
             more = max(more, gained)

@@ -1,5 +1,7 @@
 """Chains side by side, and what a candidate has to show."""
 
+from dataclasses import replace
+
 import numpy as np
 from closing import joint_of, plain_fit
 
@@ -7,7 +9,7 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
-from opamc_cli.joint.name.search import Pool, beam, objection
+from opamc_cli.joint.name.search import Pool, beam, objection, trials
 
 LIBRARY = built_in_library()
 
@@ -139,3 +141,11 @@ def priced(*rules):
 
 def test_a_price_is_asked_for_every_degree_of_freedom():
     assert priced() == []
+
+
+def test_guesses_that_lie_ready_are_asked_only_if_their_effect_is_in_the_pool():
+    chain = chain_on("cyclic", bump, strength=5.0)
+    pool = pool_of(chain, "position_drag", "spring")
+    assert "position_drag" in {one.term.effect.name for one in trials(chain, pool)}
+    spring = replace(pool, library={"spring": LIBRARY["spring"]})
+    assert "position_drag" not in {one.term.effect.name for one in trials(chain, spring)}
