@@ -16,7 +16,7 @@ class Named(Effect):
     per = ("rad/s", "", "current")
 
     def limits(self, track):
-        return {"a": (0.1, 10.0), "b": (0.0, 2.0), "c": (4.0, 5.0)}
+        return {"a": (0.1, 10.0), "b": (0.0, 2.0), "c": (4.0, 5.0), "d": (1.0, 5.0)}
 
 
 def test_a_channel_that_is_needed_and_absent_is_told():
@@ -30,7 +30,7 @@ def test_a_channel_that_is_needed_and_absent_is_told():
 
 def test_a_first_step_is_four_tenths_or_a_twentieth_of_narrow_limits():
     steps = Named().first_steps(TRACK, {"a": 2.0, "c": 4.2})
-    assert steps == {"a": pytest.approx(0.8), "b": pytest.approx(0.1), "c": pytest.approx(0.05)}
+    assert steps == pytest.approx({"a": 0.8, "b": 0.1, "c": 0.05, "d": 0.2})
 
 
 def test_searched_parameters_are_counted_where_they_are_given():

@@ -8,7 +8,7 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.fit.frozen import apply_frozen, why_not_applied
+from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
@@ -73,6 +73,13 @@ def test_errors_are_of_moving_samples_that_are_clear_or_of_some_of_them():
     none = apply_frozen(replace(track, clear=~track.clear & False), fitted.terms,
                         fitted.coefficients)  # fmt: skip
     np.testing.assert_array_equal(none.judged, track.moving)
+
+
+def test_nothing_is_explained_of_a_current_that_stays():
+    track = track_of(joint_of("cyclic", None))
+    steady = replace(track, current_a=np.full(track.size, 2.0))
+    applied = Applied(steady, np.ones(track.size), track.moving)
+    assert (applied.rmse(), applied.r2()) == (1.0, 0.0)
 
 
 def test_some_coefficients_mean_nothing_elsewhere():
