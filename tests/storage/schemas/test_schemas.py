@@ -6,13 +6,11 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
-from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL, TABLES, UNITS
 
 ROOT = Path(__file__).parents[3]
 FORMATS = (ROOT / "docs" / "formats.md").read_text(encoding="utf-8")
 HEADINGS = re.compile(r"^### (.*parquet.*)$", re.MULTILINE)
-NAMES = {name: value for name, value in vars(files).items() if name.isupper()}
 UNITLESS = {
     *("similarity", "gamma", "jsd", "chance", "excess", "base", "delta_mu", "delta_var", "ks"),
     *("lda", "self_consistency", "patterns_per_cell", "coefficient", "standard_error", "low"),
@@ -73,23 +71,3 @@ def test_every_number_has_a_unit_or_none(name):
 def test_limits_are_of_columns():
     columns = {name for table in TABLES.values() for name in table.names}
     assert set(LIMITS) | MAY_BE_NULL <= columns
-
-
-def test_no_file_name_is_written_twice():
-    for path in (ROOT / "opamc_cli").rglob("*.py"):
-        if path.name == "files.py":
-            continue
-        text = re.sub(r'""".*?"""', "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
-        written = set(re.findall(r'"([\w.]+)"', text)) & set(NAMES.values())
-        assert not written, f"{path.name}: {written}"
-
-
-@pytest.mark.parametrize("name", sorted(NAMES.values()))
-def test_every_file_is_documented(name):
-    assert any(name in path.read_text(encoding="utf-8") for path in (ROOT / "docs").glob("*.md"))
-
-
-def test_every_file_is_documented_by_its_name():
-    docs = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
-    said = set(re.findall(r"\w+\.[a-z]+\b", "\n".join(p.read_text("utf-8") for p in docs)))
-    assert set(NAMES.values()) <= said
