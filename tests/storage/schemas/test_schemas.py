@@ -6,6 +6,7 @@ from pathlib import Path
 import pyarrow as pa
 import pytest
 
+from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL, TABLES, UNITS
 
 ROOT = Path(__file__).parents[3]
