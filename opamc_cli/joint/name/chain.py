@@ -7,7 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Fit, Term, fit_terms
 from opamc_cli.joint.fit.parts import Sums
-from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.joint.motion.track import Bools, Floats, Track
 
 Signature = frozenset[tuple[object, ...]]
 PRICE = 0.02
@@ -79,7 +79,7 @@ class Chain:
     @cached_property
     def signature(self) -> Signature:
         """What makes two chains the same."""
-        return signature_of(self.terms)
+        return signature_of(self.terms, self.fit.dataset.fine.track)
 
     def gain_over(self, other: "Chain") -> tuple[float, float]:
         """Share of the other's held-out error that this chain takes away, and its t over parts."""
@@ -139,15 +139,34 @@ def without(chain: Chain, place: int) -> Chain:
     return chain_of(fit_terms(chain.fit.dataset, tuple(terms)), chain.added - 1)
 
 
-def signature_of(terms: tuple[Term, ...]) -> Signature:
-    """Effects, and their parameters to two digits."""
+def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
+    """Effects, with the lines that they are and their other parameters to two digits."""
     return frozenset(
         (
             term.effect.name,
-            tuple(sorted((k, float(f"{v:.2g}")) for k, v in term.parameters.items())),
+            line_of(term, track),
+            tuple(
+                sorted(
+                    (k, float(f"{v:.2g}"))
+                    for k, v in term.parameters.items()
+                    if not (term.effect.several and k in term.effect.searches)
+                )
+            ),
         )
         for term in terms
     )
+
+
+def line_of(term: Term, track: Track) -> int:
+    """Which of several lines a term is, in units of what two have to differ by; 0 if there is one.
+
+    A track of many turns tells orders of 320 and 322 apart.
+    """
+    if not term.effect.several:
+        return 0
+    name = term.effect.searches[0]
+    half = term.effect.first_steps(track, term.parameters)[name]
+    return round(term.parameters[name] / (2 * half))
 
 
 def _gain(before: Floats, after: Floats) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
-from opamc_cli.joint.name.chain import Chain, Signature, extended, signature_of
+from opamc_cli.joint.name.chain import Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import LEAST_T, p_value
 
@@ -137,16 +137,14 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
     reference = float(chain.error.sum())
-    found: dict[tuple[str, float], Candidate] = {}
+    found: dict[tuple[str, int], Candidate] = {}
 
     def note(candidate: Candidate) -> None:
-        effect, key = candidate.term.effect, 0.0
-        if effect.several:
-            # Two lines of one kind are two candidates.
-            key = float(f"{next(iter(candidate.term.parameters.values())):.3g}")
-        known = found.get((effect.name, key))
+        # Two lines of one kind are two candidates.
+        key = candidate.term.effect.name, line_of(candidate.term, dataset.fine.track)
+        known = found.get(key)
         if known is None or candidate.score < known.score:
-            found[effect.name, key] = candidate
+            found[key] = candidate
 
     slow = Beside(chain, fine=False)
     free = [effect for effect in pool.library.values() if effect.name not in present]
@@ -200,7 +198,8 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
     ordered = [forms for forms in ordered if not forms[0].effect.follows_load]
     found = []
     for forms in (*ordered, *_by_load(chain, pool)):
-        signatures = {chain.signature | signature_of((term,)) for term in forms}
+        track = chain.fit.dataset.fine.track
+        signatures = {chain.signature | signature_of((term,), track) for term in forms}
         if not signatures.isdisjoint(tried):
             continue
         tried |= signatures

@@ -16,10 +16,12 @@ from opamc_cli.joint.name.chain import (
     Chain,
     chain_of,
     extended,
+    line_of,
     price_of,
     signature_of,
     without,
 )
+from opamc_cli.joint.spectra import order_resolution
 
 LIBRARY = built_in_library()
 CHARGE = 0.02
@@ -37,6 +39,7 @@ def chain():
 def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
     return SimpleNamespace(
         name=name,
+        several=False,
         unnamed=unnamed,
         follows_load=follows_load,
         plausible=lambda values, parameters: plausible,
@@ -132,10 +135,25 @@ def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
     def term(name, **parameters):
         return SimpleNamespace(effect=effect(name), parameters=parameters)
 
-    one = signature_of((term("a", x=1.234, y=2.0), term("b")))
-    assert one == signature_of((term("b"), term("a", y=2.0, x=1.22)))
-    assert one != signature_of((term("b"), term("a", y=2.0, x=1.26)))
-    assert one != signature_of((term("a", x=1.234, y=2.0),))
+    one = signature_of((term("a", x=1.234, y=2.0), term("b")), None)
+    assert one == signature_of((term("b"), term("a", y=2.0, x=1.22)), None)
+    assert one != signature_of((term("b"), term("a", y=2.0, x=1.26)), None)
+    assert one != signature_of((term("a", x=1.234, y=2.0),), None)
+
+
+def test_lines_are_the_same_where_the_travel_cannot_tell_them_apart(chain):
+    """Two digits made one line of 320 and 322 per turn: the second was never tried."""
+    track = chain.fit.dataset.fine.track
+    apart = order_resolution(track)
+
+    def line(order, **flags):
+        return signature_of((Term(LIBRARY["ripple"], {"order": order, **flags}),), track)
+
+    one = 300 * apart
+    assert line(one) == line(one + 0.3 * apart)
+    assert line(one) != line(one + apart)
+    assert line(one) != line(one, load=1.0)
+    assert line_of(Term(LIBRARY["spring"], {}), track) == 0
 
 
 def test_what_is_put_in_can_be_taken_out_again(chain):
@@ -145,7 +163,7 @@ def test_what_is_put_in_can_be_taken_out_again(chain):
     )
     longer = extended(extended(chain, spring), speed)
     assert (longer.added, longer.terms) == (2, (spring, speed))
-    assert longer.signature == signature_of((spring, speed))
+    assert longer.signature == signature_of((spring, speed), longer.fit.dataset.fine.track)
     for place, kept in ((0, speed), (1, spring)):
         shorter, direct = without(longer, place), extended(chain, kept)
         assert (shorter.added, shorter.terms) == (1, (kept,))
