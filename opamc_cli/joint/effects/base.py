@@ -58,6 +58,8 @@ class Effect:
     """True where the regressors are in proportion to the load's magnitude."""
     resists: bool = False
     """True for friction: its first coefficient is above 0, or it would drive the joint."""
+    at_a_place: bool = False
+    """True for friction that is more at some place, or less, down to none."""
     per: tuple[str, ...] | None = None
     """Unit of each regressor, "" for a bare number and "current" for one in the current's own; the
     last one is that of all further ones. A coefficient is the current's unit by it."""

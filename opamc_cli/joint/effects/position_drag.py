@@ -13,9 +13,10 @@ class PositionDrag(Effect):
     domain = "joint-angle"
     per = ("",)
     searches = ("place_rad", "width_rad", "flatness")
-    meaning = "friction at one place of the travel: inspect bearing, seal and cables there"
+    meaning = "other friction at one place of the travel: inspect bearing, seal and cables there"
     needs = ("position",)
     resists = True
+    at_a_place = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

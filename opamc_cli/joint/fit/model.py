@@ -255,7 +255,10 @@ class Fit:
         if "ones" not in shared:
             shared["ones"] = np.ones((dataset.fine.track.size, 1))
         blocks = [dataset.columns(term, fine=True) for term in self.terms]
-        error: Floats = dataset.sums_of([*blocks, shared["ones"]], True).without_drift().held_out()
+        if "stretches" not in shared:
+            shared["stretches"] = dataset.parts[0].stretches(dataset.fine.track.direction)
+        sums = dataset.sums_of([*blocks, shared["ones"]], True)
+        error: Floats = sums.without_drift(shared["stretches"]).held_out()
         return error
 
     @cached_property

@@ -18,6 +18,12 @@ PARTS_PER_UNIT = 4
 """So many drops per unit make the standard error of a drop: 9 units have 36."""
 
 
+BOTH_WAYS = 0.25
+"""Share of a stretch of time that moves the one way, and the other: nearly two strokes."""
+FEWEST_STRETCHES = 4
+"""With fewer there is next to no drift to tell from anything; halves of units are taken."""
+
+
 @dataclass(frozen=True)
 class Parts:
     """Open samples of one grid, part after part."""
@@ -43,6 +49,35 @@ class Parts:
         size = np.searchsorted(self.unit, self.unit, side="right") - first
         half: Ints = 2 * self.unit + (2 * (np.arange(self.unit.size) - first) >= size)
         return np.unique(half, return_inverse=True)[1]
+
+    def stretches(self, direction: Floats) -> Ints:
+        """Stretch of time that each part lies in: half a unit, or as long as it moves both ways.
+
+        Where a half is one stroke friction is an offset, and no drift. A single stroke has halves.
+
+        Parameters
+        ----------
+        direction : array of shape (n,)
+            Sign of the speed on the grid.
+        """
+        halves = self.halves
+        starts = [start for start, _ in self.slices]
+        taken = self.taken(direction)
+        forth, back = (
+            _summed(np.add.reduceat(taken * way > 0, starts, dtype=float), halves)
+            for way in (1, -1)
+        )
+        place, both = 0, np.zeros(2)
+        stretch = np.zeros(int(halves.max()) + 1, dtype=np.int64)
+        for half, moved in enumerate(np.stack([forth, back], axis=1)):
+            stretch[half] = place
+            both = both + moved
+            if both.min() >= BOTH_WAYS * both.sum():
+                place, both = place + 1, np.zeros(2)
+        if place < FEWEST_STRETCHES:
+            return halves
+        found: Ints = np.minimum(stretch, place - 1)[halves]
+        return found
 
     def by_unit(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over each unit."""
@@ -121,16 +156,20 @@ class Sums:
         gram = np.concatenate([top, bottom], axis=1)
         return Sums(gram, np.concatenate([self.moment, moment], axis=1), self.power, self.parts)
 
-    def without_drift(self) -> "Sums":
-        """Allow the current another offset in each half of every unit.
+    def without_drift(self, stretches: Ints) -> "Sums":
+        """Allow the current another offset in each stretch of time.
 
-        A quarter is often one stroke, in which friction is an offset. The last regressor has to be
-        ones; the parts of what is returned are halves, without rows.
+        The last regressor has to be ones; the parts of what is returned are the stretches, without
+        rows.
+
+        Parameters
+        ----------
+        stretches : int array of shape (p,)
+            Stretch of each part, as `Parts.stretches` tells.
         """
-        halves = self.parts.halves
-        count = int(halves.max()) + 1
+        count = int(stretches.max()) + 1
         gram, moment, power = (
-            _summed(values, halves) for values in (self.gram, self.moment, self.power)
+            _summed(values, stretches) for values in (self.gram, self.moment, self.power)
         )
         number = np.maximum(gram[:, -1, -1], 1.0)
         own, total, mean = gram[:, :-1, :-1], gram[:, :-1, -1], moment[:, -1] / number
@@ -139,7 +178,8 @@ class Sums:
         size, whole = (np.diagonal(one, axis1=1, axis2=2) for one in (left, own))
         varies = size > ROUNDING * whole
         unit = np.zeros(count, dtype=np.int64)
-        unit[halves] = self.parts.unit
+        unit[stretches[::-1]] = self.parts.unit[::-1]
+        unit = np.unique(unit, return_inverse=True)[1]
         none = np.zeros(0, dtype=np.int64)
         parts = Parts(none, ((0, 0),) * count, unit, np.ones(count, dtype=bool))
         return Sums(

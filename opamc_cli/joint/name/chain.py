@@ -71,9 +71,12 @@ class Chain:
 
     @property
     def _signs(self) -> list[bool]:
+        pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
+        dry = sum(float(values[0]) for term, values in pairs if term.effect.name == "coulomb")
         return [
             term.effect.plausible(values, term.parameters)
-            for term, values in zip(self.fit.terms, self.fit.coefficients, strict=True)
+            or (term.effect.at_a_place and values[0] > -dry)
+            for term, values in pairs
         ]
 
     @cached_property

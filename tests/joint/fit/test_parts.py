@@ -134,7 +134,7 @@ def test_drift_is_an_offset_for_every_half_of_a_unit(seed, width, units):
     _, parts, columns, signal = drawn(seed, width, units)
     signal += 50 * np.arange(signal.size) / signal.size
     with_ones = np.concatenate([columns, np.ones((signal.size, 1))], axis=1)
-    fast = sums_of(with_ones, signal, parts).without_drift().held_out()
+    fast = sums_of(with_ones, signal, parts).without_drift(parts.halves).held_out()
     slow = slow_without_drift(columns, signal, parts)
     np.testing.assert_allclose(fast, slow, rtol=1e-5, atol=1e-6)
 
@@ -188,6 +188,38 @@ def test_what_is_an_offset_in_every_half_has_no_part_beside_the_offsets():
     steps = rng.normal(size=half.max() + 1)[half]
     ramp, ones = rng.normal(size=320), np.ones(320)
     current = 2 * ramp + 5 * steps + 0.1 * rng.normal(size=320)
-    plain = sums_of(np.stack([ramp, ones], axis=1), current, parts).without_drift()
-    beside = sums_of(np.stack([ramp, steps, ones], axis=1), current, parts).without_drift()
+    plain = sums_of(np.stack([ramp, ones], axis=1), current, parts).without_drift(parts.halves)
+    beside = sums_of(np.stack([ramp, steps, ones], axis=1), current, parts).without_drift(
+        parts.halves
+    )
     np.testing.assert_allclose(beside.held_out(), plain.held_out(), rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("stroke", "stretches"),
+    [
+        (40, 8),  # a unit is one stroke: two of them move both ways
+        (10, 16),  # half a unit moves both ways
+        (320, 16),  # nothing ever turns back
+        (160, 16),  # one return is too few to tell a drift
+    ],
+)
+def test_a_stretch_of_drift_moves_both_ways(stroke, stretches):
+    """A half of one stroke took a friction that wears off for an offset that drifts."""
+    grid = SimpleNamespace(rows=[np.arange(k * 20, k * 20 + 20) for k in range(16)])
+    parts = parts_of(grid, np.ones(320, dtype=bool))
+    direction = np.where(np.arange(320) // stroke % 2, -1.0, 1.0)
+    found = parts.stretches(direction)
+    if stretches == 16 and stroke > 10:
+        np.testing.assert_array_equal(found, parts.halves)
+        return
+    rows = np.repeat(found, [stop - start for start, stop in parts.slices])
+    assert np.all(np.diff(found) >= 0)
+    for one in np.unique(found):
+        ways = direction[rows == one]
+        assert min(np.sum(ways > 0), np.sum(ways < 0)) >= 0.25 * ways.size
+    sums = sums_of(np.ones((320, 1)), direction, parts).without_drift(found)
+    assert sums.power.sum() > 0.7 * 320
+    if stroke == 40:
+        halves = sums_of(np.ones((320, 1)), direction, parts).without_drift(parts.halves)
+        assert halves.power.sum() < 1e-6

@@ -40,6 +40,7 @@ def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
     return SimpleNamespace(
         name=name,
         several=False,
+        at_a_place=False,
         unnamed=unnamed,
         follows_load=follows_load,
         plausible=lambda values, parameters: plausible,
@@ -112,6 +113,16 @@ def test_an_added_term_has_to_have_its_sign():
     start = made(effect("declared"), added=0)
     assert made(effect("declared"), effect("new")).plausible_beside(start)
     assert not made(effect("declared"), effect("new", plausible=False)).plausible_beside(start)
+
+
+def test_a_place_may_have_less_friction_down_to_none():
+    start = made(effect("coulomb"), added=0)
+    for share, plausible in ((-0.9, True), (-1.1, False)):
+        easy = effect("easy", plausible=False)
+        easy.at_a_place = True
+        chain = made(effect("coulomb"), easy)
+        chain.fit.coefficients[1] = np.array([share])
+        assert chain.plausible_beside(start) is plausible
 
 
 @pytest.mark.parametrize(

@@ -91,7 +91,7 @@ def test_an_effect_has_to_take_its_share():
 
 
 def test_friction_resists():
-    lowered = chain_on("cyclic", lambda q, v, a, t: -bump(q, v, a, t), strength=2.0)
+    lowered = chain_on("cyclic", lambda q, v, a, t: -bump(q, v, a, t), strength=200.0)
     assert "not physical" in why_not(lowered, drag())
     assert why_not(lowered, drag(), "sign") is None
 
