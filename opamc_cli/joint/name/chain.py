@@ -152,7 +152,7 @@ def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
                 sorted(
                     (k, float(f"{v:.2g}"))
                     for k, v in term.parameters.items()
-                    if not (term.effect.several and k in term.effect.searches)
+                    if not (term.effect.several and k == next(iter(term.parameters)))
                 )
             ),
         )
@@ -160,16 +160,17 @@ def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
     )
 
 
-def line_of(term: Term, track: Track) -> int:
-    """Which of several lines a term is, in units of what two have to differ by; 0 if there is one.
+def line_of(term: Term, track: Track) -> float:
+    """Which of several lines a term is, by its first parameter; 0 of an effect that comes once.
 
-    A track of many turns tells orders of 320 and 322 apart.
+    In units of what two have to differ by: a track of many turns tells orders of 320 and 322 apart.
+    To three digits where a user's effect has no first step.
     """
-    if not term.effect.several:
-        return 0
-    name = term.effect.searches[0]
-    half = term.effect.first_steps(track, term.parameters)[name]
-    return round(term.parameters[name] / (2 * half))
+    if not term.effect.several or not term.parameters:
+        return 0.0
+    name, value = next(iter(term.parameters.items()))
+    half = term.effect.first_steps(track, term.parameters).get(name, 0.0)
+    return float(round(value / (2 * half)) if half > 0 else f"{value:.3g}")
 
 
 def _gain(before: Floats, after: Floats) -> tuple[float, float]:

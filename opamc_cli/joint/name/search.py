@@ -137,7 +137,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
     reference = float(chain.error.sum())
-    found: dict[tuple[str, int], Candidate] = {}
+    found: dict[tuple[str, float], Candidate] = {}
 
     def note(candidate: Candidate) -> None:
         # Two lines of one kind are two candidates.

@@ -8,6 +8,7 @@ import pytest
 from closing import joint_of, plain_fit
 from simulator import DECLARED
 
+from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.recordings import grouped_track
@@ -165,6 +166,16 @@ def test_lines_are_the_same_where_the_travel_cannot_tell_them_apart(chain):
     assert line(one) != line(one + apart)
     assert line(one) != line(one, load=1.0)
     assert line_of(Term(LIBRARY["spring"], {}), track) == 0
+
+
+def test_a_user_s_lines_need_no_step(chain):
+    class Lines(Effect):
+        name, several = "lines", True
+
+    track = chain.fit.dataset.fine.track
+    assert line_of(Term(Lines(), {}), track) == 0
+    places = [line_of(Term(Lines(), {"order": order}), track) for order in (2.0, 2.001, 2.02)]
+    assert places == [2.0, 2.0, 2.02]
 
 
 def test_what_is_put_in_can_be_taken_out_again(chain):
