@@ -1,4 +1,4 @@
-"""The panel: measured joints and four kinds of simulated ones, the loop beside its plain rivals.
+"""The panel: measured joints and five kinds of simulated ones, the loop beside its plain rivals.
 
     python benchmarks/panel.py [--first-seed 50000] [--seeds 1] [--source measured,testbed]
         [--without-source NAME] [--contestants loop,plain,beam] [--sizes 0.6,1.5] [--effects none]
@@ -7,9 +7,10 @@
     python benchmarks/panel.py --show benchmarks/out/panel.json [--keep FILE] [--write]
 
 A row is a recording and what was hidden in it; every contestant closes it in a child of its own.
-Each seals other parts of the motion, so both errors are given. Sources: measured,
-testbed, smooth (the tests' simulator), algebraic, two-mass. Sizes, rates and strokes take turns
-over effects and seeds; five seeds hold every effect at every size. One seed has some 140 rows.
+Each seals other parts of the motion, so both errors are given. Sources: measured, actuator,
+testbed, smooth (the tests' simulator), algebraic, two-mass, and messy, of whose joints nobody
+knows what they lack. Sizes, rates and strokes take turns over effects and seeds; five seeds hold
+every effect at every size. One seed has some 160 rows.
 `--compare` lays an earlier result of the same seeds beside this one as a further contestant.
 """
 
@@ -25,7 +26,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from panel import contestants, formulas, measured, run, table, testbed, two_mass_cases
+from panel import contestants, formulas, measured, messy, run, table, testbed, two_mass_cases
 from panel.case import SIZES, Case, Wanted
 
 SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
@@ -35,7 +36,9 @@ SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "smooth": formulas.smooth_cases,
     "algebraic": formulas.algebraic_cases,
     "two-mass": two_mass_cases.cases,
+    "messy": messy.cases,
 }
+MEASURED = ("measured", "actuator")
 
 
 BEGIN, END = "<!-- panel: begin -->", "<!-- panel: end -->"
@@ -97,8 +100,8 @@ def document(rows: list[run.Row], names: list[str]) -> None:
     """Put measured joints row by row, and the rest in sums, into docs/validation.md."""
     path = Path(__file__).parents[1] / "docs" / "validation.md"
     before, rest = path.read_text(encoding="utf-8").split(BEGIN)
-    measured_rows = [table.line(row, names) for row in rows if row["hidden"] is None]
-    section = [table.head(names), *measured_rows, "", table.total(rows, names), "",
+    measured_rows = [table.line(row, names) for row in rows if row["source"] in MEASURED]
+    section = [table.head(names), *measured_rows, "", table.totals(rows, names), "",
                table.summary(rows, names), "", table.by_size(rows, names)]  # fmt: skip
     path.write_text(
         before + "\n".join([BEGIN, "", *section, "", END]) + rest.split(END)[1], encoding="utf-8"
@@ -150,7 +153,7 @@ def main() -> None:
     if arguments.show or arguments.compare:
         print(table.head(names), *(table.line(row, names) for row in rows), sep="\n")
     print(f"\n{table.summary(rows, names)}\n\n{table.by_size(rows, names)}\n")
-    print(table.total(rows, names))
+    print(table.totals(rows, names))
     print(f"{len(rows)} rows, {time.time() - began:.0f} s")
     if arguments.keep:
         keep(arguments.keep, rows, names)

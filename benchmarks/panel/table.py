@@ -84,21 +84,24 @@ def by_size(rows: Sequence[Row], names: Sequence[str]) -> str:
     return "\n".join(lines)
 
 
-def total(rows: Sequence[Row], names: Sequence[str]) -> str:
-    """Sum the measured joints' sealed errors, over the rows that every contestant could serve."""
-    errors = [
-        [row["results"].get(name, {}).get("after") for name in names]
-        for row in rows
-        if row["hidden"] is None
-    ]
-    served = [row for row in errors if None not in row]
-    if not served:
-        return ""
-    sums = ", ".join(
-        f"{name} {sum(column):.3f}"
-        for name, column in zip(names, zip(*served, strict=True), strict=True)
-    )
-    return f"Sealed errors summed over {len(served)} of {len(errors)} measured rows, A: {sums}."
+def totals(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Sum sealed errors where nobody knows a right name, by source, over rows that all served."""
+    lines = []
+    for source in dict.fromkeys(row["source"] for row in rows if row["hidden"] is None):
+        errors = [
+            [row["results"].get(name, {}).get("after") for name in names]
+            for row in rows
+            if row["source"] == source
+        ]
+        served = [row for row in errors if None not in row]
+        if served:
+            sums = ", ".join(
+                f"{name} {sum(column):.3f}"
+                for name, column in zip(names, zip(*served, strict=True), strict=True)
+            )
+            summed = f"Sealed errors summed over {len(served)} of {len(errors)} rows"
+            lines.append(f"{summed} of {source}, A: {sums}.")
+    return "\n\n".join(lines)
 
 
 def behind(row: Row, name: str, *, share: bool) -> bool:

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from panel import run, table, two_mass, two_mass_cases
+from panel import messy, run, table, two_mass, two_mass_cases
 from panel.case import RIGID, Case, Wanted
 
 
@@ -52,3 +52,23 @@ def test_a_case_that_cannot_be_made_is_left_out(capsys):
     case = Case("x", "y", "cyclic", "position", RIGID, "", partial(_impossible))
     assert list(run.rows([case], ["plain"])) == []
     assert "no such joint" in capsys.readouterr().out
+
+
+def test_messy_joints_move_from_rest_to_rest_without_jumps():
+    made = {case.name: case for case in messy.cases(2, Wanted())}
+    assert len(made) == messy.JOINTS
+    for case in list(made.values())[: len(messy.STROKES)]:
+        (logged,) = case.make()
+        steps = np.diff(logged.position)
+        assert np.abs(np.diff(steps)).max() * logged.rate_hz**2 < 60.0 + 4e-4 * logged.rate_hz**2
+        assert np.isfinite(logged.current).all()
+        assert logged.current.shape == logged.position.shape
+
+
+def test_errors_are_summed_where_nobody_knows_a_name():
+    results = [{"a": {"after": 1.0}, "b": {"after": 2.0}}, {"a": {"after": 5.0}, "b": {}}]
+    rows = [{"source": "messy", "hidden": None, "results": each} for each in results]
+    rows.append({"source": "smooth", "hidden": "", "results": results[0]})
+    assert table.totals(rows, ["a", "b"]) == (
+        "Sealed errors summed over 1 of 2 rows of messy, A: a 1.000, b 2.000."
+    )
