@@ -99,17 +99,23 @@ class Ripple(Effect):
         waves = [np.cos(angle), np.sin(angle)]
         scale = np.abs(track.velocity) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
-        answers = drive_answers(track, waves, parameters) if parameters.get("answer") else []
-        turned = 2 + len(answers) if parameters.get("direction") else 0
         following = _following_model(waves, track, parameters)
-        pairs = (*waves, *swelling, *answers)
+        answering = _answering(track, parameters)
+        turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
+        plain = 2 + len(swelling)
+        last = plain + 4 * len(answering)
         # A hundred columns: each is written once, where it stays.
-        columns = np.empty((len(pairs) + turned + len(following), track.size))
-        for row, column in zip(columns, pairs, strict=False):
+        columns = np.empty((last + turned + len(following), track.size))
+        for row, column in zip(columns, (*waves, *swelling), strict=False):
             row[:] = column
-        for row, column in zip(columns[len(pairs) :], (*waves, *answers)[:turned], strict=False):
+        for k, w in enumerate(answering):
+            out = columns[plain + 4 * k : plain + 4 * k + 4]
+            answers(waves, w, DAMPING, track.rate_hz, track.bounds, out)
+        for row, column in zip(
+            columns[last : last + turned], (*waves, *columns[plain:last]), strict=False
+        ):
             np.multiply(track.direction, column, out=row)
-        columns[len(pairs) + turned :] = following or 0.0
+        columns[last + turned :] = following or 0.0
         return columns.T
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
@@ -142,30 +148,17 @@ class Ripple(Effect):
         return read_order(parameters["order"], track, compared=False)
 
 
-def drive_answers(track: Track, waves: list[Floats], parameters: Parameters) -> list[Floats]:
-    """Put a ripple's waves through filters of second order, evenly spread over the octaves.
+def _answering(track: Track, parameters: Parameters) -> list[float]:
+    """Angular frequencies (rad/s) of the filters in which a drive's answer is expanded.
 
-    Parameters
-    ----------
-    track : Track
-        At the full rate.
-    waves : list of arrays of shape (n,)
-        Cosine and sine of the ripple's angle.
-    parameters : dict
-        `answer`, the filters per octave, and `top_hz`, the highest one's frequency; if that is
-        missing, the ripple's own where the joint is as fast as it gets.
-
-    Returns
-    -------
-    list of arrays of shape (n,)
-        For every filter, highest first, what a low-pass and a band-pass make of each wave.
+    Evenly spread over the octaves, highest first: `answer`, so many per octave, from `top_hz` down;
+    if that is missing, from the ripple's own where the joint is as fast as it gets.
     """
-    found = []
+    density = parameters.get("answer", 0.0)
+    if not density:
+        return []
     top_hz = parameters.get("top_hz") or _top_hz(track, parameters["order"])
-    for k in range(_filters(top_hz, parameters["answer"])):
-        w = 2 * np.pi * top_hz / 2.0 ** (k / parameters["answer"])
-        found += answers(waves, w, DAMPING, track.rate_hz, track.bounds)
-    return found
+    return [2 * np.pi * top_hz / 2.0 ** (k / density) for k in range(_filters(top_hz, density))]
 
 
 def _filters(top_hz: float, density: float) -> int:

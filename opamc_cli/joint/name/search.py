@@ -1,6 +1,6 @@
 """Follow several chains of effects side by side, and keep the one that is worth its price."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Hashable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -40,6 +40,11 @@ class Pool:
     """Of the held-out error, that an effect has to take away."""
     without: Collection[str] = field(default=())
     """Rules that are switched off."""
+    asked: dict[Hashable, list[Candidate]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
+    """What `candidates` found beside which terms: a chain is met again when each of its effects is
+    asked beside the others."""
 
     @classmethod
     def of(
@@ -134,6 +139,9 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     list of Candidate
         Best first.
     """
+    asked = frozenset(term.key for term in chain.fit.terms), every
+    if asked in pool.asked:
+        return pool.asked[asked]
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
     reference = float(chain.error.sum())
@@ -178,7 +186,8 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.drop > SAME * candidate.drop else candidate)
     chain.fit.forget()
-    return sorted(better, key=lambda candidate: candidate.score)
+    pool.asked[asked] = sorted(better, key=lambda candidate: candidate.score)
+    return pool.asked[asked]
 
 
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
