@@ -72,7 +72,11 @@ class Chain:
     @property
     def _signs(self) -> list[bool]:
         pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
-        dry = sum(float(values[0]) for term, values in pairs if term.effect.name == "coulomb")
+        grid = self.fit.dataset.fine
+        way = np.unique(grid.track.direction[grid.fit])
+        # What never turns round cannot tell an offset from dry friction: it may all be either.
+        share = {"coulomb": 1.0, "offset": float(way[0]) if way.size == 1 else 0.0}
+        dry = sum(share.get(term.effect.name, 0.0) * float(values[0]) for term, values in pairs)
         return [
             term.effect.plausible(values, term.parameters)
             or (term.effect.at_a_place and values[0] > -dry)
