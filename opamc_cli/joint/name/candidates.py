@@ -59,7 +59,8 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     batches = []
     for (width, _), members in alike.items():
         count = len(members)
-        columns = np.concatenate([block for _, block in members], axis=1)
+        blocks = [block for _, block in members]
+        columns = blocks[0] if count == 1 else np.concatenate(blocks, axis=1)
         own = _own_products(columns, parts, count, width)
         moment = parts.products(columns, current)[:, :, 0].reshape(-1, count, width)
         batches.append(Batch([term for term, _ in members], columns, own, moment))

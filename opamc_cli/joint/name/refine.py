@@ -61,24 +61,24 @@ def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
             for n, log in zip(names, logs, strict=True)
         ]
     )
-    best = _one(lost, start, step) if len(names) == 1 else _several(lost, start, step)
-    best = min(best, start, key=lost)
+    found, least = (_one if len(names) == 1 else _several)(lost, start, step)
+    best = found if least < lost(start) else start
     parameters = term.effect.settled(outwards(best), track)
     return Term(term.effect, parameters, term.keep)
 
 
-def _one(lost: Callable[[Floats], float], start: Floats, step: Floats) -> Floats:
+def _one(lost: Callable[[Floats], float], start: Floats, step: Floats) -> tuple[Floats, float]:
     bounds = (float(start[0] - step[0]), float(start[0] + step[0]))
     found = minimize_scalar(
         lost, bounds=bounds, method="bounded", options={"maxiter": TRIALS_OF_ONE}
     )
-    return np.atleast_1d(found.x)
+    return np.atleast_1d(found.x), float(found.fun)
 
 
-def _several(lost: Callable[[Floats], float], start: Floats, step: Floats) -> Floats:
+def _several(lost: Callable[[Floats], float], start: Floats, step: Floats) -> tuple[Floats, float]:
     simplex = np.vstack(
         [start, *(start + 0.5 * step[i] * np.eye(start.size)[i] for i in range(start.size))]
     )
     options = {"maxfev": TRIALS_OF_MORE, "initial_simplex": simplex}
-    found: Floats = minimize(lost, start, method="Nelder-Mead", options=options).x
-    return found
+    found = minimize(lost, start, method="Nelder-Mead", options=options)
+    return found.x, float(found.fun)

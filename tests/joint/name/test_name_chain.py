@@ -49,9 +49,15 @@ def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
     )
 
 
+def moves(*directions):
+    track = SimpleNamespace(direction=np.array(directions))
+    return SimpleNamespace(fine=SimpleNamespace(track=track, fit=slice(None)))
+
+
 def made(*terms, added=1, error=(1.0, 1.0), samples=2.0, widths=None, **fit):
     terms = tuple(SimpleNamespace(effect=one, parameters={}) for one in terms)
     widths = widths or [1] * len(terms)
+    fit = {"dataset": moves(-1.0, 1.0)} | fit
     fit = SimpleNamespace(terms=terms, coefficients=[np.ones(w) for w in widths], **fit)
     return Chain(fit, added, np.array(error), samples)
 
@@ -124,6 +130,27 @@ def test_a_place_may_have_less_friction_down_to_none():
         chain = made(effect("coulomb"), easy)
         chain.fit.coefficients[1] = np.array([share])
         assert chain.plausible_beside(start) is plausible
+
+
+@pytest.mark.parametrize(
+    ("directions", "offset", "plausible"),
+    [
+        ((1.0, 1.0), 1.0, True),
+        ((-1.0, -1.0), -1.0, True),
+        ((1.0, 1.0), -1.0, False),
+        ((1.0, -1.0), 1.0, False),
+    ],
+)
+def test_what_never_turns_round_may_have_its_dry_friction_in_the_offset(
+    directions, offset, plausible
+):
+    easy = effect("easy", plausible=False)
+    easy.at_a_place = True
+    declared = effect("coulomb"), effect("offset")
+    start = made(*declared, added=0)
+    chain = made(*declared, easy, dataset=moves(*directions))
+    chain.fit.coefficients[1:] = np.array([offset]), np.array([-1.9])
+    assert chain.plausible_beside(start) is plausible
 
 
 @pytest.mark.parametrize(
