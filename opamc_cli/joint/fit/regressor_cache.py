@@ -9,7 +9,7 @@ import numpy as np
 from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
-MOST_BYTES = 250e6
+MOST_BYTES = 120e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
 
 
