@@ -98,11 +98,19 @@ class RegressorCache:
         return blocks + sum(rows.nbytes for _, rows in self._taken.values())
 
     def _forget_strangers(self, blocks: Sequence[Floats]) -> None:
-        """Keep the memory bounded: what was used longest ago goes first."""
-        while self._held > MOST_BYTES and len(self._columns) > 1:
-            _, block = self._columns.popitem(last=False)
-            for fine in (True, False):
-                self._taken.pop((id(block), fine), None)
+        """Keep the memory bounded: what was used longest ago goes first.
+
+        What is asked for now stays: a block that is kept here no more may be freed by its owner,
+        and another one would find the products of its place in memory.
+        """
+        asked = {id(block) for block in blocks}
+        for key, block in list(self._columns.items()):
+            if self._held <= MOST_BYTES:
+                break
+            if id(block) not in asked:
+                del self._columns[key]
+                for fine in (True, False):
+                    self._taken.pop((id(block), fine), None)
         wanted = {id(block) for block in (*self._columns.values(), *blocks)}
         wanted |= {id(value) for value in self.shared.values()}
         for key in [key for key in self._taken if key[0] not in wanted]:

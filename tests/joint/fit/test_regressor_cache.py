@@ -61,3 +61,27 @@ def test_after_clearing_everything_is_computed_again():
     check(cache.sums([block], 2 * current, parts, True), [block], 2 * current, parts)
     other = random_parts(rng, 8)
     assert cache.sums([], current, other, False).held_out().size == len(other.slices)
+
+
+def test_what_is_asked_for_is_not_forgotten_and_mistaken_for_what_comes_after(monkeypatch):
+    """A block that is freed leaves its place in memory, by which products are known."""
+    rng = np.random.default_rng(4)
+    parts = random_parts(rng, 8)
+    size = parts.rows.max() + 1
+    # Room for six blocks of two columns and their rows, and for no hundred columns beside them.
+    monkeypatch.setattr(regressor_cache, "MOST_BYTES", 300 * size)
+    current = rng.normal(size=size)
+    cache = RegressorCache()
+
+    def drawn(columns=2):
+        return rng.normal(size=(size, columns))
+
+    blocks = [cache.columns(key, drawn) for key in range(6)]
+    for beside in ([], [drawn(100)], []):
+        cache.sums([*blocks, *beside], current, parts, True)
+    kept = blocks.pop()
+    places = [id(block) for block in blocks]
+    del blocks, beside
+    others = [drawn() for _ in range(100)]
+    again = [other for other in others if id(other) in places]
+    check(cache.sums([*again, kept], current, parts, True), [*again, kept], current, parts)
