@@ -1,7 +1,7 @@
 """A current that comes later, or earlier, than the motion it belongs to."""
 
 import numpy as np
-from scipy.signal import lfilter
+from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
@@ -143,7 +143,14 @@ def lagging(columns: Floats, samples: float) -> Floats:
     samples : float
         Time constant.
     """
-    pole = np.exp(-1.0 / max(samples, 1e-3))
-    rest = pole * columns[:1]
-    smooth: Floats = lfilter([1.0 - pole], [1.0, -pole], columns, axis=0, zi=rest)[0]
+    smooth: Floats = _lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T
     return smooth
+
+
+@njit(cache=True)
+def _lagging(rows: Floats, pole: float) -> Floats:
+    """Overwrite each row."""
+    for row in rows:
+        for n in range(1, row.size):
+            row[n] += pole * (row[n - 1] - row[n])
+    return rows

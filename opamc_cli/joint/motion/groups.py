@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import correlate
+from scipy.fft import irfft, next_fast_len, rfft
 
 from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
@@ -85,7 +85,8 @@ def _mismatch(path: Floats) -> Floats:
     """Mean square of ``path[t + lag] - path[t]`` for every lag below n, by one correlation."""
     n = path.size
     centred = path - path.mean()
-    products = correlate(centred, centred, mode="full", method="fft")[n - 1 :]
+    length = next_fast_len(2 * n, real=True)
+    products = irfft(np.abs(rfft(centred, length)) ** 2, length)[:n]
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     lags = np.arange(n)
     overlap = n - lags

@@ -1,9 +1,11 @@
 """Local polynomials: value, first and second derivative of a noisy, uniformly sampled path."""
 
-import numpy as np
-from scipy.signal import savgol_coeffs, savgol_filter
+from math import perm
 
-from opamc_cli.joint.motion.track import Floats
+import numpy as np
+from scipy.ndimage import correlate1d
+
+from opamc_cli.joint.motion.track import Floats, Ints
 
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 5
@@ -82,6 +84,35 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     return max(min(window, longest), SHORTEST_WINDOW)
 
 
+def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | Ints = 0) -> Floats:
+    """Weights of a window's samples in a derivative of the cubic that fits them best.
+
+    `scipy.signal.savgol_coeffs`, without the 0.7 s that package takes to load.
+
+    Parameters
+    ----------
+    rate_hz : float
+        Sampling rate.
+    window : int
+        Odd number of samples.
+    derivative : int
+        Order of the derivative.
+    at : int or array of shape (k,)
+        Sample at which it is asked for, from the middle.
+
+    Returns
+    -------
+    array of shape (window,) or (k, window)
+    """
+    half = window // 2
+    places = np.arange(-half, half + 1) / half
+    fit = np.linalg.pinv(np.vander(places, POLYNOMIAL_ORDER + 1, increasing=True))
+    place = np.asarray(at) / half
+    asked = [perm(k, derivative) * place ** max(k - derivative, 0) for k in range(len(fit))]
+    weights: Floats = np.stack(asked, axis=-1) @ fit * (rate_hz / half) ** derivative
+    return weights
+
+
 def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     """Compute the standard deviation of a derivative of white noise of unit deviation.
 
@@ -94,8 +125,7 @@ def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     derivative : int
         Order of the derivative.
     """
-    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
-    return float(np.linalg.norm(kernel))
+    return float(np.linalg.norm(polynomial_weights(rate_hz, window, derivative)))
 
 
 def averaging_kernel(window: int, derivative: int) -> Floats:
@@ -116,7 +146,7 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
     array of shape (window,)
         Sum 1.
     """
-    weights = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, use="dot")
+    weights = polynomial_weights(1.0, window, derivative)
     for _ in range(derivative):
         weights = -np.cumsum(weights)
     # Two sums have moved the weights back by one sample, one sum by half a sample.
@@ -172,7 +202,7 @@ def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     float
         For a path that is white noise of unit deviation.
     """
-    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
     half = (twice.size - kernel.size) // 2
     return float(np.linalg.norm(np.pad(kernel, half) - twice))
@@ -200,7 +230,7 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
     int
         At least 1, at most 0.2 s.
     """
-    kernel = savgol_coeffs(window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz)
+    kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
     block = 1
     while block < longest:
@@ -233,9 +263,12 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
     ----------
     Savitzky and Golay, Analytical Chemistry 36, 1964.
     """
-    smooth: Floats = savgol_filter(
-        path, window, POLYNOMIAL_ORDER, deriv=derivative, delta=1.0 / rate_hz, mode="interp"
-    )
+    half = window // 2
+    weights = polynomial_weights(rate_hz, window, derivative, np.arange(-half, half + 1))
+    smooth: Floats = correlate1d(path, weights[half])
+    # Within half a window of the ends the outermost polynomial goes on.
+    smooth[:half] = weights[:half] @ path[:window]
+    smooth[-half:] = weights[half + 1 :] @ path[-window:]
     return smooth
 
 

@@ -5,8 +5,9 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve, upfirdn
+from scipy.fft import irfft, next_fast_len, rfft
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -250,8 +251,11 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
         part = values[start:stop]
         padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
         padded = np.pad(part, padding, mode="edge")
-        shape = (-1,) + (1,) * (part.ndim - 1)
-        smooth[start:stop] = oaconvolve(padded, kernel.reshape(shape), mode="valid", axes=0)
+        length = next_fast_len(len(padded), real=True)
+        answer = rfft(kernel, length).reshape(-1, *(1,) * (part.ndim - 1))
+        # What wraps round lies before the first sample that all weights reach.
+        whole = irfft(rfft(padded, length, axis=0) * answer, length, axis=0)
+        smooth[start:stop] = whole[2 * half : 2 * half + stop - start]
     return smooth
 
 
@@ -271,19 +275,13 @@ def averaged_blocks(
     factor : int
         Samples per block, at least 1.
     """
-    weights = np.convolve(kernel, np.full(factor, 1.0 / factor))
+    weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
     half = kernel.size // 2
-    # a whole number of blocks before the first sample that all weights reach
-    ahead = -(weights.size - 1) % factor
     parts = []
     for start, stop in bounds:
-        blocks = (stop - start) // factor
-        wide = np.empty((values.shape[1], ahead + stop - start + 2 * half))
-        wide[:, ahead + half : wide.shape[1] - half] = values[start:stop].T
-        wide[:, : ahead + half] = values[start][:, None]
-        wide[:, wide.shape[1] - half :] = values[stop - 1][:, None]
-        first = (weights.size - 1 + ahead) // factor
-        parts.append(upfirdn(weights, wide, down=factor)[:, first : first + blocks])
+        wide = np.pad(values[start:stop].T, [(0, 0), (half, half)], mode="edge")
+        reached = sliding_window_view(wide, weights.size, axis=1)[:, ::factor]
+        parts.append(reached @ weights)
     return np.concatenate(parts, axis=1).T
 
 

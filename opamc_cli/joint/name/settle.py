@@ -65,7 +65,7 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
             # What an effect ties with is of interest once nothing changes any more.
             others = trials(parent, pool) if changed is None else []
             ties = ties_of(best, term.effect.name, others)
-            told = tuple(other.told for other in others)
+            told = tuple(other.told for other in others if other.chain.signature != best.signature)
             named.append(Named(_trial(parent, best, term, pool), told, ties))
     return best, named
 

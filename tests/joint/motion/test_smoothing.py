@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 from simulator import simulate
 
 from opamc_cli.joint.motion.smoothing import (
@@ -32,6 +33,8 @@ def test_derivative_is_that_of_a_cubic_fitted_around_each_sample(order, window):
     fast = derivatives(path, 100.0, window, order)
     inside = np.isfinite(slow)
     np.testing.assert_allclose(fast[inside], slow[inside], rtol=1e-6, atol=1e-6)
+    ends = savgol_filter(path, window, 3, deriv=order, delta=0.01, mode="interp")
+    np.testing.assert_allclose(fast, ends, rtol=1e-9, atol=1e-9 * np.abs(ends).max())
 
 
 @pytest.mark.parametrize("window", [7, 13, 51])
