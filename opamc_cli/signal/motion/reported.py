@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyfit, polyval
 from numpy.typing import NDArray
 
 from opamc_cli.signal.motion.noise import noise_level
@@ -68,10 +69,13 @@ def velocity_from_position(
     window = min(wanted, angle.size - 1 + angle.size % 2)
     if window < 3:
         return np.zeros(angle.size)
-    # Importing it takes as long as all else together, and few runs lack the velocity.
-    from scipy.signal import savgol_filter
-
-    velocity: NDArray[np.float64] = savgol_filter(angle, window, 2, deriv=1, delta=1 / fs_hz)
+    # As `scipy.signal.savgol_filter`, whose package takes as long to load as all else together.
+    half = window // 2
+    places = np.arange(-half, half + 1) / fs_hz
+    velocity: NDArray[np.float64] = np.convolve(angle, -places / (places @ places), "same")
+    first, last = (polyder(polyfit(places, part, 2)) for part in (angle[:window], angle[-window:]))
+    velocity[:half] = polyval(places[:half], first)
+    velocity[-half:] = polyval(places[-half:], last)
     return velocity
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from opamc_cli.signal.motion import reported
 from opamc_cli.signal.motion.reported import (
@@ -72,6 +73,14 @@ def test_velocity_of_short_positions(n):
     assert velocity.shape == (n,)
     if n >= 3:
         assert velocity == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("n", "window"), [(5, 5), (400, 21), (401, 401), (400, 399)])
+def test_velocity_is_that_of_local_parabolas(n, window):
+    place = np.cumsum(np.random.default_rng(n).normal(size=n)) * 1e-2
+    expected = savgol_filter(place, window, 2, deriv=1, delta=1 / FS_HZ)
+    velocity = velocity_from_position(place, FS_HZ, window / FS_HZ)
+    np.testing.assert_allclose(velocity, expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_what_stands_for_the_carrier():
