@@ -238,14 +238,10 @@ class Fit:
         left in the averages of the coarse grid, by which nobody could fit it.
         """
         dataset = self.dataset
-        blocks = [dataset.columns(term, fine=False) for term in self.terms]
-        sums = dataset.sums_of(blocks, fine=False)
-        widths = np.cumsum([0, *(block.shape[1] for block in blocks)])
-        fast = [i for i, term in enumerate(self.terms) if term.effect.fast]
-        known = [k for i in fast for k in range(widths[i], widths[i + 1])]
-        values = np.concatenate([np.zeros(0), *(self.coefficients[i] for i in fast)])
-        slow = [block for i, block in enumerate(blocks) if i not in fast]
-        return sums.given(known, values), slow
+        slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
+        fast = self.fast_part(False)[:, None]
+        sums = dataset.sums_of([*slow, fast], False)
+        return sums.given([sums.moment.shape[1] - 1], np.ones(1)), slow
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -280,11 +276,15 @@ class Fit:
 
     def fast_part(self, fine: bool) -> Floats:
         """Compute the current of the fast terms on one of the grids."""
-        part = np.zeros(self.dataset.grid_of(fine).track.size)
+        dataset = self.dataset
+        track = dataset.fine.track
+        part = np.zeros(track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:
-                part += self.dataset.columns(term, fine) @ values
-        return part
+                part += dataset.columns(term, True) @ values
+        if fine or dataset.coarse is dataset.fine:
+            return part
+        return averaged_blocks(part[:, None], track.bounds, track.kernel, dataset.factor)[:, 0]
 
     @cached_property
     def opened(self) -> "Fit":
