@@ -231,17 +231,21 @@ class Fit:
     """Of the fine grid's open samples."""
 
     @cached_property
-    def coarse_sums(self) -> tuple[Sums, list[Floats]]:
-        """Products of the slow terms on the coarse grid, and their regressors beside them.
+    def coarse_sums(self) -> tuple[Sums, list[Floats], Floats]:
+        """Products of the slow terms on the coarse grid, their regressors, and the fast current.
 
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
         """
-        dataset = self.dataset
+        dataset, track = self.dataset, self.dataset.fine.track
+        fast = np.zeros((track.size, 1))
+        for term, values in zip(self.terms, self.coefficients, strict=True):
+            if term.effect.fast:
+                fast += dataset.columns(term, True) @ values[:, None]
+        fast = averaged_blocks(fast, track.bounds, track.kernel, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        fast = self.fast_part(False)[:, None]
         sums = dataset.sums_of([*slow, fast], False)
-        return sums.given([sums.moment.shape[1] - 1], np.ones(1)), slow
+        return sums.given([sums.moment.shape[1] - 1], np.ones(1)), slow, fast[:, 0]
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -273,18 +277,6 @@ class Fit:
         self.dataset.coarse.track.forget()
         self.__dict__.pop("coarse_sums", None)
         self.sums.forget()
-
-    def fast_part(self, fine: bool) -> Floats:
-        """Compute the current of the fast terms on one of the grids."""
-        dataset = self.dataset
-        track = dataset.fine.track
-        part = np.zeros(track.size)
-        for term, values in zip(self.terms, self.coefficients, strict=True):
-            if term.effect.fast:
-                part += dataset.columns(term, True) @ values
-        if fine or dataset.coarse is dataset.fine:
-            return part
-        return averaged_blocks(part[:, None], track.bounds, track.kernel, dataset.factor)[:, 0]
 
     @cached_property
     def opened(self) -> "Fit":

@@ -118,8 +118,8 @@ class Beside:
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
         if not self.fine:
-            self.sums, blocks = chain.fit.coarse_sums
-            self.fast_part = self.parts.taken(chain.fit.fast_part(False))
+            self.sums, blocks, fast = chain.fit.coarse_sums
+            self.fast_part = self.parts.taken(fast)
         else:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             follows = not all(term.is_constant for term in chain.fit.terms)

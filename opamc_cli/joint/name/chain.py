@@ -119,7 +119,7 @@ def chain_of(fit: Fit, added: int) -> Chain:
     error = fit.sums.held_out()[fine.judged]
     samples = float(sum(b - a for (a, b), j in zip(fine.slices, fine.judged, strict=True) if j))
     if not fine.judged.all() and not coarse.judged.all() and dataset.coarse is not dataset.fine:
-        sums, _ = fit.coarse_sums
+        sums = fit.coarse_sums[0]
         rest, count = _unclear(sums, coarse.judged)
         error = np.concatenate([error, dataset.factor * rest])
         samples += dataset.factor * count

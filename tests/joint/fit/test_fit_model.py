@@ -155,13 +155,15 @@ def test_fast_terms_are_taken_as_fitted_on_the_coarse_grid():
     recording = joint_of("cyclic", lambda q, v, a, t: np.sin(40 * q), rate=1000.0)
     terms = (*rigid(), term("ripple", order=40.0))
     fitted = fit_terms(dataset_from(recording), terms)
-    sums, slow = fitted.coarse_sums
+    dataset, track = fitted.dataset, fitted.dataset.coarse.track
+    sums, slow, fast = fitted.coarse_sums
     assert sum(block.shape[1] for block in slow) == sums.moment.shape[1] == 5
-    part = fitted.fast_part(True)
-    np.testing.assert_allclose(
-        part, terms[-1].columns(fitted.dataset.fine.track) @ fitted.coefficients[-1]
-    )
-    assert fitted.fast_part(False).size == fitted.dataset.coarse.track.size
+    ripple = dataset.columns(terms[-1], fine=False) @ fitted.coefficients[-1]
+    np.testing.assert_allclose(fast, ripple, atol=1e-12)
+    rows = dataset.parts[1].rows
+    columns, left = np.concatenate(slow, axis=1)[rows], (track.current_a - ripple)[rows]
+    np.testing.assert_allclose(sums.moment.sum(axis=0), columns.T @ left)
+    assert sums.power.sum() == pytest.approx(left @ left)
     fitted.forget()
     assert "coarse_sums" not in vars(fitted)
 
