@@ -73,9 +73,14 @@ class Trial:
         ]
 
     def oracle_share(self) -> float:
-        """Fall of the sealed error, as a share of the fall for who knows the effect's shape."""
+        """Fall of the sealed error, as a share of the fall for who knows the effect's shape.
+
+        Of a long recording a sample stands for all; nobody asks there, and NaN is returned.
+        """
         loop = self.loop
         dataset = loop.before.opened.dataset
+        if dataset.fine.track.size != self.simulated.effect.size:
+            return float("nan")
         track, grid = dataset.fine.track, dataset.fine
         known = self.simulated.effect
         declared = [term.columns(track) for term in loop.before.terms]
@@ -371,7 +376,8 @@ def main() -> None:
         notes += said
     print(f"{time.time() - began:.0f} s")
     if arguments.write:
-        command = f"python benchmarks/loop.py --seeds {study.per_effect} --write"
+        seeds = f"--seeds {study.per_effect} --first-seed {study.first_seed}"
+        command = f"python benchmarks/loop.py {seeds} --write"
         last = study.seeds_of(effects[-1]).stop - 1
         lines = [
             f"Seeds {study.first_seed} to {last}; `{command}` makes this section.",
