@@ -1,7 +1,6 @@
 """How often the loop adds what is not there, finds what is, and names it rightly.
 
     python benchmarks/loop.py [--quick] [--seeds N] [--first-seed 22000] [--mode position|phases]
-    python benchmarks/loop.py --write     # and updates docs/validation.md
 
 Every trial is a joint of the tests' own simulator: trajectory, rate, robot, noise colour and
 effect are drawn from the seed. Tuning used seeds below 100 only. Of four joints with nothing
@@ -29,7 +28,6 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 
 ROOT = Path(__file__).parents[1]
-BEGIN, END = "<!-- loop: begin -->", "<!-- loop: end -->"
 NULLS_PER_SEED = 20
 FILTERS_PER_SEED = 4
 
@@ -335,7 +333,6 @@ def main() -> None:
     parser.add_argument("--only", default="", help="effects, separated by commas; or null, removed")
     parser.add_argument("--ratios", default="0.3,0.6")
     parser.add_argument("--verbose", action="store_true")
-    parser.add_argument("--write", action="store_true", help="update docs/validation.md")
     parser.add_argument(
         "--testbed", action="store_true", help="on the virtual testbed; --seeds per effect"
     )
@@ -358,39 +355,16 @@ def main() -> None:
         arguments.verbose,
     )
     began = time.time()
-    rows: list[Share] = []
-    notes: list[str] = []
     if "null" in study.chosen:
-        rows += nothing_missing(study) + through_a_filter(study)
-        print(*(row.row() for row in rows), sep="\n", flush=True)
+        print(*(row.row() for row in nothing_missing(study) + through_a_filter(study)), sep="\n")
     if study.chosen & set(effects):
         for ratio in (float(text) for text in arguments.ratios.split(",")):
             found, said = one_missing(study, ratio)
             print(*(row.row() for row in found), *said, sep="\n", flush=True)
-            rows += found
-            notes += said
     if "removed" in study.chosen:
         found, said = outside_library(study)
         print(*(row.row() for row in found), *said, sep="\n", flush=True)
-        rows += found
-        notes += said
     print(f"{time.time() - began:.0f} s")
-    if arguments.write:
-        seeds = f"--seeds {study.per_effect} --first-seed {study.first_seed}"
-        command = f"python benchmarks/loop.py {seeds} --write"
-        last = study.seeds_of(effects[-1]).stop - 1
-        lines = [
-            f"Seeds {study.first_seed} to {last}; `{command}` makes this section.",
-            "",
-            "| | aim | reached | 95 % interval |",
-            "|---|---|---|---|",
-            *(row.row() for row in rows),
-            *(line for note in notes for line in ("", note)),
-        ]
-        path = ROOT / "docs" / "validation.md"
-        before, rest = path.read_text(encoding="utf-8").split(BEGIN)
-        section = "\n".join([BEGIN, "", *lines, "", END])
-        path.write_text(before + section + rest.split(END)[1], encoding="utf-8")
 
 
 if __name__ == "__main__":
