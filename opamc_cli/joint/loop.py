@@ -13,7 +13,7 @@ from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import Pool, Trial, Tried, beam, trials
-from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
+from opamc_cli.joint.name.settle import CLEARLY, EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
@@ -146,6 +146,11 @@ def close_loop(
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     # Beside a function without a name an effect may no longer be worth its price.
     final = worth_their_price(beam(best, unnamed, width=1))
+    held, drop = (start.mean_square - one.mean_square for one in (final, explained))
+    clearly = explained.score < final.score - CLEARLY and held < EXACT * drop
+    if clearly and "unnamed" not in without_rules:
+        # All the names together, and what was added to them, hold less than no names do.
+        final, named = explained, []
     only_named = final
     for place in reversed(range(final.added)):
         if final.terms[place].effect.unnamed:

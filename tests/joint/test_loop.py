@@ -7,8 +7,11 @@ import pytest
 from closing import MOTIONS, close_on, close_recording, fit_declared, joint_of, moved
 from simulator import DECLARED, simulate
 
+from opamc_cli.joint import loop as loop_module
 from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.name.chain import chain_of, extended
 from tests.marks import long
 
 SHAPES = {
@@ -179,6 +182,26 @@ def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
         assert loop.verdict in ("not-in-library", "partial")
         assert loop.remaining_domain is not None
         assert loop.explained_share < 0.9
+
+
+def test_names_that_hold_less_than_no_names_do_give_way(monkeypatch):
+    library = {"offset": built_in_library()["offset"]}
+    fitted = fit_declared([joint_of("cyclic", SHAPES["position_drag"], rate=100.0)])
+
+    def settled_on_offset(best, pool, unnamed):
+        chain = extended(chain_of(fitted, 0), Term(library["offset"], {}))
+        return chain, []
+
+    monkeypatch.setattr(loop_module, "settled", settled_on_offset)
+    monkeypatch.setattr(loop_module, "beam", lambda chain, pool, width=2: chain)
+    monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: chain)
+    loop = close_loop(fitted, library)
+    assert loop.steps
+    assert not any(step.named for step in loop.steps)
+    assert loop.verdict == "not-in-library"
+    assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
+    kept = close_loop(fitted, library, without_rules=("unnamed",))
+    assert [step.term.effect.name for step in kept.steps] == ["offset"]
 
 
 def test_a_model_that_predicts_nothing_is_not_said_to_lack_nothing():
