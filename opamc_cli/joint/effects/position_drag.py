@@ -45,5 +45,7 @@ class PositionDrag(Effect):
 
     @staticmethod
     def _travel(track: Track) -> tuple[float, float]:
-        position = track.position_rad[track.moving]
+        # Of a place that the fitted samples do not pass there are only the bell's tails.
+        rows = track.moving if track.open_samples is None else track.open_samples
+        position = track.position_rad[rows]
         return float(position.min()), float(position.max())

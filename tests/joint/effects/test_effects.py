@@ -36,6 +36,21 @@ def test_regressors_are_finite_and_as_long_as_the_track(name):
         assert set(effect.limits(track)) <= set(guess)
 
 
+def test_a_place_is_sought_where_the_fitted_samples_have_been():
+    _, track = track_of()
+    low, high = np.quantile(track.position_rad[track.moving], [0.0, 0.5])
+    shown = track.moving & (track.position_rad < high)
+    drag = built_in_library()["position_drag"]
+    for rows, top in ((None, track.position_rad[track.moving].max()), (shown, high)):
+        places = [
+            guess["place_rad"] for guess in drag.guesses(replace(track, open_samples=rows), None)
+        ]
+        assert drag.limits(replace(track, open_samples=rows))["place_rad"] == pytest.approx(
+            (low, top), rel=1e-2
+        )
+        assert low <= min(places) < max(places) < 1.1 * top - 0.1 * low
+
+
 def slow_dahl(position, length):
     state, states = 0.0, []
     previous = position[0]
