@@ -147,9 +147,11 @@ def close_loop(
     # Beside a function without a name an effect may no longer be worth its price.
     final = worth_their_price(beam(best, unnamed, width=1))
     held, drop = (start.mean_square - one.mean_square for one in (final, explained))
-    clearly = explained.score < final.score - CLEARLY and held < EXACT * drop
+    helped = any(term.effect.unnamed for term in final.terms)
+    clearly = explained.score < final.score - CLEARLY and (helped or held < EXACT * drop)
     if clearly and "unnamed" not in without_rules:
-        # All the names together, and what was added to them, hold less than no names do.
+        # All the names together, and what was added to them, hold less than no names do, or hold
+        # it no better with a function without a name beside them.
         final, named = explained, []
     only_named = final
     for place in reversed(range(final.added)):
@@ -168,7 +170,7 @@ def _with_true_names(
     """Take the name off effects whose form holds less than half of their domain's curve."""
     shares: dict[int, float] = {}
     for one in named:
-        drop = float((one.trial.parent.error - one.trial.chain.error).sum())
+        drop = one.trial.parent.mean_square - one.trial.chain.mean_square
         share = share_of_form(best, drop, one.term, unnamed)
         if share >= APPROXIMATE or "unnamed" in pool.without:
             shares[id(one.term)] = share

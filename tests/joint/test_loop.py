@@ -9,6 +9,7 @@ from simulator import DECLARED, simulate
 
 from opamc_cli.joint import loop as loop_module
 from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.name.chain import chain_of, extended
@@ -115,7 +116,8 @@ def test_a_slow_log_of_a_noisy_position_is_served(noise_rad):
 def test_a_missing_effect_of_the_noise_s_size_is_found_named_and_removed(effect):
     made, loop = close_on(1, (effect,), rate=250.0)
     assert any(effect in names for names in names_of(loop))
-    assert loop.verdict == "closed"
+    # What no function without a name shows may all be there to explain.
+    assert loop.verdict == ("closed" if loop.ceiling.share else "partial")
     gone = loop.rmse_before_a**2 - loop.rmse_after_a**2
     assert gone > 0.8 * (loop.rmse_before_a**2 - made.noise_rms**2)
 
@@ -170,12 +172,13 @@ HELD = pytest.mark.xfail(reason="a Stribeck curve and sublinear friction hold it
     ]
     + [pytest.param("quadratic_friction", marks=[HELD, pytest.mark.long])],
 )
-def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
+@pytest.mark.parametrize("strength", [5.0, long(10.0)])
+def test_an_effect_that_the_library_lacks_is_not_called_found(effect, strength):
     shapes = SHAPES | {
         "offset": lambda q, v, a, t: np.ones(t.size),
         "asymmetric_friction": lambda q, v, a, t: (v > 0) * 1.0,
     }
-    loop = close(joint_of("cyclic", shapes[effect], strength=5.0), without=(effect,))
+    loop = close(joint_of("cyclic", shapes[effect], strength=strength), without=(effect,))
     if loop.verdict == "closed":
         assert names_of(loop)[0] & EXACT.get(effect, set())
     else:
@@ -184,15 +187,18 @@ def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
         assert loop.explained_share < 0.9
 
 
-def test_names_that_hold_less_than_no_names_do_give_way(monkeypatch):
-    library = {"offset": built_in_library()["offset"]}
+@pytest.mark.parametrize("beside", [False, True], ids=["alone", "beside a function"])
+def test_names_that_hold_no_more_than_no_names_do_give_way(monkeypatch, beside):
+    names = ("offset", "spring") if beside else ("offset",)
+    library = {name: built_in_library()[name] for name in names}
     fitted = fit_declared([joint_of("cyclic", SHAPES["position_drag"], rate=100.0)])
+    function = Term(unnamed_library()["unnamed_angle_and_direction"], {"degree": 16.0})
 
-    def settled_on_offset(best, pool, unnamed):
-        chain = extended(chain_of(fitted, 0), Term(library["offset"], {}))
-        return chain, []
+    def settled_on_names(best, pool, unnamed):
+        terms = [Term(effect, {}) for effect in library.values()]
+        return extended(chain_of(fitted, 0), *terms, *([function] if beside else [])), []
 
-    monkeypatch.setattr(loop_module, "settled", settled_on_offset)
+    monkeypatch.setattr(loop_module, "settled", settled_on_names)
     monkeypatch.setattr(loop_module, "beam", lambda chain, pool, width=2: chain)
     monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: chain)
     loop = close_loop(fitted, library)
@@ -201,7 +207,7 @@ def test_names_that_hold_less_than_no_names_do_give_way(monkeypatch):
     assert loop.verdict == "not-in-library"
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
     kept = close_loop(fitted, library, without_rules=("unnamed",))
-    assert [step.term.effect.name for step in kept.steps] == ["offset"]
+    assert [step.term.effect.name for step in kept.steps[: len(names)]] == [*names]
 
 
 def test_a_model_that_predicts_nothing_is_not_said_to_lack_nothing():

@@ -43,6 +43,11 @@ class Parts:
         return int(self.unit.max()) + 1 if self.unit.size else 0
 
     @property
+    def counts(self) -> Floats:
+        """Samples of each part; (p,)."""
+        return np.array([stop - start for start, stop in self.slices], dtype=float)
+
+    @property
     def halves(self) -> Ints:
         """Half of a unit that each part belongs to, counted over all units."""
         first = np.searchsorted(self.unit, self.unit)

@@ -10,7 +10,7 @@ from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.joint.name.chain import Chain, price_of
+from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
@@ -22,10 +22,10 @@ RIDGE = 1e-7
 
 @dataclass(frozen=True)
 class Candidate:
-    """An effect with parameters, and the held-out sum of squares that it would take away."""
+    """An effect with parameters, and the share of the held-out error that it would take away."""
 
     term: Term
-    drop: float
+    gain: float
     score: float
 
 
@@ -82,13 +82,13 @@ def _own_products(columns: Floats, parts: Parts, count: int, width: int) -> Floa
     return own
 
 
-def judged(term: Term, drop: float, width: int, reference: float) -> Candidate:
-    """Turn a drop of the held-out sum of squares into a candidate's score."""
-    left = max(reference - drop, LEAST_LEFT * reference)
-    return Candidate(term, drop, float(np.log(left / reference)) + price_of(term, width))
+def judged(term: Term, gain: float, width: int) -> Candidate:
+    """Turn a share of the held-out mean square error into a candidate's score."""
+    left = max(1.0 - gain, LEAST_LEFT)
+    return Candidate(term, gain, float(np.log(left)) + price_of(term, width))
 
 
-def best_form(dataset: Dataset, beside: "Beside", full: Term, reference: float) -> Candidate:
+def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     """Choose among the smaller forms of an effect the one that is worth its price."""
     effect = full.effect
     (batch,) = batches_of(dataset, [full], fine=True)
@@ -100,8 +100,8 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term, reference: float) 
     for term, keep in forms:
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
-        drop = float(beside.drops_of(cross[..., index], own, batch.moment[..., index])[0])
-        found = judged(term, drop, index.size, reference)
+        gain = float(beside.gains_of(cross[..., index], own, batch.moment[..., index])[0])
+        found = judged(term, gain, index.size)
         if best is None or found.score < best.score:
             best = found
     assert best is not None
@@ -130,7 +130,6 @@ class Beside:
         if self.fast_part is not None:
             self.current = self.current - self.fast_part
         self.step = max(self.current.size // COARSE_SAMPLES, 1)
-        self.weight = 1.0 if self.fine else float(dataset.factor)
         self.before = self.sums.held_out()
 
     def products(self, columns: Floats) -> Floats:
@@ -138,8 +137,8 @@ class Beside:
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
         return np.concatenate([none, *(self.parts.products(b, columns) for b in self.blocks)], 1)
 
-    def drops(self, batch: Batch) -> Floats:
-        """Held-out sum of squares that each guess takes away beside the chain; shape (K,)."""
+    def gains(self, batch: Batch) -> Floats:
+        """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
         count, width = len(batch.terms), batch.width
         cross = self.products(batch.columns)
         cross = cross.reshape(*cross.shape[:2], count, width).transpose(0, 2, 1, 3)
@@ -147,9 +146,9 @@ class Beside:
         if self.fast_part is not None:
             fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
             moment = moment - fast.reshape(moment.shape)
-        return self.drops_of(cross, batch.own, moment, whole=batch.terms[0].effect.whole)
+        return self.gains_of(cross, batch.own, moment, whole=batch.terms[0].effect.whole)
 
-    def drops_of(
+    def gains_of(
         self, cross: Floats, own: Floats, moment: Floats, *, whole: bool = False
     ) -> Floats:
         """Likewise, from products: cross (p, K, b, w), own (p, K, w, w), moment (p, K, w)."""
@@ -177,8 +176,11 @@ class Beside:
             + 2 * np.einsum("pki,pkij,pkj->pk", beta, cross, gamma, optimize=True)
             + np.einsum("pki,pkij,pkj->pk", gamma, own, gamma, optimize=True)
         )
-        drop: Floats = self.weight * (self.before[:, None] - error)[self.counted].sum(axis=0)
-        return drop
+        counts = self.parts.counts[self.counted]
+        before = deviation_of(self.before[self.counted], counts).sum()
+        after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
+        gain: Floats = 1.0 - (after / max(before, 1e-300)) ** 2
+        return gain
 
     def refined_rows(self, values: Floats) -> Floats:
         """Take every so-many-th of the parts' rows of an array on the grid, for `fitted_drop`."""

@@ -6,8 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from opamc_cli.joint.fit.model import Fit, Term, fit_terms
-from opamc_cli.joint.fit.parts import Sums
-from opamc_cli.joint.motion.track import Bools, Floats, Track
+from opamc_cli.joint.motion.track import Floats, Track
 
 Signature = frozenset[tuple[object, ...]]
 PRICE = 0.02
@@ -29,8 +28,13 @@ class Chain:
     """Sum of squares of each judged part, of the fit to all other units. Every moving sample is
     judged once: at the full rate where it is clear of corners of the motion, else on the coarse
     grid, where the current is as smooth as the motion; (p,)."""
-    samples: float
-    """Samples that are judged."""
+    counts: Floats
+    """Samples of each; (p,)."""
+
+    @cached_property
+    def deviation(self) -> Floats:
+        """Root mean square of each judged part times its samples, in A; (p,)."""
+        return deviation_of(self.error, self.counts)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -39,8 +43,12 @@ class Chain:
 
     @property
     def mean_square(self) -> float:
-        """Held-out mean square error, in A^2."""
-        return float(self.error.sum()) / self.samples
+        """Square of the mean of the parts' root mean square errors, held out, in A^2.
+
+        A part that is hard, or that noise or an unknown motion has hit, counts by its error and
+        not by the error's square: which effects are there is seen in all parts.
+        """
+        return float(self.deviation.sum() / self.counts.sum()) ** 2
 
     @cached_property
     def price(self) -> float:
@@ -90,7 +98,8 @@ class Chain:
 
     def gain_over(self, other: "Chain") -> tuple[float, float]:
         """Share of the other's held-out error that this chain takes away, and its t over parts."""
-        return _gain(other.error, self.error)
+        _, t_value = _gain(other.deviation, self.deviation)
+        return 1.0 - self.mean_square / max(other.mean_square, 1e-300), t_value
 
     def gain_beside_drift(self, other: "Chain") -> tuple[float, float]:
         """Likewise, where the current may drift: every part has an offset of its own."""
@@ -117,20 +126,20 @@ def chain_of(fit: Fit, added: int) -> Chain:
     dataset = fit.dataset
     fine, coarse = dataset.parts
     error = fit.sums.held_out()[fine.judged]
-    samples = float(sum(b - a for (a, b), j in zip(fine.slices, fine.judged, strict=True) if j))
+    counts = fine.counts[fine.judged]
     if not fine.judged.all() and not coarse.judged.all() and dataset.coarse is not dataset.fine:
         sums = fit.coarse_sums[0]
-        rest, count = _unclear(sums, coarse.judged)
-        error = np.concatenate([error, dataset.factor * rest])
-        samples += dataset.factor * count
+        unclear = ~coarse.judged
+        error = np.concatenate([error, dataset.factor * sums.held_out()[unclear]])
+        counts = np.concatenate([counts, dataset.factor * sums.parts.counts[unclear]])
     fit.forget()
-    return Chain(fit, added, error, samples)
+    return Chain(fit, added, error, counts)
 
 
-def _unclear(sums: Sums, clear: Bools) -> tuple[Floats, float]:
-    slices = sums.parts.slices
-    count = sum(b - a for (a, b), judged in zip(slices, clear, strict=True) if not judged)
-    return sums.held_out()[~clear], float(count)
+def deviation_of(error: Floats, counts: Floats) -> Floats:
+    """Root mean squares times samples, from sums of squares over the first axis' parts."""
+    found: Floats = np.sqrt(np.maximum(error, 0.0) * counts)
+    return found
 
 
 def extended(chain: Chain, *terms: Term) -> Chain:

@@ -52,7 +52,7 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
     best : Chain
         With the effect.
     drop : float
-        Sum of squares that the effect takes off the held-out error.
+        What the effect takes off the held-out mean square error, in A^2.
     term : Term
         The effect.
     unnamed : Pool
@@ -73,7 +73,7 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
     }
     more = 0.0
     for trial in trials(best, replace(unnamed, library=library, least_share=0.0)):
-        gained = float((best.error - trial.chain.error).sum())
+        gained = best.mean_square - trial.chain.mean_square
         if trial.t_value > LEAST_T and trial.chain.score < best.score:
             more = max(more, gained)
     return max(drop, 0.0) / max(drop + more, 1e-300)

@@ -23,7 +23,7 @@ MOST_STEPS = 16
 REFINED, TRIED = 6, 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
 SAME = 0.98
-"""Of a drop: a parameter with a meaning may cost 2 % of what the best one takes away."""
+"""Of a gain: a parameter with a meaning may cost 2 % of what the best one takes away."""
 PROMISING = 0.25
 """Share of the best candidate's fall in the score below which none is refined."""
 
@@ -144,7 +144,6 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         return pool.asked[asked]
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
-    reference = float(chain.error.sum())
     found: dict[tuple[str, float], Candidate] = {}
 
     def note(candidate: Candidate) -> None:
@@ -166,15 +165,15 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     ]
     names = {effect.name for effect in free}
     for batch in (*pool.slow, *batches_of(dataset, following, fine=False)):
-        for term, drop in zip(batch.terms, slow.drops(batch), strict=True):
+        for term, gain in zip(batch.terms, slow.gains(batch), strict=True):
             if term.effect.name in names:
-                note(judged(term, float(drop), batch.width, reference))
+                note(judged(term, float(gain), batch.width))
     fast = Beside(chain, fine=True) if any(effect.fast for effect in free) else slow
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
         if effect.fast and not effect.untestable(dataset.fine.track):
             for parameters in effect.guesses(dataset.fine.track, residual):
-                note(best_form(dataset, fast, Term(effect, parameters), reference))
+                note(best_form(dataset, fast, Term(effect, parameters)))
     ordered = sorted(found.values(), key=lambda candidate: candidate.score)
     least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
     better = []
@@ -182,9 +181,9 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         beside = fast if candidate.term.effect.fast else slow
         term = refined(dataset, candidate.term, beside)
         (batch,) = batches_of(dataset, [term], beside.fine)
-        trial = judged(term, float(beside.drops(batch)[0]), batch.width, reference)
+        trial = judged(term, float(beside.gains(batch)[0]), batch.width)
         # A parameter that was moved to a value with a meaning may cost a trifle.
-        better.append(trial if trial.drop > SAME * candidate.drop else candidate)
+        better.append(trial if trial.gain > SAME * candidate.gain else candidate)
     chain.fit.forget()
     pool.asked[asked] = sorted(better, key=lambda candidate: candidate.score)
     return pool.asked[asked]

@@ -157,12 +157,12 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
     Where a smooth function does as well as a line, it is no line. A name that holds nine tenths of
     what the function explains stays: the rest is asked for beside it.
     """
-    difference, error = paired(rival.error, best.error)
+    difference, error = paired(rival.deviation, best.deviation)
     if term.effect.fast:
         return rival.score < best.score + CLEARLY and difference > -LEAST_T * error
     if rival.score >= best.score - CLEARLY or difference <= LEAST_T * error:
         return False
-    named, explained = (float((parent.error - one.error).sum()) for one in (best, rival))
+    named, explained = (parent.mean_square - one.mean_square for one in (best, rival))
     if named >= EXACT * explained:
         return False
     # What follows slow noise is no better form of an effect.

@@ -42,7 +42,7 @@ def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
     """
     found = []
     for other in others:
-        difference, error = paired(best.error, other.chain.error)
+        difference, error = paired(best.deviation, other.chain.deviation)
         if other.why_not is None and difference <= LEAST_T * error:
             found.append(other.term.effect.name)
     return tuple(other for other in dict.fromkeys(found) if other != name)

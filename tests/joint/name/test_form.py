@@ -20,7 +20,7 @@ BINS = 40
 def share(effect, *terms):
     start = chain_of(plain_fit(joint_of("cyclic", effect, strength=10.0, rate=100.0)), 0)
     best = extended(start, *terms)
-    drop = float((start.error - best.error).sum())
+    drop = start.mean_square - best.mean_square
     unnamed = Pool.of(start.fit.dataset, unnamed_library())
     return share_of_form(best, drop, terms[0], unnamed), start, best
 
@@ -38,12 +38,12 @@ def test_a_form_that_is_another_holds_what_it_takes_of_what_its_domain_explains(
 
     found, start, best = share(waves, Term(LIBRARY["quadratic_friction"], {}))
     # All that the effect is can be explained, but for the noise, which is a hundredth of it.
-    took = 1 - best.error.sum() / start.error.sum()
+    took = 1 - best.mean_square / start.mean_square
     assert 0 <= took < 0.9
     assert found == pytest.approx(took, abs=0.02)
 
 
-BEST = SimpleNamespace(error=np.array([4.0, 6.0]), score=-1.0)
+BEST = SimpleNamespace(mean_square=10.0, score=-1.0)
 
 
 def effect(name, domain, fast=False):
@@ -54,7 +54,7 @@ VISCOUS = effect("viscous", "velocity")
 
 
 def rival(left, t_value=3.0, score=-1.1):
-    chain = SimpleNamespace(error=np.array([left - 1.0, 1.0]), score=score)
+    chain = SimpleNamespace(mean_square=left, score=score)
     return SimpleNamespace(chain=chain, t_value=t_value)
 
 

@@ -54,12 +54,13 @@ def moves(*directions):
     return SimpleNamespace(fine=SimpleNamespace(track=track, fit=slice(None)))
 
 
-def made(*terms, added=1, error=(1.0, 1.0), samples=2.0, widths=None, **fit):
+def made(*terms, added=1, error=(1.0, 1.0), counts=None, widths=None, **fit):
     terms = tuple(SimpleNamespace(effect=one, parameters={}) for one in terms)
     widths = widths or [1] * len(terms)
     fit = {"dataset": moves(-1.0, 1.0)} | fit
     fit = SimpleNamespace(terms=terms, coefficients=[np.ones(w) for w in widths], **fit)
-    return Chain(fit, added, np.array(error), samples)
+    counts = np.ones(len(error)) if counts is None else np.array(counts)
+    return Chain(fit, added, np.array(error), counts)
 
 
 @pytest.mark.parametrize(
@@ -75,20 +76,32 @@ def test_a_price_is_for_the_effect_its_coefficients_and_what_was_searched(
 
 def test_only_what_was_added_is_paid_for():
     chain = made(effect("declared"), effect("first", searched=1), effect("second"),
-                 added=2, error=(3.0, 5.0), samples=4.0, widths=[7, 2, 3])  # fmt: skip
+                 added=2, error=(4.0, 4.0), counts=(2.0, 2.0), widths=[7, 2, 3])  # fmt: skip
     assert [term.effect.name for term in chain.terms] == ["first", "second"]
-    assert chain.mean_square == 2.0
+    assert chain.mean_square == pytest.approx(2.0)
     assert chain.price == pytest.approx(CHARGE * (4 + 4))
     assert chain.score == pytest.approx(np.log(2.0) + chain.price)
     assert made(added=0).price == 0.0
     assert np.isfinite(made(added=0, error=(0.0, 0.0)).score)
 
 
+def test_a_part_counts_by_its_samples_and_by_its_error_not_by_the_error_s_square():
+    # Root mean squares of 1 over three samples, and of 9 over one.
+    assert made(added=0, error=(3.0, 81.0), counts=(3.0, 1.0)).mean_square == pytest.approx(9.0)
+    quiet, hard = (
+        made(error=(0.75, 81.0), counts=(3.0, 1.0)),
+        made(error=(3.0, 72.25), counts=(3.0, 1.0)),
+    )
+    # Half of the noise of three quarters is worth more than half an ampere of nine in one.
+    assert quiet.mean_square < hard.mean_square
+    assert quiet.error.sum() > hard.error.sum()
+
+
 def test_a_gain_is_a_share_of_the_other_s_error_and_its_t():
-    before, after = made(error=(4.0, 4.0, 4.0), added=0), made(error=(1.0, 2.0, 3.0), added=0)
-    # Drops of 3, 2, 1 have a variance of 1, their sum one of 3.
-    assert after.gain_over(before) == pytest.approx((0.5, 6 / np.sqrt(3)))
-    assert before.gain_over(after) == pytest.approx((-1.0, -6 / np.sqrt(3)))
+    before, after = made(error=(16.0, 16.0, 16.0), added=0), made(error=(1.0, 4.0, 9.0), added=0)
+    # Root mean squares fall by 3, 2, 1, which have a variance of 1, their sum one of 3.
+    assert after.gain_over(before) == pytest.approx((0.75, 6 / np.sqrt(3)))
+    assert before.gain_over(after) == pytest.approx((-3.0, -6 / np.sqrt(3)))
     share, t_value = before.gain_over(before)
     assert (share, t_value) == (0.0, 0.0)
 
@@ -226,7 +239,7 @@ def test_on_one_grid_the_error_is_that_of_the_parts_that_are_judged(chain):
     assert dataset.coarse is dataset.fine
     np.testing.assert_allclose(chain.error, sums.held_out()[parts.judged])
     judged = parts.rows[np.repeat(parts.judged, [b - a for a, b in parts.slices])]
-    assert chain.samples == judged.size
+    assert chain.counts.sum() == judged.size
 
 
 def test_on_two_grids_what_is_not_clear_is_judged_on_the_coarse_one():
@@ -246,6 +259,6 @@ def test_on_two_grids_what_is_not_clear_is_judged_on_the_coarse_one():
         sum(b - a for (a, b), kept in zip(grid.slices, chosen, strict=True) if kept)
         for grid, chosen in ((fine, fine.judged), (coarse, ~coarse.judged))
     ]
-    assert chain.samples == counts[0] + dataset.factor * counts[1]
+    assert chain.counts.sum() == counts[0] + dataset.factor * counts[1]
     # Every moving sample once, but for those at the ends of blocks.
-    assert chain.samples == pytest.approx(np.count_nonzero(dataset.fine.fit), rel=0.1)
+    assert chain.counts.sum() == pytest.approx(np.count_nonzero(dataset.fine.fit), rel=0.1)

@@ -52,8 +52,17 @@ def test_two_imitators_give_way_to_the_effect_that_is_there():
     names = ("stribeck", "quadratic_friction", "sublinear_friction")
     chain, _ = settle(stribeck, *terms, names=names)
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
-    kept, _ = settle(stribeck, terms[0], names=names, without=("unnamed",))
-    assert [one.effect.name for one in kept.terms] == ["quadratic_friction"]
+
+
+@pytest.mark.parametrize("name", ["offset", "spring"])
+def test_a_name_that_holds_a_part_of_what_a_smooth_function_does_goes(name):
+    def stop(q, v, a, t):
+        return np.maximum(q - 0.5, 0.0)
+
+    chain, _ = settle(stop, term(name), names=(name,))
+    assert [one.effect.name for one in chain.terms] == ["unnamed_angle"]
+    kept, _ = settle(stop, term(name), names=(name,), without=("unnamed",))
+    assert [one.effect.name for one in kept.terms] == [name]
 
 
 def test_of_two_that_do_not_go_together_the_better_one_stays(monkeypatch):

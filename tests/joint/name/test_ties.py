@@ -12,14 +12,14 @@ ERROR = np.array([1.0, 2.0, 3.0, 2.0])
 
 def other(name, error, why_not=None):
     return SimpleNamespace(
-        chain=SimpleNamespace(error=error),
+        chain=SimpleNamespace(deviation=error),
         why_not=why_not,
         term=SimpleNamespace(effect=SimpleNamespace(name=name)),
     )
 
 
 def ties(*others):
-    return ties_of(SimpleNamespace(error=ERROR), "coulomb", others)
+    return ties_of(SimpleNamespace(deviation=ERROR), "coulomb", others)
 
 
 def test_what_leaves_no_surely_larger_error_ties():
