@@ -57,7 +57,7 @@ class Smooth(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Cosines of the stretched covariate times each modifier."""
         place = np.pi * stretched(self._covariate(track), track.moving)
-        waves = [np.cos(k * place) for k in range(self._first, int(parameters["degree"]) + 1)]
+        waves = cosines(place, int(parameters["degree"]))[self._first :]
         return stack(*(part * wave for part in self._modifier(track) for wave in waves))
 
 
@@ -116,6 +116,14 @@ class Shift(Effect):
         part = columns[rows]
         first = np.gradient(columns @ solve(part.T @ part, part.T @ track.current_a[rows]))
         return stack(first, np.gradient(first))
+
+
+def cosines(angle: Floats, degree: int) -> list[Floats]:
+    """Cosines of the multiples of an angle from 0 to some degree, by Chebyshev's recurrence."""
+    waves = [np.ones_like(angle), np.cos(angle)]
+    while len(waves) <= degree:
+        waves.append(2 * waves[1] * waves[-1] - waves[-2])
+    return waves
 
 
 def stretched(values: Floats, members: Bools) -> Floats:

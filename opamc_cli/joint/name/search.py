@@ -283,7 +283,7 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
     pool : Pool
         What may be added.
     width : int
-        Chains that are followed side by side.
+        Chains that are followed side by side; one alone as far as its score falls.
     """
     width = 1 if "beam" in pool.without else width
     chains = [start]
@@ -294,5 +294,7 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
         if not following:
             break
         chains = sorted(following, key=lambda chain: chain.score)[:width]
+        if width == 1 and chains[0].score >= best.score:
+            break  # What a step that is not worth its price leads to is found beside others only.
         best = min((best, *chains), key=lambda chain: chain.score)
     return best

@@ -1,13 +1,16 @@
 """Chains side by side, and what a candidate has to show."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
+import pytest
 from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.name import search
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.search import Pool, beam, objection, trials
 
@@ -149,3 +152,15 @@ def test_guesses_that_lie_ready_are_asked_only_if_their_effect_is_in_the_pool():
     assert "position_drag" in {one.term.effect.name for one in trials(chain, pool)}
     spring = replace(pool, library={"spring": LIBRARY["spring"]})
     assert "position_drag" not in {one.term.effect.name for one in trials(chain, spring)}
+
+
+@pytest.mark.parametrize(("width", "found"), [(1, -1.0), (2, -3.0)])
+def test_one_chain_is_followed_as_far_as_its_score_falls(monkeypatch, width, found):
+    chains = [SimpleNamespace(score=score) for score in (0.0, -1.0, -0.5, -3.0)]
+
+    def possible(chain, pool, known):
+        following = chains[chains.index(chain) + 1 :][:1]
+        return [SimpleNamespace(chain=one) for one in following]
+
+    monkeypatch.setattr(search, "_possible", possible)
+    assert beam(chains[0], Pool([], {}), width).score == found
