@@ -5,12 +5,11 @@ import json
 import math
 
 import pytest
-import yaml
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from recordings import record
 
-from opamc_cli.config.yaml.values import MOST_VALUES, YamlError, plain_values
+from opamc_cli.config.yaml.values import MOST_VALUES, YamlError, plain_values, yaml_of
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.json_documents import parsed
 from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
@@ -33,9 +32,11 @@ TREES = st.recursive(
 
 
 @given(TREES, st.booleans())
+@example("1E5", False)
+@example({"robot": "0e0", "limit": 1e5, "share": 1e-05, "offset": -1.0}, True)
 @settings(max_examples=60, deadline=None)
 def test_yaml_reads_back_what_was_written(tree, flow):
-    text = yaml.safe_dump(tree, default_flow_style=flow, allow_unicode=True)
+    text = yaml_of(tree, default_flow_style=flow, allow_unicode=True)
     assert plain_values(text) == tree
 
 

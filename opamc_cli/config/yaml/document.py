@@ -3,8 +3,9 @@
 import textwrap
 from typing import Any
 
-import yaml
 from pydantic import BaseModel
+
+from opamc_cli.config.yaml.values import yaml_of
 
 
 def to_yaml(model: BaseModel) -> str:
@@ -25,5 +26,5 @@ def to_yaml(model: BaseModel) -> str:
 
 def _flow(value: Any) -> str:
     plain = list(value) if isinstance(value, tuple) else value
-    text: str = yaml.safe_dump(plain, default_flow_style=True, width=10_000)
+    text = yaml_of(plain, default_flow_style=True, width=10_000)
     return text.removesuffix("...\n").strip()

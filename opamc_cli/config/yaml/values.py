@@ -30,6 +30,7 @@ LARGEST = 1e15
 """Of numbers: no quantity of a robot is larger, and sums of it would lose their digits."""
 
 _TAG = "tag:yaml.org,2002:"
+_FLOAT = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _RESOLVER = yaml.SafeLoader("")
 _INTEGER = re.compile(r"[-+]?(0b[01_]+|0x[0-9a-fA-F_]+|0[0-7_]*|[1-9][0-9_]*)")
 
@@ -53,6 +54,29 @@ def plain_values(text: str) -> Any:
     except yaml.YAMLError as error:
         raise YamlError(_flat(error)) from error
     return builder.value
+
+
+class _Writer(yaml.SafeDumper):
+    """Quotes text that `plain_values` would take for a number: a robot may be called 1e5."""
+
+
+_Writer.add_implicit_resolver(
+    f"{_TAG}float", re.compile(f"(?:{_FLOAT.pattern})$"), list("-+.0123456789")
+)
+
+
+def yaml_of(value: Any, **form: Any) -> str:
+    """Return a document that `plain_values` reads back.
+
+    Parameters
+    ----------
+    value : object
+        Mappings, lists, text, numbers, truth and nothing.
+    form : object
+        As of `yaml.dump`.
+    """
+    text: str = yaml.dump(value, Dumper=_Writer, **form)
+    return text
 
 
 class _Builder:
@@ -163,7 +187,6 @@ def _number(text: str) -> int | float | None:
 
 _NO_TEXT = re.compile("[\\x00\ud800-\udfff]")
 """What no name of a file and no UTF-8 can hold."""
-_FLOAT = re.compile(r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _TRUTH = {"yes": True, "true": True, "on": True, "no": False, "false": False, "off": False}
 
 

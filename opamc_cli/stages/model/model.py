@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
-import yaml
 
 from opamc_cli.config.joint_model import JointModelConfig
+from opamc_cli.config.yaml.values import yaml_of
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library
 from opamc_cli.joint.fit.intervals import certainty
 from opamc_cli.joint.loop import close_loop, untestable
@@ -176,7 +176,7 @@ def close(
     ]
     for each in done:
         name = files.MODEL if len(done) == 1 else f"model_axis{each.entry['axis']}.yaml"
-        text = yaml.safe_dump(each.extended, sort_keys=False, default_flow_style=None)
+        text = yaml_of(each.extended, sort_keys=False, default_flow_style=None)
         write_text(out / name, text)
         written.append(out / name)
     entries = tuple(each.entry for each in done)
