@@ -70,6 +70,10 @@ class Effect:
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
 
+    from_terms: bool = False
+    """True where they look at the static columns alone: at which terms there are, not at how they
+    fit."""
+
     @property
     def harmless(self) -> bool:
         """Whether a joint that has more of it is no worse for it: changed, but not at fault."""

@@ -24,6 +24,7 @@ class TimeDelay(Effect):
     as_smoothing = True
     needs = ("position", "logged")
     static = False
+    from_terms = True
     whole = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -106,6 +106,7 @@ class Shift(Effect):
     meaning = "a response of the model's own current; no effect of the library has its form"
     needs = ("position", "logged")
     static = False
+    from_terms = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """First and second rate of change of the static terms' current."""

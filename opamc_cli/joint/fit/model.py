@@ -314,8 +314,10 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     -------
     Fit
     """
-    circular = not all(term.is_constant for term in terms)
-    plain = not np.any(dataset.fine.track.model_a)
+    track = dataset.fine.track
+    dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
+    circular = not all(term.is_constant or term.effect.from_terms for term in terms)
+    plain = not np.any(track.model_a)
     fewest = 3 if plain else 2
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
