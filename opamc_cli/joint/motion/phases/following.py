@@ -4,10 +4,11 @@ When the torque changes sign, the current vector's angle jumps by pi; the angle 
 does not. Half of that angle is the electrical angle, and the current along it has a sign.
 """
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.phases.angle_filter import (
     acceleration_noise,
     clean_bandwidth,
@@ -17,6 +18,11 @@ from opamc_cli.joint.motion.phases.angle_filter import (
 )
 from opamc_cli.joint.motion.phases.half_turns import bridged
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
+from opamc_cli.joint.motion.phases.sensor_errors import (
+    current_vector,
+    rounded,
+    without_sensor_errors,
+)
 from opamc_cli.joint.motion.smoothing import derivatives
 from opamc_cli.joint.motion.track import Bools, Floats
 
@@ -31,35 +37,53 @@ UNLIKELY = 4.0
 """A weaker current counts where the mean of its square, turned back by the angle followed so far,
 over 8 ms is this many times what noise makes of it."""
 
-CLEANING_ROUNDS = 5
-"""At most. An angle that was followed beside a sensor's zero error tells a part of that error; the
-angle that is followed without that part tells more: three tell a third of the current."""
+CLEANING_ROUNDS = 2
 BRIDGE_ROUNDS = 2
 BANDWIDTH_ROUNDS = 2
 CARRIER_OVER_BANDWIDTH = 2.0
-FEWEST_FAST_SAMPLES = 200
+"""Electrical frequency, in bandwidths, above which the follower does not sway with the carrier."""
 
 NOISIEST_SHARE = 0.1
 """Noise of the acceleration, relative to the acceleration, up to which a sample counts."""
 
 
-def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
-    """Clarke vector, amplitude-invariant.
+@dataclass(frozen=True)
+class _Followed:
+    """A current vector with the angle, modulo pi, that was followed along it."""
 
-    Parameters
-    ----------
-    phases_a : array of shape (n, 3)
-        Phase currents a, b, c.
+    vector: NDArray[np.complex128]
+    noise: float
+    floor: float
+    """With `noise`: standard deviation of each component, and length below which none counts."""
+    angle: Floats
+    fast: Bools
+    """Samples at which the carrier is faster than the follower."""
+    rough: Floats
+    sure: Bools
+    spread: Floats | None
+    """With `rough`, `sure`: as for `bridged`."""
+    roughness: float
+    """Mean square of the speed's changes, in units of the speed's."""
 
-    Returns
-    -------
-    complex array of shape (n,)
-    """
-    turn = np.exp(2j * np.pi / 3)
-    vector: NDArray[np.complex128] = (
-        2 / 3 * (phases_a[:, 0] + turn * phases_a[:, 1] + np.conj(turn) * phases_a[:, 2])
-    )
-    return vector
+
+def _followed(vector: NDArray[np.complex128], rate_hz: float, bandwidth: float) -> _Followed:
+    length = np.abs(vector)
+    # The third harmonic-free sum of three phases is noise alone where sensors have no offset;
+    # fourth differences of the vector's length hold no carrier either way.
+    noise = float(np.median(np.abs(np.diff(length, 4)))) / 0.6745 / np.sqrt(70.0)
+    floor = WEAKEST_SHARE * float(np.quantile(length, 0.95))
+    strong = length > max(STRONG * noise, floor)
+    rough, coherence = _turning(vector, rate_hz)
+    sure = (coherence > 0.9) & strong
+    local = np.sqrt(np.maximum(_centred_mean(length**2 + 0j, 15).real, 1e-300))
+    spread = None
+    if strong.any():
+        spread = np.maximum(float(np.median(local[strong])) / local, 1.0) ** 2
+    measured = np.angle(vector)
+    angle, speed = bridged(measured, strong, rough, sure, spread, rate_hz, bandwidth)
+    fast = strong & (np.abs(speed) > CARRIER_OVER_BANDWIDTH * 2 * np.pi * bandwidth)
+    roughness = float(np.sum(np.diff(speed) ** 2)) / max(float(np.sum(speed**2)), 1e-300)
+    return _Followed(vector, noise, floor, angle, fast, rough, sure, spread, roughness)
 
 
 def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
@@ -77,41 +101,33 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     PhaseAngle
         Smoothed by `smoothed_angle`.
     """
-    vector = current_vector(phases_a)
-    length = np.abs(vector)
-    # The third harmonic-free sum of three phases is noise alone where sensors have no offset;
-    # fourth differences of the vector's length hold no carrier either way.
-    noise = float(np.median(np.abs(np.diff(length, 4)))) / 0.6745 / np.sqrt(70.0)
-    floor = WEAKEST_SHARE * float(np.quantile(length, 0.95))
     bandwidth = widest_bandwidth(rate_hz)
+    vector = current_vector(phases_a)
+    starts = [_followed(one, rate_hz, bandwidth) for one in (vector, rounded(vector))]
+    # Beside an error of the sensors the angle sways: the smoother motion is the right one.
+    found = min(starts, key=lambda one: one.roughness)
     for _ in range(CLEANING_ROUNDS):
-        length = np.abs(vector)
-        strong = length > max(STRONG * noise, floor)
-        rough, coherence = _turning(vector, rate_hz)
-        sure = (coherence > 0.9) & strong
-        local = np.sqrt(np.maximum(_centred_mean(length**2 + 0j, 15).real, 1e-300))
-        spread = None
-        if strong.any():
-            spread = np.maximum(float(np.median(local[strong])) / local, 1.0) ** 2
-        measured = np.angle(vector)
-        angle, velocity = bridged(measured, strong, rough, sure, spread, rate_hz, bandwidth)
-        fast = strong & (np.abs(velocity) > CARRIER_OVER_BANDWIDTH * 2 * np.pi * bandwidth)
-        before, vector = vector, without_sensor_errors(vector, angle, fast)
-        if float(np.median(np.abs(vector - before))) <= noise:
+        before = found.vector
+        cleaned = without_sensor_errors(before, found.angle, found.fast)
+        if float(np.median(np.abs(cleaned - before))) <= found.noise:
+            found = replace(found, vector=cleaned)
             break
+        found = _followed(cleaned, rate_hz, bandwidth)
+    rough, sure, noise, angle = found.rough, found.sure, found.noise, found.angle
     for _ in range(BRIDGE_ROUNDS):
-        strong, measured = averaged_angle(vector, angle, noise, floor, rate_hz)
-        angle, velocity = bridged(measured, strong, rough, sure, spread, rate_hz, bandwidth)
+        strong, measured = averaged_angle(found.vector, angle, noise, found.floor, rate_hz)
+        angle, _ = bridged(measured, strong, rough, sure, found.spread, rate_hz, bandwidth)
     measured = angle + _halved(measured - angle)
     angle, velocity, acceleration = smoothed_angle(
         measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0
     )
-    angle_noise = noise / np.maximum(_centred_mean(length.astype(np.complex128), 15).real, 1e-300)
+    length = _centred_mean(np.abs(found.vector) + 0j, 15).real
+    angle_noise = noise / np.maximum(length, 1e-300)
     typical = float(np.median(angle_noise[strong])) if strong.any() else 0.0
     for _ in range(BANDWIDTH_ROUNDS):
-        followed = float(np.var(acceleration[strong])) if strong.any() else 0.0
-        followed -= acceleration_noise(typical, rate_hz, bandwidth) ** 2
-        narrower = clean_bandwidth(typical, np.sqrt(max(followed, 0.0)), rate_hz)
+        own = float(np.var(acceleration[strong])) if strong.any() else 0.0
+        own -= acceleration_noise(typical, rate_hz, bandwidth) ** 2
+        narrower = clean_bandwidth(typical, np.sqrt(max(own, 0.0)), rate_hz)
         if narrower > 0.9 * bandwidth:
             break
         bandwidth = narrower
@@ -184,48 +200,6 @@ def _halved(angle_rad: Floats) -> Floats:
     """Angle modulo pi, between -pi/2 and pi/2."""
     halved: Floats = angle_rad - np.pi * np.round(angle_rad / np.pi)
     return halved
-
-
-def without_sensor_errors(
-    vector: NDArray[np.complex128], angle_rad: Floats, fast: Bools
-) -> NDArray[np.complex128]:
-    """Take zero errors and unequal gains of the sensors out of a current vector.
-
-    Both show in the flux current, once and twice per electrical revolution; at a low speed the
-    followed angle would sway with them.
-
-    Parameters
-    ----------
-    vector : complex array of shape (n,)
-        Clarke vector.
-    angle_rad : array of shape (n,)
-        Followed angle of the torque axis, modulo pi.
-    fast : bool array of shape (n,)
-        Samples at which the carrier is faster than the follower.
-
-    Returns
-    -------
-    complex array of shape (n,)
-        The vector itself where too few samples are fast.
-    """
-    if np.count_nonzero(fast) < FEWEST_FAST_SAMPLES:
-        return vector
-    rotated = vector[fast] * np.exp(-1j * angle_rad[fast])
-    torque, flux, angle = rotated.real, rotated.imag, angle_rad[fast]
-    columns = np.stack(
-        [
-            -np.sin(angle),
-            np.cos(angle),
-            -torque * np.sin(2 * angle),
-            torque * np.cos(2 * angle),
-            np.ones(angle.size),
-        ],
-        axis=1,
-    )
-    found = solve(columns.T @ columns, columns.T @ flux)
-    offset, imbalance = complex(found[0], found[1]), complex(found[2], found[3])
-    clean: NDArray[np.complex128] = vector - offset - imbalance * np.conj(vector)
-    return clean
 
 
 def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:
