@@ -18,9 +18,6 @@ from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
 
-CLOSED_SHARE = 0.9
-"""Of the ceiling that has to be reached."""
-
 
 @dataclass(frozen=True)
 class Step:
@@ -239,7 +236,7 @@ def _opened(
     # A model that predicts no better than the mean lacks something, whatever was found.
     predicts = _r2(after) > 0
     if has_name:
-        verdict = "closed" if reached >= CLOSED_SHARE and predicts else "partial"
+        verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
         verdict = "not-in-library" if unknown else "nothing-missing"

@@ -9,11 +9,9 @@ from opamc_cli.joint.explain.lines import AngleLine, Tone
 from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.joint.name.chain import Chain
+from opamc_cli.joint.name.chain import PRICE, Chain
 from opamc_cli.joint.name.search import Pool, beam
 
-LEAST_SHARE = 0.02
-"""Of the held-out error: without a name, less than half of what a name has to take away counts."""
 SEALED_PARTS = 12
 
 
@@ -29,7 +27,7 @@ class Ceiling:
     @property
     def certain(self) -> bool:
         """Whether there is anything to explain."""
-        return self.share > 2 * self.standard_error and self.share > LEAST_SHARE
+        return self.share > 2 * self.standard_error and self.share > PRICE
 
 
 def unnamed_library() -> dict[str, Effect]:
@@ -48,7 +46,7 @@ def saturated(start: Chain, pool: Pool) -> Chain:
     pool : Pool
         Of unnamed effects.
     """
-    return beam(start, replace(pool, least_share=LEAST_SHARE), width=1)
+    return beam(start, replace(pool, least_share=PRICE), width=1)
 
 
 def ceiling(before: Fit, explained: Fit) -> Ceiling:

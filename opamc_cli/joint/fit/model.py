@@ -23,8 +23,6 @@ every round costs as many."""
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
-LOAD_SAMPLES = 10_000
-"""By which the load is found that friction follows: a handful of coefficients."""
 SMALLEST_KERNEL = 5
 """A moving average of up to 5 samples needs no counterpart."""
 
@@ -343,7 +341,7 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     if not follow or not any(term.effect.carries_load for term in terms):
         return dataset
     rows = np.flatnonzero(dataset.fine.fit)
-    rows = rows[:: max(rows.size // LOAD_SAMPLES, 1)]
+    rows = rows[:: max(rows.size // COARSE_SAMPLES, 1)]
     blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
     carries, follows = (

@@ -8,7 +8,7 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
-from opamc_cli.joint.least_squares import inverse
+from opamc_cli.joint.least_squares import SINGULAR_BELOW, inverse
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
@@ -16,8 +16,6 @@ LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
 NARROW = 4
 """Regressors of a guess up to which products are summed one by one, for all guesses at once."""
-RIDGE = 1e-7
-"""Of a regressor's energy: one of which the model leaves less is the model's already."""
 
 
 @dataclass(frozen=True)
@@ -160,8 +158,9 @@ class Beside:
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
         width = own.shape[-1]
-        # What nothing outside a unit excites has no coefficient there.
-        floor = RIDGE * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
+        # What nothing outside a unit excites has no coefficient there, nor what the model leaves
+        # next to nothing of.
+        floor = SINGULAR_BELOW * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
         left = left + floor[..., None] * np.eye(width)
         asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, alone)
         gamma = np.ones_like(asked) if whole else np.linalg.solve(left, asked[..., None])[..., 0]
@@ -198,7 +197,7 @@ class Beside:
         cross = beside.T @ columns
         projected = gram @ cross
         left = columns.T @ columns - cross.T @ projected
-        left += RIDGE * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
+        left += SINGULAR_BELOW * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
         asked = columns.T @ current - projected.T @ moment
         if whole:
             return float(2 * asked.sum() - left.sum())

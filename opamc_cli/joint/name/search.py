@@ -9,7 +9,7 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
-from opamc_cli.joint.name.chain import Chain, Signature, extended, line_of, signature_of
+from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import LEAST_T, p_value
 
@@ -22,8 +22,6 @@ MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
 REFINED, TRIED = 6, 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
-SAME = 0.98
-"""Of a gain: a parameter with a meaning may cost 2 % of what the best one takes away."""
 PROMISING = 0.25
 """Share of the best candidate's fall in the score below which none is refined."""
 
@@ -183,7 +181,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         (batch,) = batches_of(dataset, [term], beside.fine)
         trial = judged(term, float(beside.gains(batch)[0]), batch.width)
         # A parameter that was moved to a value with a meaning may cost a trifle.
-        better.append(trial if trial.gain > SAME * candidate.gain else candidate)
+        better.append(trial if trial.gain > (1 - PRICE) * candidate.gain else candidate)
     chain.fit.forget()
     pool.asked[asked] = sorted(better, key=lambda candidate: candidate.score)
     return pool.asked[asked]

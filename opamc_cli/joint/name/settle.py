@@ -12,7 +12,8 @@ from opamc_cli.joint.name.ties import ties_of
 CLEARLY = 0.05
 """Of the score: where an effect stands against a function without a name, less is no difference."""
 EXACT = 0.9
-"""Share of its domain's curve from which on a form has the name."""
+"""Share of its domain's curve from which on a form has the name, and of the ceiling from which on
+the loop is closed."""
 MOST_ROUNDS = 4
 
 
