@@ -46,6 +46,19 @@ def test_the_fit_is_least_squares_of_the_open_samples():
     assert fitted.rmse(sealed=True) == pytest.approx(np.sqrt(np.mean(rest**2)))
 
 
+def test_what_looks_at_the_terms_alone_is_fitted_once(monkeypatch):
+    dataset = dataset_from(joint_of("cyclic", None, rate=1000.0))
+    terms = (*rigid(), term("time_delay", delay_s=0.01))
+    rounds = []
+    once = model._fit_once
+    monkeypatch.setattr(model, "_fit_once", lambda *given: rounds.append(1) or once(*given))
+    fitted = fit_terms(dataset, terms)
+    assert len(rounds) == 1
+    # Another round, with the fitted model on the grid, would change nothing.
+    again = once(fitted.dataset, terms)
+    np.testing.assert_allclose(again.residual_a, fitted.residual_a, atol=1e-12)
+
+
 def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(monkeypatch):
     monkeypatch.setattr(model, "COARSE_SAMPLES", 6000)
     dataset = dataset_from(joint_of("one stroke", None, rate=1000.0))
