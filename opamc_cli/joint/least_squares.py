@@ -6,11 +6,12 @@ from scipy.linalg import eigh
 
 Floats = NDArray[np.float64]
 
-SINGULAR_BELOW = 1e-8
-"""Of the largest eigenvalue: regressors that differ by less than 1e-4 of their size are not told
-apart; what noise makes of the difference would be extrapolated. Over a short stroke a spring and an
-offset differ that little from gravity: at 1e-7 one of 15 times the noise was missed (the smooth
-simulator, seed 9900009); 46 real recordings end alike."""
+SINGULAR_BELOW = 1e-7
+"""Of the largest eigenvalue: regressors that differ by less than 3e-4 of their size are not told
+apart; what noise makes of the difference would be extrapolated. Over a stroke of 0.75 rad a spring
+differs from gravity by 1e-3, over half a radian by less than 3e-4: one of 15 times the noise is
+missed there. At 1e-8 it is found, but a minute of a testbed's axis takes 1.4 times as long, ten
+minutes twice, since every filter of a drive's answer is then told from its neighbours."""
 
 
 def solve(gram: Floats, moment: Floats) -> Floats:
@@ -26,7 +27,7 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     Returns
     -------
     array of shape (k,) or (groups, k)
-        Coefficients; directions below 1e-8 of the largest get none.
+        Coefficients; directions below 1e-7 of the largest get none.
     """
     if moment.shape[-1] == 0:
         return moment
