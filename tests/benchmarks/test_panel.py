@@ -9,7 +9,7 @@ from panel.case import RIGID, Case, Wanted
 
 
 def test_a_name_is_right_where_it_or_its_tie_is_and_wrong_where_neither_is():
-    row = {"hidden": "stribeck", "present": ("elasticity",)}
+    row = {"hidden": "stribeck", "right": ["stribeck"], "present": ("elasticity",)}
     steps = [
         {"name": "sublinear_friction", "ties": ["stribeck"]},
         {"name": "elasticity", "ties": []},
