@@ -1,12 +1,16 @@
 """Identification of cycles and motions by the similarity of variance vectors."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 UNIDENTIFIED = -1
+
+SAME_MOTION = 0.05
+"""Relative difference of durations and speeds below which a cycle is another one's motion, whatever
+it draws. Of half of its segments: the edges of short ones move with the current."""
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -57,6 +61,12 @@ class MatchRule:
     """With `duration_tolerance`: largest relative difference of each segment from its reference."""
     use_direction: bool = True
     """Whether known directions must agree."""
+    middle_tolerance: float | None = None
+    """Within which half of the segments have to be."""
+
+    def by_motion(self) -> "MatchRule":
+        """Return the rule for a current that is like nothing: a gross fault changes every one."""
+        return replace(self, min_similarity=0.0, middle_tolerance=SAME_MOTION)
 
 
 @dataclass(frozen=True)
@@ -226,7 +236,11 @@ def _agreement(
         (segments.duration_s, reference.duration_s, rule.duration_tolerance),
         (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
     ):
-        agree &= np.abs(windows(have) - want) <= tolerance * want
+        difference = np.abs(windows(have) - want)
+        agree &= difference <= tolerance * want
+        if rule.middle_tolerance is not None:
+            beyond = difference - rule.middle_tolerance * want
+            agree &= np.median(beyond, axis=1, keepdims=True) <= 0
     if rule.use_direction:
         agree &= windows(segments.direction) * reference.direction >= 0
     return np.asarray(agree.all(axis=1))

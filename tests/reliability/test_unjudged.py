@@ -127,6 +127,22 @@ def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):
 # -- what a drive reports ----------------------------------------------------------------------
 
 
+def grinding(columns):
+    backwards = columns["axis2_velocity"] < 0
+    columns["axis2_current"][backwards] += np.random.default_rng(0).normal(0, 8, backwards.sum())
+
+
+def test_a_fault_that_leaves_nothing_of_the_usual_current_is_one(opamc, tmp_path):
+    for seed in range(4):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
+    target = record(tmp_path / "tonight.parquet", 9, grinding, made=recordings.reported)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out")
+    assert ended.code == ExitCode.UNHEALTHY, ended.err
+    assert "Axis 2 at fault" in ended.out
+    assert "axis 2: its currents are like the reference cycle's by 0." in ended.err
+    assert "told by duration, speed and direction" in ended.err
+
+
 def half(columns):
     return len(columns["axis2_current"]) // 2
 

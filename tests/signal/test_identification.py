@@ -95,6 +95,20 @@ def test_another_program_is_never_forced():
     assert (found.cycle == -1).all()
 
 
+def test_by_their_motion_alone_cycles_are_told_whatever_the_current():
+    reference = series(CYCLE, noise=0)
+    faulty = [(9 * v if k % 4 == 1 else v, *rest) for k, (v, *rest) in enumerate(CYCLE * 3)]
+    assert identify(reference, series(faulty), RULE).cycle.max() == -1
+    found = identify(reference, series(faulty), RULE.by_motion())
+    assert found.cycle.tolist() == np.repeat(range(3), 4).tolist()
+    assert 0 < found.similarity.max() < RULE.min_similarity
+    short = [(v, 0.8 * d if k == 3 else d, *rest) for k, (v, d, *rest) in enumerate(CYCLE)]
+    assert identify(reference, series(short), RULE.by_motion()).cycle.max() == 0
+    slower = [(v, 1.2 * d, *rest) for v, d, *rest in CYCLE]
+    assert identify(reference, series(slower), RULE).cycle.max() == 0
+    assert identify(reference, series(slower), RULE.by_motion()).cycle.max() == -1
+
+
 def test_wrong_direction_alone_prevents_a_match():
     reference = series(CYCLE, noise=0)
     turned = [(v, d, f, -s, p) for v, d, f, s, p in CYCLE]

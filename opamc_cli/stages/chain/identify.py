@@ -63,6 +63,14 @@ class IdentifyOutcome:
             )
         return counts
 
+    def unlike(self, min_similarity: float) -> dict[int, float]:
+        """Return the least similarity of axes whose cycles were told by their motion alone."""
+        found: dict[int, float] = {}
+        for row in self.table.select(["axis", "cycle", "similarity"]).to_pylist():
+            if row["cycle"] != UNIDENTIFIED and row["similarity"] < min_similarity:
+                found[row["axis"]] = min(row["similarity"], found.get(row["axis"], 1.0))
+        return found
+
 
 @dataclass(frozen=True)
 class _Axis:
@@ -97,6 +105,8 @@ class _Job:
     reference: _Reference | None
     config: IdentifyConfig
     envelope: EnvelopeKind
+    judged: bool
+    """Whether the reference is of other runs, so that the current may be a faulty joint's."""
 
 
 def run(
@@ -153,7 +163,13 @@ def run(
             ).items()
         }
     work = [
-        _Job(part, references.get(part.axis), config.identify, config.patterns.envelope)
+        _Job(
+            part,
+            references.get(part.axis),
+            config.identify,
+            config.patterns.envelope,
+            judged=reference is not None,
+        )
         for part in parts
     ]
     for source in {part.source for part in parts} | {r.source for r in references.values()}:
@@ -342,15 +358,18 @@ def _identify_part(job: _Job) -> pa.Table:
     # motions at the recording's edge are whole if those of the reference are
     whole = np.arange(n) if reference is not None and reference.edges else _whole(part)
     if reference is not None and whole.size:
-        found = identify(reference.features, part.features.take(whole), match_rule(job.config))
+        rule, own = match_rule(job.config), part.features.take(whole)
+        found = identify(reference.features, own, rule)
+        if job.judged and found.cycle.max() == UNIDENTIFIED:
+            found = identify(reference.features, own, rule.by_motion())
         cycle[whole], motion[whole] = found.cycle, found.motion
         similarity[whole] = found.similarity
         for i in np.flatnonzero(motion >= 0).tolist():
             span = reference.spans[motion[i]]
             f_max_hz[i] = reference.carrier_hz[motion[i]]
             samples[i] = span[1] - span[0]
-            own = _span(part.rows, i)
-            is_reference[i] = part.source == reference.source and own == span
+            place = _span(part.rows, i)
+            is_reference[i] = part.source == reference.source and place == span
         # windows of a steady signal have no beginning that could be synchronised
         moving = _column(part.rows, "kind") == "motion"
         lag[moving] = _lags(job, motion[moving], _spans(part.rows, moving))
