@@ -70,6 +70,20 @@ def energy_of(
     return Energy(max(slow, 0.0), fast if clear else 0.0)
 
 
+def rest_growth(units: list[Unit], population: Population, shift: Shift | None) -> float:
+    """By which factor the share of the current that neither model nor shift holds has grown.
+
+    Of the equally smooth current's mean square, corners and reversals with it: there a loose joint
+    knocks, which a fit to clear samples never sees.
+    """
+    shares: dict[bool, list[float]] = {False: [], True: []}
+    for unit in units:
+        current = without(unit, shift, fine=False)
+        residual = own_fit(unit, population.terms, current=current)[1]
+        shares[unit.after].append(float(np.mean(residual**2) / np.mean(unit.current_a() ** 2)))
+    return float(np.median(shares[True])) / max(float(np.median(shares[False])), 1e-300)
+
+
 def shift_power(units: list[Unit], shift: Shift) -> float:
     """Mean square of a shift's own current in the target's units, A^2."""
     return float(

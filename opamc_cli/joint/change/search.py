@@ -263,7 +263,7 @@ def _friction(
     if ready[0].unit.fine.temperature_c is not None:
         return cause  # as warm as ever
     dry, wet = _relative(ready, population)
-    if abs(wet) > abs(dry) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
+    if _mostly_wet(dry, wet) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
         return _thermal(cause.shift, cause.p_value, ties, None)
     return cause
 

@@ -202,10 +202,10 @@ def slow_candidates(units: list[Unit], effects: list[Effect]) -> list[Term]:
     return found
 
 
-def without(unit: Unit, shift: Shift | None) -> Floats:
-    """Take a shift from the target's current, on the fine grid; the baseline has none."""
-    current = unit.current_a(fine=True)
+def without(unit: Unit, shift: Shift | None, fine: bool = True) -> Floats:
+    """Take a shift from the target's current; the baseline has none."""
+    current = unit.current_a(fine)
     if shift is None or not unit.after:
         return current
-    rest: Floats = current - unit.stacked(shift.terms, fine=True) @ shift.coefficients
+    rest: Floats = current - unit.stacked(shift.terms, fine) @ shift.coefficients
     return rest
