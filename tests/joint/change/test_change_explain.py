@@ -14,6 +14,16 @@ from tests.marks import long
 BASELINE, TARGET = 4, 3
 
 
+def knocking(a, time):
+    """Swing at 20 Hz for a while where the torque turns over, as a loose joint does."""
+    after = np.zeros_like(time)
+    turned = np.flatnonzero(np.diff(np.sign(a)) != 0)
+    for at in turned:
+        since = time[at:] - time[at]
+        after[at:] += np.exp(-since / 0.08) * np.sin(2 * np.pi * 20 * since)
+    return after
+
+
 def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
     """Sessions of two cycles each, whose friction differs by 5 %; the target's has an effect.
 
@@ -32,6 +42,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
         "friction": 0.5 * v / top,
         "tooth and payload": 1.5 * noise * np.cos(tooth * q)
         + 1.5 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
+        "friction and knocks": 0.5 * v / top + 20 * noise * knocking(a, made.time),
         "hum": 1.5 * noise * np.cos(2 * np.pi * 50.0 * made.time),
     }[kind]
     edges = np.linspace(0, v.size, count + 1).astype(int)
@@ -125,6 +136,13 @@ def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
     change = change_of(kind, seed, colder)
     assert change.causes[0].effect == effect
     assert change.harmless
+
+
+@pytest.mark.parametrize("seed", [1, long(2)])
+def test_cold_grease_is_no_excuse_for_a_joint_that_knocks(seed):
+    change = change_of("friction and knocks", seed, colder=15.0)
+    assert not change.harmless
+    assert "thermal_viscous" not in {cause.effect for cause in change.causes}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from sessions import LIBRARY, TERMS, units_of
+from sessions import COEFFICIENTS, LIBRARY, TERMS, units_of
 
 from opamc_cli.joint.change.search import find_slow_causes
 from opamc_cli.joint.change.slow import learn
@@ -83,6 +83,19 @@ def test_friction_that_grows_with_the_speed_may_be_grease_where_no_temperature_i
     assert causes_of(lambda q, v, a, t: 0.5 * v)[0].effect == "viscous"
     assert causes_of(lambda q, v, a, t: -0.2 * v)[0].effect == "viscous"
     assert causes_of(thick, library=only("viscous"))[0].effect == "viscous"
+
+
+def test_friction_that_has_grown_at_all_speeds_is_no_grease():
+
+    def names(dry, wet):
+        def more(q, v, a, t):
+            return dry * COEFFICIENTS[3] * np.sign(v) + wet * COEFFICIENTS[4] * v
+
+        return {cause.effect for cause in causes_of(more)}
+
+    assert "thermal_viscous" in names(0.1, 0.9)
+    assert names(0.5, 0.9)
+    assert "thermal_viscous" not in names(0.5, 0.9)
 
 
 @pytest.mark.parametrize(

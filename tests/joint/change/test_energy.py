@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sessions import LIBRARY, TERMS, units_of
 
-from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of, shift_power
+from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of, rest_growth, shift_power
 from opamc_cli.joint.change.lines import strokes
 from opamc_cli.joint.change.slow import Shift
 from opamc_cli.joint.fit.model import Term
@@ -76,6 +76,12 @@ def test_sessions_that_agree_by_chance_differ_by_a_twentieth():
     assert energy(before, [(2 + 1.01 * limit, 0.0)]).fast > 0.0
 
 
+def test_the_rest_grows_by_its_share_of_the_current():
+    units = [unit(square(1.0)), unit(square(1.0)), unit(square(3.0), after=True)]
+    # 25 and 1, 25 and 3 are the mean squares of the constant and the rest.
+    assert rest_growth(units, POPULATION, None) == pytest.approx(3 / (25 + 3) * 26)
+
+
 def stiff(q, v, a, t):
     return 0.5 * q
 
@@ -91,6 +97,8 @@ def test_a_shift_that_is_taken_away_leaves_nothing_slow():
     assert before.total == pytest.approx(power, rel=0.05)
     assert energy_of(units, population, True, shift).total < 0.02 * power
     assert shift_power(units, shift) == pytest.approx(power, rel=1e-2)
+    assert rest_growth(units, population, None) > 2
+    assert rest_growth(units, population, shift) == pytest.approx(1.0, abs=0.3)
 
 
 def test_a_shift_s_power_is_that_of_the_target_alone():
