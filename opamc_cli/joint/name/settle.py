@@ -1,6 +1,5 @@
 """What a chain keeps when each effect is asked again beside the others."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
@@ -54,8 +53,6 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
     for _ in range(MOST_ROUNDS):
         changes = (_asked_again(best, place, pool, unnamed) for place in range(best.added))
         changed = next((chain for chain in changes if chain is not None), None)
-        if changed is None and "unnamed" not in pool.without:
-            changed = _one_for_several(best, unnamed)
         if changed is None:
             break
         best = changed
@@ -93,7 +90,7 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
         passing += _passing_without_another(best, place, pool)
         return min(passing, key=lambda chain: chain.score, default=parent)
     if "unnamed" not in pool.without:
-        for rival in trials(parent, _rivals_of([term], unnamed)):
+        for rival in trials(parent, _rivals_of(term, unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain
     return None
@@ -114,36 +111,14 @@ def _passing_without_another(best: Chain, place: int, pool: Pool) -> list[Chain]
     return found
 
 
-def _one_for_several(best: Chain, unnamed: Pool) -> Chain | None:
-    """Return the chain in which one function without a name does better than several names did.
-
-    Effects may each be the wrong form of another one, and asked for one by one each is needed
-    beside the others: those of one domain, or all that are no lines.
-    """
-    named = [i for i, term in enumerate(best.terms) if not term.effect.unnamed]
-    domains = dict.fromkeys(best.terms[i].effect.domain for i in named)
-    groups = [[i for i in named if best.terms[i].effect.domain == name] for name in domains]
-    groups.append([i for i in named if not best.terms[i].effect.fast])
-    for group in groups:
-        if len(group) < 2:
-            continue
-        parent = best
-        for place in reversed(group):
-            parent = without(parent, place)
-        for rival in trials(parent, _rivals_of([best.terms[i] for i in group], unnamed)):
-            if rival.why_not is None and rival.chain.score < best.score:
-                return rival.chain
-    return None
-
-
-def _rivals_of(terms: Sequence[Term], unnamed: Pool) -> Pool:
-    """Return the functions without a name that may stand in the place of some effects.
+def _rivals_of(term: Term, unnamed: Pool) -> Pool:
+    """Return the functions without a name that may stand in the place of an effect.
 
     A line that shakes the joint is in the measured acceleration, too: what looks at that, or
     filters it, is no rival.
     """
     library = {name: one for name, one in unnamed.library.items() if not one.fast}
-    if any(term.effect.fast for term in terms):
+    if term.effect.fast:
         library = {
             name: one
             for name, one in library.items()
