@@ -172,7 +172,10 @@ def _diagnose(
                 continue
             if found is not None and found["share"] >= LEAST_SHARE:
                 causes[axis] = found
-    every_note = (*left_out, *normal.notes, *other.notes, *scored.notes, *notes)
+    # of both sides alike counts once
+    every_note = tuple(
+        dict.fromkeys((*left_out, *normal.notes, *other.notes, *scored.notes, *notes))
+    )
     sources = (*sides.baseline.sources, *sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
 
