@@ -137,5 +137,5 @@ def _unfitting(axis: int, rows: pa.Table) -> str:
     count = f"all {rows.num_rows} segments" if rows.num_rows > 1 else "the only segment"
     return (
         f"{count} of axis {axis} fit no motion of the baseline's cycle: another program or speed, "
-        "another joint's channels, or no cycle that repeats"
+        "another joint's channels, no cycle that repeats, or a fault that changes the motion itself"
     )
