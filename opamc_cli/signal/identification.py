@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 UNIDENTIFIED = -1
 
-SAME_MOTION = 0.05
+SAME_PROGRAM = 0.05
 """Relative difference of durations and speeds below which a cycle is another one's motion, whatever
 it draws. Of half of its segments: the edges of short ones move with the current."""
 
@@ -66,7 +66,7 @@ class MatchRule:
 
     def by_motion(self) -> "MatchRule":
         """Return the rule for a current that is like nothing: a gross fault changes every one."""
-        return replace(self, min_similarity=0.0, middle_tolerance=SAME_MOTION)
+        return replace(self, min_similarity=0.0, middle_tolerance=SAME_PROGRAM)
 
 
 @dataclass(frozen=True)

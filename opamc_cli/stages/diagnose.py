@@ -172,7 +172,7 @@ def _diagnose(
                 continue
             if found is not None and found["share"] >= LEAST_SHARE:
                 causes[axis] = found
-    # of both sides alike counts once
+    # what both sides give alike is said once
     every_note = tuple(
         dict.fromkeys((*left_out, *normal.notes, *other.notes, *scored.notes, *notes))
     )

@@ -141,6 +141,12 @@ def test_a_fault_that_leaves_nothing_of_the_usual_current_is_one(opamc, tmp_path
     assert "Axis 2 at fault" in ended.out
     assert "axis 2: its currents are like the reference cycle's by 0." in ended.err
     assert "told by duration, speed and direction" in ended.err
+    for side in (tmp_path / "baseline", target):
+        assert opamc("segment", side, "--out", tmp_path / f"of {side.name}").code == 0
+    before, after = tmp_path / "of baseline", tmp_path / f"of {target.name}"
+    assert opamc("identify", "--out", before).err == ""
+    alone = opamc("identify", "--out", after, "--reference", before / "motions.parquet")
+    assert "told by duration, speed and direction" in alone.err
 
 
 def half(columns):

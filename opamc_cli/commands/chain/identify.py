@@ -52,8 +52,10 @@ def identify(
         {"run": run, "axis": axis, "cycles": cycles, "unidentified": unidentified}
         for (run, axis), (cycles, unidentified) in outcome.cycles().items()
     ]
+    for note in outcome.notes:
+        output.note(note)
     output.result(
-        {"written": str(outcome.path), "series": found},
+        {"written": str(outcome.path), "series": found, "notes": list(outcome.notes)},
         *(
             f"{f['run']} axis {f['axis']}: {f['cycles']} cycles, "
             f"{f['unidentified']} segments unidentified"

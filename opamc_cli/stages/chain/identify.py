@@ -50,6 +50,8 @@ class IdentifyOutcome:
     """Its rows."""
     errors: tuple[OpamcError, ...]
     """One for each axis of a run that could not be read."""
+    notes: tuple[str, ...]
+    """One for each axis of which only the motion told the cycles."""
 
     def cycles(self) -> dict[tuple[str, int], tuple[int, int]]:
         """Return the numbers of cycles and of unidentified segments by (run, axis)."""
@@ -62,14 +64,6 @@ class IdentifyOutcome:
                 unidentified + (row["cycle"] == UNIDENTIFIED),
             )
         return counts
-
-    def unlike(self, min_similarity: float) -> dict[int, float]:
-        """Return the least similarity of axes whose cycles were told by their motion alone."""
-        found: dict[int, float] = {}
-        for row in self.table.select(["axis", "cycle", "similarity"]).to_pylist():
-            if row["cycle"] != UNIDENTIFIED and row["similarity"] < min_similarity:
-                found[row["axis"]] = min(row["similarity"], found.get(row["axis"], 1.0))
-        return found
 
 
 @dataclass(frozen=True)
@@ -192,7 +186,20 @@ def run(
         inputs=inputs,
         extra=sources_record(list(sources.values()), out),
     )
-    return IdentifyOutcome(path, motions, outcome.errors)
+    return IdentifyOutcome(path, motions, outcome.errors, tuple(_unlike(motions, rule)))
+
+
+def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:
+    """Say of which axes the current is so odd that only the motion told the cycles."""
+    least: dict[int, float] = {}
+    for row in motions.select(["axis", "cycle", "similarity"]).to_pylist():
+        if row["cycle"] != UNIDENTIFIED and row["similarity"] < rule.min_similarity:
+            least[row["axis"]] = min(row["similarity"], least.get(row["axis"], 1.0))
+    return [
+        f"axis {axis}: its currents are like the reference cycle's by {similarity:.2g} only "
+        f"({rule.min_similarity:.2g} asked); the motions were told by duration, speed and direction"
+        for axis, similarity in sorted(least.items())
+    ]
 
 
 def match_rule(config: IdentifyConfig) -> MatchRule:

@@ -101,7 +101,7 @@ def run_chain(
             *segmented.notes,
             *counted.notes,
             *_unidentified(identified),
-            *_unlike(identified, config.identify.min_similarity),
+            *identified.notes,
         ),
     )
 
@@ -116,13 +116,4 @@ def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:
         f"axis {axis}: {sum(counts)} segments of {len(counts)} runs fit no motion of the "
         "reference cycle"
         for axis, counts in sorted(missed.items())
-    ]
-
-
-def _unlike(identified: identify.IdentifyOutcome, min_similarity: float) -> list[str]:
-    """Say of which axes the current is so odd that only the motion told the cycles."""
-    return [
-        f"axis {axis}: its currents are like the reference cycle's by {similarity:.2g} only "
-        f"({min_similarity:.2g} asked); the motions were told by duration, speed and direction"
-        for axis, similarity in sorted(identified.unlike(min_similarity).items())
     ]
