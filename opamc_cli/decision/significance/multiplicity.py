@@ -30,19 +30,21 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def harmonic_mean(p_values: ArrayLike) -> float:
+def harmonic_mean(p_values: ArrayLike, weights: ArrayLike | None = None) -> float:
     """Combine p-values of one hypothesis that may depend on each other.
 
     Parameters
     ----------
     p_values : array_like, shape (N,)
         Without NaN.
+    weights : array_like, shape (N,), optional
+        Positive; all alike by default.
 
     Returns
     -------
     float
-        Between the least of them, if all agree, and N times that (Bonferroni), if one alone is
-        small.
+        Between the least of them, if all agree, and that over its share of the weights
+        (Bonferroni), if one alone is small.
 
     Notes
     -----
@@ -51,4 +53,5 @@ def harmonic_mean(p_values: ArrayLike) -> float:
     """
     # a tail too small for a floating point number is zero
     p = np.maximum(np.asarray(p_values, dtype=np.float64), np.finfo(np.float64).tiny)
-    return float(p.size / np.sum(1 / p))
+    w = np.ones_like(p) if weights is None else np.asarray(weights, dtype=np.float64)
+    return float(w.sum() / np.sum(w / p))
