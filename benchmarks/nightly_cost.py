@@ -8,6 +8,7 @@ nights, which an earlier night has read, and one target night of one recording.
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -24,6 +25,7 @@ from opamc_cli.testbed.robot import simulate
 
 BASELINE = 6
 FAULTY_AXIS = 3
+KINDS = ("healthy", "first faulty", "next faulty")
 OPTIONS = {"joint.gear_ratio": 100, "joint.pole_pairs": 5}
 
 
@@ -61,7 +63,7 @@ def computing_s(*arguments: object) -> float:
 def measure(
     folder: Path, record: Callable[[Path, int, bool], None], rounds: int
 ) -> dict[str, list[tuple[float, float]]]:
-    """Return a night's and its diagnosis's seconds, of a healthy and of a faulty night."""
+    """Return a night's and its diagnosis's seconds, by kind of night."""
     for index in range(BASELINE + 1):
         record(folder / "logs" / "r1" / cell_logs.night(index) / "run.parquet", index, False)
     cell = folder / "cell.yaml"
@@ -71,20 +73,24 @@ def measure(
         f"baseline: {{nights: {BASELINE}}}\nset: {{{options}}}\n"
     )
     computing_s("nightly", cell)
+    shutil.copytree(folder / "nightly", folder / "before")
     given = [part for key, value in OPTIONS.items() for part in ("--set", f"{key}={value}")]
     for index in range(BASELINE):
         given += ["--baseline", folder / "logs" / "r1" / cell_logs.night(index)]
-    found: dict[str, list[tuple[float, float]]] = {"healthy": [], "faulty": []}
-    for turn in range(rounds):
-        for kind, pairs in found.items():
-            index = BASELINE + 1 + 2 * turn + (kind == "faulty")
+    found: dict[str, list[tuple[float, float]]] = {kind: [] for kind in KINDS}
+    index = BASELINE + 1
+    for _ in range(rounds):
+        shutil.rmtree(folder / "nightly")
+        shutil.copytree(folder / "before", folder / "nightly")
+        for kind in KINDS:
             night = cell_logs.night(index)
             target = folder / "logs" / "r1" / night
-            record(target / "run.parquet", index, kind == "faulty")
+            record(target / "run.parquet", index, kind != "healthy")
             nightly = computing_s("nightly", cell, "--night", night)
             out = folder / "diagnosed" / night
             diagnosed = computing_s("diagnose", *given, "--target", target, "--out", out)
-            pairs.append((nightly, diagnosed))
+            found[kind].append((nightly, diagnosed))
+            index += 1
     return found
 
 
