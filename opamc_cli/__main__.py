@@ -7,7 +7,6 @@ the first millisecond ends as one in the last.
 if __name__ == "__main__":
     import opamc_cli.entry  # noqa: F401 - takes SIGINT in hand
 
-import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -18,8 +17,6 @@ from opamc_cli.stages.processes.interruption import interruptible
 
 MOST_DIGITS = 11
 """Of seconds since 1970: to the year 5138."""
-OBJECTS_BETWEEN_LOOKS = 20_000
-"""Made and not yet gone; garbage is what refers to itself, such as a figure."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -87,9 +84,6 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
-    # of what libraries make as they are loaded nothing is garbage: to look for it every 700 objects
-    # is a twentieth of a short command
-    gc.set_threshold(OBJECTS_BETWEEN_LOOKS, 20, 100)
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:

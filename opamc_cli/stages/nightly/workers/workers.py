@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from opamc_cli.errors import OpamcError
+from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
 from opamc_cli.stages.processes.interruption import SIGNALS
 from opamc_cli.stages.processes.parallel import die_with, one_thread_each
 from opamc_cli.storage.files.parquet import forgo_pandas
@@ -226,6 +227,7 @@ def _serve(pipe: Connection, name: str, memory: int | None, parent: int, forked:
         _let_go(pipe)
     die_with(parent)
     _take_signals()
+    look_for_garbage_seldom()
     function = called(name)
     forgo_pandas()
     if memory is not None:
