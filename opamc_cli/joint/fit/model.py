@@ -40,6 +40,11 @@ class Term:
         columns = self.effect.columns(track, self.parameters)
         return columns if self.keep is None else columns[:, self.keep]
 
+    def columns_at(self, track: Track, rows: NDArray[np.int64]) -> Floats:
+        """Likewise at some samples, shape (rows, m)."""
+        columns = self.effect.columns_at(track, self.parameters, rows)
+        return columns if self.keep is None else columns[:, self.keep]
+
     def averaged(self, fine: Track, coarse: Track, factor: int) -> Floats:
         """Regressors on a coarse track; fast ones are averaged, not resampled."""
         if not self.effect.fast:
@@ -140,9 +145,11 @@ class Dataset:
         current = (self.fine if fine else self.coarse).track.current_a
         return self.cache.sums(blocks, current, parts, fine)
 
-    def computed(self, term: Term, fine: bool) -> Floats:
-        """Regressors of a guess, which nobody will ask for again."""
-        return self._columns(term, fine or self.coarse is self.fine)
+    def computed(self, term: Term, fine: bool, rows: NDArray[np.int64]) -> Floats:
+        """Regressors of a guess at some samples; nobody will ask for them again."""
+        if term.effect.fast and not fine and self.coarse is not self.fine:
+            return self._columns(term, fine)[rows]
+        return term.columns_at(self.grid_of(fine).track, rows)
 
     def grid_of(self, fine: bool) -> Grid:
         """Return the fine or the coarse grid."""

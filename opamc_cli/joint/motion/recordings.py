@@ -11,8 +11,8 @@ from opamc_cli.joint.motion.track import Joint, Track
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
 SHORTEST_PATH = 3.0
-ENOUGH_SAMPLES = 200_000
-"""Of a logged motion, by which the way to differentiate is chosen: all of 100 s at 2 kHz."""
+ENOUGH_SAMPLES = 100_000
+"""Of a logged motion, by which the way to differentiate is chosen: all of 50 s at 2 kHz."""
 
 
 def grouped_track(
