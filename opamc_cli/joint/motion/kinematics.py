@@ -20,7 +20,6 @@ from opamc_cli.joint.motion.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
-    quiet_block,
     smoothing_window,
     taken_noise_gain,
     unstepped,
@@ -124,8 +123,6 @@ class Motion:
     """Standard deviation of the speed's noise."""
     kernel: Floats
     """Moving average that the acceleration has gone through."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
     None."""
@@ -173,8 +170,9 @@ def motion_from_position(
     -------
     Motion
     """
-    window = smoothing_window(position_rad, rate_hz, derivative=2)
-    if smoothing is not None:
+    if smoothing is None:
+        window = smoothing_window(position_rad, rate_hz, derivative=2)
+    else:
         window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
     beside = smoothing is None or smoothing.blurred
     motion = _smoothed(position_rad, rate_hz, window, 2, beside)
@@ -202,16 +200,14 @@ def _smoothed(
 ) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
-    velocity, acceleration = values[-2:]
-    noise, spread = measurement_noise(path), float(np.std(acceleration))
+    noise = measurement_noise(path)
     return Motion(
         position_rad=values[0],
-        velocity=velocity,
-        acceleration=acceleration,
+        velocity=values[-2],
+        acceleration=values[-1],
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        quiet=quiet_block(noise, spread, rate_hz, window, derivative),
         blur=blurred(path, rate_hz, window, derivative) if beside else None,
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
@@ -344,7 +340,6 @@ def build_track(
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
-        quiet=max(piece.quiet for piece in pieces),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
@@ -469,7 +464,6 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,
-        quiet=motion.quiet,
         blur=motion.blur,
     )
 
