@@ -7,6 +7,7 @@ the first millisecond ends as one in the last.
 if __name__ == "__main__":
     import opamc_cli.entry  # noqa: F401 - takes SIGINT in hand
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -17,6 +18,8 @@ from opamc_cli.stages.processes.interruption import interruptible
 
 MOST_DIGITS = 11
 """Of seconds since 1970: to the year 5138."""
+OBJECTS_BETWEEN_LOOKS = 50_000
+"""For garbage in circles; 700 are an interpreter's own."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -84,6 +87,8 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
+    # What libraries make as they are imported is no garbage: half a second of looking for some.
+    gc.set_threshold(OBJECTS_BETWEEN_LOOKS)
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:
