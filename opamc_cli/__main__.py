@@ -7,19 +7,17 @@ the first millisecond ends as one in the last.
 if __name__ == "__main__":
     import opamc_cli.entry  # noqa: F401 - takes SIGINT in hand
 
-import gc
 import os
 import sys
 from collections.abc import Sequence
 
 from opamc_cli.commands.terminal.streams import complain, finish, open_streams, say
 from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
+from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
 from opamc_cli.stages.processes.interruption import interruptible
 
 MOST_DIGITS = 11
 """Of seconds since 1970: to the year 5138."""
-OBJECTS_BETWEEN_LOOKS = 50_000
-"""For garbage in circles; 700 are an interpreter's own."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -87,8 +85,7 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
-    # What libraries make as they are imported is no garbage: half a second of looking for some.
-    gc.set_threshold(OBJECTS_BETWEEN_LOOKS)
+    look_for_garbage_seldom()
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:

@@ -78,10 +78,8 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Judge every robot's nights that are new; print the robots that need a look."""
-    from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
     from opamc_cli.stages.processes.parallel import one_thread_each
 
-    look_for_garbage_seldom()
     # numpy with threads of its own could not be copied into the workers
     with one_thread_each():
         from opamc_cli.stages.nightly import run as stage
