@@ -253,7 +253,8 @@ class Trial:
 
 def _is_worker(pid: int) -> bool:
     try:
-        return b"spawn_main" in (Path("/proc") / str(pid) / "cmdline").read_bytes()
+        # what multiprocessing starts beside the workers, where they are not forked
+        return b"resource_tracker" not in (Path("/proc") / str(pid) / "cmdline").read_bytes()
     except OSError:
         return False
 

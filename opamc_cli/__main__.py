@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 from opamc_cli.commands.terminal.streams import complain, finish, open_streams, say
 from opamc_cli.errors import ExitCode, Interrupted, OpamcError, UsageError
+from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
 from opamc_cli.stages.processes.interruption import interruptible
 
 MOST_DIGITS = 11
@@ -84,6 +85,7 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
+    look_for_garbage_seldom()
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:

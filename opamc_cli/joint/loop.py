@@ -12,8 +12,8 @@ from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
-from opamc_cli.joint.name.search import Pool, Trial, Tried, beam, trials
-from opamc_cli.joint.name.settle import CLEARLY, EXACT, Named, settled, worth_their_price
+from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
+from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
@@ -145,7 +145,7 @@ def close_loop(
     final = worth_their_price(beam(best, unnamed, width=1))
     held, drop = (start.mean_square - one.mean_square for one in (final, explained))
     helped = any(term.effect.unnamed for term in final.terms)
-    clearly = explained.score < final.score - CLEARLY and (helped or held < EXACT * drop)
+    clearly = explained.score < final.score - LEAST_SHARE and (helped or held < EXACT * drop)
     if clearly and "unnamed" not in without_rules:
         # All the names together, and what was added to them, hold less than no names do, or hold
         # it no better with a function without a name beside them.

@@ -148,7 +148,8 @@ def _diagnose(
     )
     unjudged = agreement.unjudged(normal.motions, other.motions)
     progress("score")
-    sides = Sides(read_side(normal.patterns), read_side(other.patterns), config.score.day_starts_at)
+    starts_at = config.score.day_starts_at
+    sides = Sides(read_side(normal.patterns), read_side(other.patterns), starts_at, kept)
     if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
         refuse_all(unjudged.axes)
     scored = score.compare_sides(sides, config, out, models=models)
@@ -164,7 +165,7 @@ def _diagnose(
             times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
             try:
                 found = cause.explain(
-                    axis, sides.baseline.sources, sides.target.sources, config.joint, times
+                    axis, sides.baseline.sources, sides.target.sources, config.joint, times, kept
                 )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings

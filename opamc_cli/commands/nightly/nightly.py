@@ -78,12 +78,18 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Judge every robot's nights that are new; print the robots that need a look."""
+    from opamc_cli.stages.processes.parallel import one_thread_each
+
+    # numpy with threads of its own could not be copied into the workers
+    with one_thread_each():
+        from opamc_cli.stages.nightly import run as stage
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly import run as stage
     from opamc_cli.stages.nightly.morning import silent, tell
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.schemas import files
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     loaded = load_cell(cell)
     wanted = stage.Wanted(as_night(night), as_night(since), tuple(robot) if robot else None)

@@ -42,7 +42,9 @@ def diagnose(
     from opamc_cli.stages import diagnose as stage
     from opamc_cli.stages.chain.compared import discriminants
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     effective = load_config(config, overrides or ())
     with output_lock(out), output.steps() as progress:

@@ -10,7 +10,7 @@ from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Reading
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
 from opamc_cli.joint.change.slow import Population, learn
-from opamc_cli.joint.change.units import Unit, followed, read_side, usable_terms
+from opamc_cli.joint.change.units import Follow, Unit, follow, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.motion.kinematics import Recording
@@ -108,6 +108,7 @@ def explain_change(
     joint: Joint,
     declared: tuple[str, ...] = DECLARED,
     library: Library | None = None,
+    follow: Follow = follow,
 ) -> Change:
     """Trace what changed between a baseline and a target of one joint.
 
@@ -127,6 +128,8 @@ def explain_change(
         Effects of the joint's model; those that the recordings cannot show are left out.
     library : Library, optional
         Effects that may be causes; the built-in ones by default.
+    follow : callable
+        How the baseline's recordings are followed: `units.follow`, or what remembers its results.
 
     Returns
     -------
@@ -134,7 +137,7 @@ def explain_change(
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS
-    before = read_side(baseline, joint, after=False, cycles=cycles)
+    before = read_side(baseline, joint, after=False, cycles=cycles, follow=follow)
     after = read_side(target, joint, after=True, cycles=cycles)
     if not before or not after:
         side = "target" if before else "baseline"

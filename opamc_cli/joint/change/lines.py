@@ -90,14 +90,6 @@ def clocked(unit: Unit) -> Unit:
     return replace(unit, fine=fine)
 
 
-def turned_back(unit: Unit, residual: Floats) -> tuple[Floats, Floats] | None:
-    """Residual in the frame of the phases, where what one of them picks up stands still."""
-    field = unit.fine.electrical_rad
-    if field is None or "phases" not in unit.fine.channels:
-        return None
-    return residual * np.cos(field), residual * np.sin(field)
-
-
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     """Half-open stretches of motion in one direction long enough to count orders."""
     side = np.where(rows, track.direction, 0.0)

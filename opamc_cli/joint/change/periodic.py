@@ -9,11 +9,11 @@ from opamc_cli.joint.change.lines import (
     clocked,
     grown_lines,
     order_spectra,
-    turned_back,
 )
 from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
 from opamc_cli.joint.change.units import Unit
 from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.spectra import standing_views
 
 STANDING = 0.7
 """A ripple that is turned back to the phases' frame keeps half of its line there at most; what one
@@ -101,6 +101,6 @@ def _standing_spectra(timed: list[Unit], sides: list[list[Floats]]) -> OrderSpec
 
 def _quadratures(units: list[Unit], residuals: list[Floats]) -> list[list[Floats]]:
     """Residuals along both axes of the phases' frame; none where no phases were logged."""
-    sides = [turned_back(unit, residual) for unit, residual in zip(units, residuals, strict=True)]
-    turned = [side for side in sides if side is not None]
+    views = [standing_views(unit.fine, one) for unit, one in zip(units, residuals, strict=True)]
+    turned = [signals for view in views for turning, signals in view if turning]
     return [list(side) for side in zip(*turned, strict=True)] if len(turned) == len(units) else []

@@ -108,8 +108,7 @@ def find_slow_causes(
         cause = _next(ready, population, before, candidates, library)
         if cause is None:
             break
-        needed = _still_needed(ready, population, found, cause, len(candidates))
-        found = _in_turn(ready, population, [*needed, cause])
+        found.append(cause)
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         if cause.effect == "thermal_viscous":
             gone |= GREASE
@@ -128,25 +127,6 @@ def _one_grease(
     rest = [cause for cause in found if cause not in (*grease, *dry)]
     joint = _in_turn(ready, population, [*grease, *dry, *rest])
     return [replace(joint[0], shift=joint[1].shift), *joint[2:]]
-
-
-def _still_needed(
-    ready: list[Prepared],
-    population: Population,
-    found: list[SlowCause],
-    latest: SlowCause,
-    guesses: int,
-) -> list[SlowCause]:
-    """Drop causes that the latest one has made superfluous."""
-    kept = list(found)
-    for cause in found:
-        others = [other for other in kept if other is not cause]
-        beside = tuple(other.shift.terms[-1] for other in (*others, latest))
-        again = shifts(ready, population, beside, [cause.shift.terms[-1]])
-        part = EXPECTED.get(cause.shift.terms[-1].effect.name, UNEXPECTED / guesses)
-        if not again or again[0].p_value / part > LARGEST_P:
-            kept = others
-    return kept
 
 
 def _in_turn(

@@ -1,5 +1,6 @@
 """What is compared as a whole: a recording session, or a cycle where there are too few of those."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
@@ -8,6 +9,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import Term, currents
 from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import (
@@ -71,7 +73,19 @@ class Unit:
         return replace(self, fine=fine, coarse=self.coarse.with_model(load, model, terms))
 
 
-def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bool) -> list[Unit]:
+Tracked = tuple[Track, Grouping]
+Follow = Callable[[Recording, Joint], Tracked | None]
+
+
+def follow(recording: Recording, joint: Joint) -> Tracked | None:
+    """Lay one recording on its grid; None where the joint hardly moves."""
+    track, grouping = grouped_track([replace(recording, started_s=None)], joint)
+    return None if grouping is None or not is_moving(track) else (track, grouping)
+
+
+def read_side(
+    recordings: list[Recording], joint: Joint, after: bool, cycles: bool, follow: Follow = follow
+) -> list[Unit]:
     """Turn the recordings of one side into units.
 
     Parameters
@@ -84,6 +98,8 @@ def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bo
         True for the target.
     cycles : bool
         Whether cycles (or blocks) are the units, and not recordings.
+    follow : callable
+        `follow`, or what remembers its results.
 
     Returns
     -------
@@ -92,9 +108,10 @@ def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bo
     """
     units = []
     for recording in recordings:
-        track, grouping = grouped_track([replace(recording, started_s=None)], joint)
-        if grouping is None or not is_moving(track):
+        tracked = follow(recording, joint)
+        if tracked is None:
             continue
+        track, grouping = tracked
         if "logged" not in track.channels:
             # Phases give no zero of the joint angle; the same program has the same middle.
             at = track.position_rad[track.moving]
@@ -103,7 +120,7 @@ def read_side(recordings: list[Recording], joint: Joint, after: bool, cycles: bo
         group = grouping.group if cycles else np.where(grouping.group >= 0, 0, -1)
         fine = replace(track, group=group)
         width = 1.0 / float(np.sum(fine.kernel**2))
-        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), fine.quiet, 1)
+        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), 1)
         coarse = coarsen(fine, factor)
         members = _cycles(fine, grouping.names) if cycles else [fine.group >= 0]
         for member in members:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 Parameters = dict[str, float]
 
@@ -122,6 +122,11 @@ class Effect:
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Regressors, shape (n, m), for given non-linear parameters."""
         raise NotImplementedError
+
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
+        """Regressors at some samples, shape (rows, m)."""
+        columns: Floats = self.columns(track, parameters)[rows]
+        return columns
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.second_order import answers
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 from opamc_cli.joint.spectra import highest_order, order_lines, order_resolution
 
 SWITCHES = ("speed", "direction", "load", "current")
@@ -95,26 +95,32 @@ class Ripple(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Pairs of cosine and sine; those that follow the model come last."""
+        return self.columns_at(track, parameters, np.arange(track.size))
+
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
+        """Likewise: of a hundred columns nothing is written that nobody looks at."""
         angle = parameters["order"] * track.machine_angle_rad
-        waves = [np.cos(angle), np.sin(angle)]
-        scale = np.abs(track.velocity) / track.speed_scale - 0.5
+        turning = [np.cos(angle), np.sin(angle)]
+        waves = [wave[rows] for wave in turning]
+        scale = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
-        following = _following_model(waves, track, parameters)
+        following = _following_model(waves, track.model_a[rows], parameters)
         answering = _answering(track, parameters)
         turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
         plain = 2 + len(swelling)
         last = plain + 4 * len(answering)
         # A hundred columns: each is written once, where it stays.
-        columns = np.empty((last + turned + len(following), track.size))
+        columns = np.empty((last + turned + len(following), rows.size))
         for row, column in zip(columns, (*waves, *swelling), strict=False):
             row[:] = column
         for k, w in enumerate(answering):
             out = columns[plain + 4 * k : plain + 4 * k + 4]
-            answers(waves, w, DAMPING, track.rate_hz, track.bounds, out)
+            answers(turning, w, DAMPING, track.rate_hz, track.bounds, rows, out)
+        direction = track.direction[rows]
         for row, column in zip(
             columns[last : last + turned], (*waves, *columns[plain:last]), strict=False
         ):
-            np.multiply(track.direction, column, out=row)
+            np.multiply(direction, column, out=row)
         columns[last + turned :] = following or 0.0
         return columns.T
 
@@ -167,8 +173,8 @@ def _filters(top_hz: float, density: float) -> int:
     return 1 + max(int(density * octaves), 0)
 
 
-def _following_model(waves: list[Floats], track: Track, parameters: Parameters) -> list[Floats]:
-    sizes = {"load": np.sign(track.model_a), "current": track.model_a}
+def _following_model(waves: list[Floats], model_a: Floats, parameters: Parameters) -> list[Floats]:
+    sizes = {"load": np.sign(model_a), "current": model_a}
     return [size * wave for name, size in sizes.items() if parameters.get(name) for wave in waves]
 
 

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Floats, Ints
 
 Quadratic = tuple[float, float, float]
 
@@ -17,6 +16,7 @@ def answers(
     damping: float,
     rate_hz: float,
     bounds: tuple[tuple[int, int], ...],
+    rows: Ints | None = None,
     out: Floats | None = None,
 ) -> Floats:
     """Put signals through the low-pass and the band-pass of one resonance.
@@ -31,31 +31,40 @@ def answers(
         Sampling rate.
     bounds : tuple of (int, int)
         Half-open recordings.
-    out : array of shape (2 k, n), optional
+    rows : int array of shape (m,), optional
+        Samples that somebody looks at; else all n of them.
+    out : array of shape (2 k, m), optional
         Where to write.
 
     Returns
     -------
-    array of shape (2 k, n)
+    array of shape (2 k, m)
         All k signals through the low-pass, of gain 1 at rest; then through the band-pass, the
         low-pass's rate of change in units of the resonance.
     """
     # The bilinear transform bends frequencies; start from the bent one.
     w = 2 * rate_hz * np.tan(rad_per_s / (2 * rate_hz))
     zeros, poles = discrete((0.0, 0.0, w * w), (1.0, 2 * damping * w, w * w), rate_hz)
-    found = np.empty((2 * len(signals), signals[0].size)) if out is None else out
+    size = signals[0].size
+    places = np.arange(size)
+    if rows is not None:
+        places[:] = -1
+        places[rows] = np.arange(rows.size)
+    count = size if rows is None else rows.size
+    found = np.empty((2 * len(signals), count)) if out is None else out
     for signal, low, band in zip(signals, found, found[len(signals) :], strict=False):
-        _put_through(signal, np.array(bounds), poles, zeros[0], 2 * rate_hz / w, low, band)
+        _put_through(signal, np.array(bounds), poles, zeros[0], 2 * rate_hz / w, places, low, band)
     return found
 
 
 @njit(cache=True)
 def _put_through(
     signal: Floats,
-    bounds: NDArray[np.int64],
+    bounds: Ints,
     poles: Floats,
     gain: float,
     steeper: float,
+    places: Ints,
     low: Floats,
     band: Floats,
 ) -> None:
@@ -64,8 +73,10 @@ def _put_through(
         for n in range(start, stop):
             # Both have these poles; their zeros are (1 + 1/z)^2 and 1 - 1/z^2.
             poled = gain * signal[n] - poles[1] * last - poles[2] * before
-            low[n] = poled + 2.0 * last + before
-            band[n] = steeper * (poled - before)
+            place = places[n]
+            if place >= 0:
+                low[place] = poled + 2.0 * last + before
+                band[place] = steeper * (poled - before)
             before = last
             last = poled
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines, order_resolution
 
 LOWEST_HZ = 1.0
@@ -36,9 +36,13 @@ class AngleLine(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Cosine and sine, times one, speed, direction and the model's current."""
-        angle = parameters["order"] * track.machine_angle_rad
-        speed = np.abs(track.velocity) / track.speed_scale - 0.5
-        parts = (np.ones(track.size), speed, track.direction, track.model_a)
+        return self.columns_at(track, parameters, np.arange(track.size))
+
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
+        """Likewise."""
+        angle = parameters["order"] * track.machine_angle_rad[rows]
+        speed = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
+        parts = (np.ones(rows.size), speed, track.direction[rows], track.model_a[rows])
         waves = (np.cos(angle), np.sin(angle))
         return stack(*(part * wave for part in parts for wave in waves))
 

@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, block_mean
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""
@@ -56,9 +56,13 @@ class Smooth(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Cosines of the stretched covariate times each modifier."""
-        place = np.pi * stretched(self._covariate(track), track.moving)
+        return self.columns_at(track, parameters, np.arange(track.size))
+
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
+        """Likewise."""
+        place = np.pi * stretched(self._covariate(track), track.moving, rows)
         waves = cosines(place, int(parameters["degree"]))[self._first :]
-        return stack(*(part * wave for part in self._modifier(track) for wave in waves))
+        return stack(*(part[rows] * wave for part in self._modifier(track) for wave in waves))
 
 
 class Response(Effect):
@@ -127,9 +131,9 @@ def cosines(angle: Floats, degree: int) -> list[Floats]:
     return waves
 
 
-def stretched(values: Floats, members: Bools) -> Floats:
-    """Put a covariate on 0..1, half-way between its value and its rank among some samples."""
-    known = values[members]
+def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) -> Floats:
+    """Put rows of a covariate on 0..1, half-way between the value and its rank among members."""
+    known, values = values[members], values[rows]
     if not known.size:
         return np.zeros_like(values)
     levels = np.quantile(known, np.linspace(0, 1, QUANTILES))

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.fit.parts import Parts, Sums, parts_of
@@ -14,7 +13,15 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
-from opamc_cli.joint.motion.track import Bools, Floats, Track, averaged_blocks, block_mean, coarsen
+from opamc_cli.joint.motion.track import (
+    Bools,
+    Floats,
+    Ints,
+    Track,
+    averaged_blocks,
+    block_mean,
+    coarsen,
+)
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 16_000
@@ -38,6 +45,11 @@ class Term:
     def columns(self, track: Track) -> Floats:
         """Regressors on the track's grid, shape (n, m)."""
         columns = self.effect.columns(track, self.parameters)
+        return columns if self.keep is None else columns[:, self.keep]
+
+    def columns_at(self, track: Track, rows: Ints) -> Floats:
+        """Likewise at some samples, shape (rows, m)."""
+        columns = self.effect.columns_at(track, self.parameters, rows)
         return columns if self.keep is None else columns[:, self.keep]
 
     def averaged(self, fine: Track, coarse: Track, factor: int) -> Floats:
@@ -71,7 +83,7 @@ class Grid:
     """Half-open ranges of the open groups among the `fit` samples."""
 
     @property
-    def rows(self) -> list[NDArray[np.int64]]:
+    def rows(self) -> list[Ints]:
         """Places of each open group's `fit` samples on the grid."""
         places = np.flatnonzero(self.fit)
         return [places[start:stop] for start, stop in self.slices]
@@ -118,31 +130,22 @@ class Dataset:
         return found
 
     def columns(self, term: Term, fine: bool) -> Floats:
-        """Regressors of a term on one of the grids; fast ones are averaged, not resampled."""
-        fine = fine or self.coarse is self.fine
+        """Regressors of a term on one of the grids; fast ones have none on the coarse one."""
+        track = self.grid_of(fine).track
         if not term.is_constant:
-            return self._columns(term, fine)
-        return self.cache.columns((term.key, fine), lambda: self._columns(term, fine))
-
-    def _columns(self, term: Term, fine: bool) -> Floats:
-        track = self.fine.track
-        return term.columns(track) if fine else term.averaged(track, self.coarse.track, self.factor)
-
-    def sums(self, terms: "tuple[Term, ...]", fine: bool) -> Sums:
-        """Products of the terms' regressors with one another and the current, over each part."""
-        blocks = [self.columns(term, fine) for term in terms]
-        return self.sums_of(blocks, fine)
+            return term.columns(track)
+        return self.cache.columns((term.key, track is self.fine.track), lambda: term.columns(track))
 
     def sums_of(self, blocks: list[Floats], fine: bool) -> Sums:
-        """Likewise, of regressors that are at hand."""
+        """Products of regressors with one another and the current, over each part."""
         fine = fine or self.coarse is self.fine
         parts = self.parts[0 if fine else 1]
         current = (self.fine if fine else self.coarse).track.current_a
         return self.cache.sums(blocks, current, parts, fine)
 
-    def computed(self, term: Term, fine: bool) -> Floats:
-        """Regressors of a guess, which nobody will ask for again."""
-        return self._columns(term, fine or self.coarse is self.fine)
+    def computed(self, term: Term, fine: bool, rows: Ints) -> Floats:
+        """Regressors of a guess at some samples; nobody will ask for them again."""
+        return term.columns_at(self.grid_of(fine).track, rows)
 
     def grid_of(self, fine: bool) -> Grid:
         """Return the fine or the coarse grid."""

@@ -247,9 +247,9 @@ class Sums:
         if self.moment.shape[1] == 0:
             return self.power
         coefficients = self.coefficients[self.parts.unit]
-        linear = np.einsum("pi,pi->p", coefficients, self.moment)
-        quadratic = np.einsum("pi,pij,pj->p", coefficients, self.gram, coefficients, optimize=True)
-        error: Floats = np.maximum(self.power - 2 * linear + quadratic, 0.0)
+        predicted = (self.gram @ coefficients[..., None])[..., 0]
+        square = np.sum(coefficients * (predicted - 2 * self.moment), axis=-1)
+        error: Floats = np.maximum(self.power + square, 0.0)
         return error
 
 

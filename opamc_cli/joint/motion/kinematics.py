@@ -20,7 +20,6 @@ from opamc_cli.joint.motion.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
-    quiet_block,
     smoothing_window,
     taken_noise_gain,
     unstepped,
@@ -91,6 +90,8 @@ class Smoothing:
 
     window_s: float
     from_velocity: bool
+    blurred: bool = False
+    """Whether it is laid beside other windows: not while it competes with them."""
 
 
 def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
@@ -122,8 +123,6 @@ class Motion:
     """Standard deviation of the speed's noise."""
     kernel: Floats
     """Moving average that the acceleration has gone through."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
     None."""
@@ -171,17 +170,19 @@ def motion_from_position(
     -------
     Motion
     """
-    window = smoothing_window(position_rad, rate_hz, derivative=2)
-    if smoothing is not None:
+    if smoothing is None:
+        window = smoothing_window(position_rad, rate_hz, derivative=2)
+    else:
         window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
-    motion = _smoothed(position_rad, rate_hz, window, 2)
+    beside = smoothing is None or smoothing.blurred
+    motion = _smoothed(position_rad, rate_hz, window, 2, beside)
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         size = float(np.sqrt(np.mean(motion.velocity**2)))
         agrees = size > 0 and float(np.std(velocity_rad_s - motion.velocity)) < 0.1 * size
         own = window if asked else smoothing_window(velocity_rad_s, rate_hz, derivative=1)
         if agrees and (asked or own < window):
-            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1)
+            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1, beside)
             return replace(cleaner, position_rad=motion.position_rad)
     return motion
 
@@ -194,20 +195,20 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     return replace(motion, position_rad=np.concatenate([[0.0], np.cumsum(steps)]))
 
 
-def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Motion:
+def _smoothed(
+    path: Floats, rate_hz: float, window: int, derivative: int, beside: bool = True
+) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
-    velocity, acceleration = values[-2:]
-    noise, spread = measurement_noise(path), float(np.std(acceleration))
+    noise = measurement_noise(path)
     return Motion(
         position_rad=values[0],
-        velocity=velocity,
-        acceleration=acceleration,
+        velocity=values[-2],
+        acceleration=values[-1],
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        quiet=quiet_block(noise, spread, rate_hz, window, derivative),
-        blur=blurred(path, rate_hz, window, derivative),
+        blur=blurred(path, rate_hz, window, derivative) if beside else None,
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
 
@@ -339,7 +340,6 @@ def build_track(
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
-        quiet=max(piece.quiet for piece in pieces),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
@@ -464,7 +464,6 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,
-        quiet=motion.quiet,
         blur=motion.blur,
     )
 

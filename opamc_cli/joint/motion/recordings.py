@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.motion.groups import Grouping, cycle_length, group_samples
-from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
+from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, Track
 
 SHORTEST_TRAVEL_RAD = 1e-4
@@ -15,9 +15,7 @@ ENOUGH_SAMPLES = 200_000
 """Of a logged motion, by which the way to differentiate is chosen: all of 100 s at 2 kHz."""
 
 
-def grouped_track(
-    recordings: list[Recording], joint: Joint, smoothing: Smoothing | None = None
-) -> tuple[Track, Grouping | None]:
+def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
     """Lay recordings on one grid and split them into groups.
 
     Parameters
@@ -26,8 +24,6 @@ def grouped_track(
         In time order, all at one rate.
     joint : Joint
         Gear ratio and pole pairs, where known.
-    smoothing : Smoothing, optional
-        Another window than the noise of each path asks for.
 
     Returns
     -------
@@ -36,7 +32,7 @@ def grouped_track(
     grouping : Grouping or None
         None where too little moves to seal anything off.
     """
-    track = build_track(recordings, joint, smoothing)
+    track = build_track(recordings, joint)
     lengths = [
         cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
     ]

@@ -3,19 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import groupby
 
 import numpy as np
 
 from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import SINGULAR_BELOW, inverse
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Floats, Ints
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
 NARROW = 4
-"""Regressors of a guess up to which products are summed one by one, for all guesses at once."""
+"""Regressors of a guess up to which products are summed one by one, for all guesses at once; of a
+chain's terms, for all terms at once."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     current = parts.taken(dataset.grid_of(fine).track.current_a)[:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = parts.taken(dataset.computed(term, fine))
+        columns = dataset.computed(term, fine, parts.rows)
         alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
     for (width, _), members in alike.items():
@@ -123,6 +125,13 @@ class Beside:
             follows = not all(term.is_constant for term in chain.fit.terms)
             self.sums = dataset.sums_of(blocks, True) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
+        runs = [list(run) for _, run in groupby(self.blocks, lambda b: b.shape[1] <= NARROW)]
+        # Those of the declared model are a column each: a guess is gone through once for them all.
+        self.joined = [
+            block
+            for run in runs
+            for block in ([np.concatenate(run, axis=1)] if run[0].shape[1] <= NARROW else run)
+        ]
         current = dataset.grid_of(self.fine).track.current_a
         self.current = self.parts.taken(current)
         if self.fast_part is not None:
@@ -133,7 +142,7 @@ class Beside:
     def products(self, columns: Floats) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
-        return np.concatenate([none, *(self.parts.products(b, columns) for b in self.blocks)], 1)
+        return np.concatenate([none, *(self.parts.products(b, columns) for b in self.joined)], 1)
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
@@ -169,11 +178,9 @@ class Beside:
         sums = self.sums
         error = (
             sums.power[:, None]
-            - 2 * np.einsum("pki,pi->pk", beta, sums.moment)
-            - 2 * np.einsum("pki,pki->pk", gamma, moment)
-            + np.einsum("pki,pij,pkj->pk", beta, sums.gram, beta, optimize=True)
-            + 2 * np.einsum("pki,pkij,pkj->pk", beta, cross, gamma, optimize=True)
-            + np.einsum("pki,pkij,pkj->pk", gamma, own, gamma, optimize=True)
+            + np.sum(beta * (beta @ sums.gram - 2 * sums.moment[:, None]), axis=-1)
+            + np.sum(gamma * ((own @ gamma[..., None])[..., 0] - 2 * moment), axis=-1)
+            + 2 * np.sum(gamma * (beta[:, :, None] @ cross)[:, :, 0], axis=-1)
         )
         counts = self.parts.counts[self.counted]
         before = deviation_of(self.before[self.counted], counts).sum()
@@ -181,10 +188,10 @@ class Beside:
         gain: Floats = 1.0 - (after / max(before, 1e-300)) ** 2
         return gain
 
-    def refined_rows(self, values: Floats) -> Floats:
-        """Take every so-many-th of the parts' rows of an array on the grid, for `fitted_drop`."""
-        taken: Floats = values[self.parts.rows[:: self.step]]
-        return taken
+    @cached_property
+    def refined_rows(self) -> Ints:
+        """Every so-many-th of the parts' rows, for `fitted_drop`."""
+        return self.parts.rows[:: self.step]
 
     def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
         """Sum of squares that columns on the refined rows take away beside the chain, when fitted.

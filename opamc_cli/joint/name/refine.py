@@ -46,7 +46,7 @@ def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
 
     def lost(values: Floats) -> float:
         trial = Term(term.effect, outwards(np.atleast_1d(values)), term.keep)
-        columns = beside.refined_rows(dataset.computed(trial, beside.fine))
+        columns = dataset.computed(trial, beside.fine, beside.refined_rows)
         return -beside.fitted_drop(columns, whole=term.effect.whole)
 
     start = np.array(

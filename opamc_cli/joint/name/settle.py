@@ -4,12 +4,10 @@ from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import Chain, extended, without
-from opamc_cli.joint.name.search import Pool, Trial, Tried, objection, trials
+from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
 from opamc_cli.joint.name.ties import ties_of
 
-CLEARLY = 0.05
-"""Of the score: where an effect stands against a function without a name, less is no difference."""
 EXACT = 0.9
 """Share of its domain's curve from which on a form has the name, and of the ceiling from which on
 the loop is closed."""
@@ -135,15 +133,15 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
     """
     difference, error = paired(rival.deviation, best.deviation)
     if term.effect.fast:
-        return rival.score < best.score + CLEARLY and difference > -LEAST_T * error
-    if rival.score >= best.score - CLEARLY or difference <= LEAST_T * error:
+        return rival.score < best.score + LEAST_SHARE and difference > -LEAST_T * error
+    if rival.score >= best.score - LEAST_SHARE or difference <= LEAST_T * error:
         return False
     named, explained = (parent.mean_square - one.mean_square for one in (best, rival))
     if named >= EXACT * explained:
         return False
     # What follows slow noise is no better form of an effect.
     share, t_value = rival.gain_beside_drift(best)
-    return share > CLEARLY and t_value > LEAST_T
+    return share > LEAST_SHARE and t_value > LEAST_T
 
 
 def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:

@@ -34,6 +34,9 @@ DIGEST_BYTES = 32
 BEFORE_VERDICT = ("segment", "joint", "identify", "patterns")
 """Sections of the configuration that a recording's tables can depend on."""
 
+SAMPLES = "samples"
+"""Column of a table that holds an array."""
+
 UNKNOWN = object()
 """What `KeptResults.find` returns where nothing is kept; None may be a result."""
 
@@ -166,6 +169,9 @@ def _tree(value: object, tables: list[pa.Table]) -> Any:
     if isinstance(value, pa.Table):
         tables.append(value)
         return {"table": len(tables) - 1}
+    if isinstance(value, np.ndarray):
+        tables.append(pa.table({SAMPLES: value.ravel()}))
+        return {"array": [len(tables) - 1, *value.shape]}
     if isinstance(value, AxisSegments):
         values = [getattr(value, field.name) for field in fields(value)]
         return {"segments": [_tree(each, tables) for each in values]}
@@ -192,6 +198,10 @@ def _value(tree: Any, tables: list[pa.Table]) -> Any:
     ((kind, inner),) = tree.items()
     if kind == "table":
         return tables[inner]
+    if kind == "array":
+        number, *shape = inner
+        samples = tables[number][SAMPLES].combine_chunks().to_numpy(zero_copy_only=False)
+        return np.array(samples).reshape(shape)  # a copy can be written to, as what was kept
     if kind == "fields":
         return {name: _value(each, tables) for name, each in inner.items()}
     items = tuple(_value(each, tables) for each in inner)

@@ -17,10 +17,9 @@ from opamc_cli.decision.divergence.jensen_shannon import (
     divergences_from_pool,
     leave_cycle_out_divergences,
 )
-from opamc_cli.decision.witnesses.patterns import inflation_within_sessions
 from opamc_cli.errors import InputError
 from opamc_cli.stages.chain.compared.discriminants import LatentModels
-from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, common_keys, cycle_counts
+from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, common_keys
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import FEATURES, SCORES
@@ -93,7 +92,7 @@ def compare_sides(
         )
         raise InputError(msg)
     base = config.score.base
-    scores = score_table(own, other, base)
+    scores = score_table(sides, base)
     features = feature_table(scores, other, base, models)
     inputs = [table_input(sides.baseline.path), table_input(sides.target.path)]
     used = config.canonical("score")
@@ -127,15 +126,14 @@ def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
                 raise InputError(msg)
 
 
-def score_table(
-    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows], base: float
-) -> pa.Table:
+def score_table(sides: Sides, base: float) -> pa.Table:
     """Divergence of every segment from the baseline's pool.
 
     A baseline segment meets the pool without its own session, or without its own cycle where
     there is one session only; a target segment meets the whole pool. `chance` is what finite,
     overlapping patterns would show by themselves, `excess` the rest.
     """
+    baseline, target = sides.rows
     tables = [SCORES.empty_table()]
     for key in common_keys(baseline, target):
         own, other = baseline[key], target[key]
@@ -145,8 +143,7 @@ def score_table(
         n_own = own.counts.sum(axis=1)
         _, place = np.unique(label, return_inverse=True)
         n_rest = pool.sum() - np.bincount(place, n_own)[place]
-        cycles, session = cycle_counts(own)
-        inflation = inflation_within_sessions(cycles, session)
+        inflation = sides.inflations[key]
         tables.append(
             _score_rows(
                 "baseline",

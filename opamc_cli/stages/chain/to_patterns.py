@@ -3,12 +3,16 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain import identify, patterns, segment
-from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.chain.kept import UNKNOWN, KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
+from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.schemas import files
 
 FILES = (files.SEGMENTS, files.MOTIONS, *patterns.FILES)
@@ -77,33 +81,84 @@ def run_chain(
         paths, config, out, without=without, jobs=jobs, kept=kept, watch=progress("segment")
     )
     left_out = check(segmented)
+    segments = _Segments(segmented.path, config, tuple(sorted(left_out)))
+    # of a baseline all is kept at once as well: to put it together file by file takes ten times as
+    # long as to copy it
+    whole = kept if reference is None else None
+    found: Any = UNKNOWN if whole is None else whole.find(_identify_and_count, segments)
+    if found is UNKNOWN:
+        done = _identify_and_count(segments, out, reference, jobs, kept, progress)
+        if whole is not None and not done.errors:
+            whole.keep(_identify_and_count, segments, (_content(out), done.notes))
+    else:
+        tables, notes = found
+        _put_down(tables, out)
+        done = _Done((), notes)
+    names = dict.fromkeys(segmented.table.column("run").to_pylist())
+    return ChainOutcome(
+        segments=segmented.path,
+        motions=out / files.MOTIONS,
+        patterns=out / files.PATTERNS,
+        runs_done=tuple(names),
+        errors=(*segmented.errors, *done.errors),
+        notes=(*segmented.notes, *done.notes),
+    )
+
+
+@dataclass(frozen=True)
+class _Segments:
+    """All that motions and patterns of a baseline depend on."""
+
+    path: Path
+    config: Config
+    left_out: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True)
+class _Done:
+    """What `_identify_and_count` has to say beside its tables."""
+
+    errors: tuple[OpamcError, ...]
+    notes: tuple[str, ...]
+
+
+def _identify_and_count(
+    segments: _Segments,
+    out: Path,
+    reference: Path | None,
+    jobs: int,
+    kept: KeptResults | None,
+    progress: Steps,
+) -> _Done:
     identified = identify.run(
-        segmented.path,
-        config,
+        segments.path,
+        segments.config,
         out,
         reference=reference,
-        without=left_out,
+        without=segments.left_out,
         jobs=jobs,
         kept=kept,
         watch=progress("identify"),
     )
     counted = patterns.run(
-        identified.path, config, out, jobs=jobs, kept=kept, watch=progress("patterns")
+        identified.path, segments.config, out, jobs=jobs, kept=kept, watch=progress("patterns")
     )
-    names = dict.fromkeys(segmented.table.column("run").to_pylist())
-    return ChainOutcome(
-        segments=segmented.path,
-        motions=identified.path,
-        patterns=counted.path,
-        runs_done=tuple(names),
-        errors=(*segmented.errors, *identified.errors, *counted.errors),
-        notes=(
-            *segmented.notes,
-            *counted.notes,
-            *_unidentified(identified),
-            *identified.notes,
-        ),
+    return _Done(
+        (*identified.errors, *counted.errors),
+        (*counted.notes, *_unidentified(identified), *identified.notes),
     )
+
+
+def _content(out: Path) -> pa.Table:
+    """Return the tables that follow on the segments, byte by byte."""
+    names = FILES[1:]
+    return pa.table({"name": names, "content": [(out / name).read_bytes() for name in names]})
+
+
+def _put_down(tables: pa.Table, out: Path) -> None:
+    for row in tables.to_pylist():
+        with atomic_path(out / row["name"]) as path:
+            path.write_bytes(row["content"])
 
 
 def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:

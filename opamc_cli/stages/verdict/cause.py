@@ -12,6 +12,8 @@ from opamc_cli.joint.change.explain import Cause, Change, explain_change
 from opamc_cli.joint.effects.library import Library, built_in_library, load_user_effects
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.storage.sources import RunSource
@@ -39,6 +41,7 @@ def explain(
     target: Sequence[RunSource],
     config: JointConfig,
     moving: Mapping[str, tuple[int, int]] | None = None,
+    kept: KeptResults | None = None,
 ) -> dict[str, Any] | None:
     """Trace the change of one joint to an effect of the library.
 
@@ -52,6 +55,8 @@ def explain(
         Gear ratio and pole pairs, effects of the user's own, and how much is looked at.
     moving
         Samples between which the axis moves (half-open), by run: nothing else is looked at.
+    kept
+        Where the motion of the baseline's recordings may lie.
 
     Returns
     -------
@@ -74,7 +79,8 @@ def explain(
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
     library = library_of(config)
     with users_effects_named():
-        return _entry(explain_change(sides[0], sides[1], joint, library=library))
+        change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
+        return _entry(change)
 
 
 def library_of(config: JointConfig) -> Library:

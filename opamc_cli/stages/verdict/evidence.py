@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.decision.judge import Bundle
-from opamc_cli.decision.witnesses.patterns import Cell, inflation_within_sessions
+from opamc_cli.decision.witnesses.patterns import Cell
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, common_keys, cycle_counts
 from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.stages.chain.witnesses import WITNESSES
@@ -24,7 +24,7 @@ def bundles(sides: Sides) -> dict[int, Bundle]:
         Without cells where the two sides have nothing in common.
     """
     result = {}
-    for axis, cells in cells_by_axis(*sides.rows).items():
+    for axis, cells in cells_by_axis(sides).items():
         names = Names(session_names(axis, *sides.rows), sides.sessions)
         witnesses = {}
         for witness in WITNESSES:
@@ -39,9 +39,7 @@ def bundles(sides: Sides) -> dict[int, Bundle]:
     return result
 
 
-def cells_by_axis(
-    baseline: Mapping[Key, PatternRows], target: Mapping[Key, PatternRows]
-) -> dict[int, list[Cell]]:
+def cells_by_axis(sides: Sides) -> dict[int, list[Cell]]:
     """Pool the segments of each session, for every axis, motion and order.
 
     Sessions in which an axis does not move are none of that axis.
@@ -51,13 +49,13 @@ def cells_by_axis(
     dict of int to list of Cell
         Every axis of either side; an empty list where the two have nothing in common.
     """
+    baseline, target = sides.rows
     keys = common_keys(baseline, target)
     result: dict[int, list[Cell]] = {key[0]: [] for key in sorted({*baseline, *target})}
     for axis in result:
         own = [key for key in keys if key[0] == axis]
         names = session_names(axis, baseline, target)
         for key in own:
-            cycles, session = cycle_counts(baseline[key])
             result[axis].append(
                 Cell(
                     motion=key[1],
@@ -65,9 +63,9 @@ def cells_by_axis(
                     tau=key[3],
                     baseline=_by_session(baseline[key], names[0]),
                     target=_by_session(target[key], names[1]),
-                    cycles=cycles,
+                    cycles=sides.baseline_cycles[key][0],
                     target_cycles=cycle_counts(target[key])[0],
-                    inflation=inflation_within_sessions(cycles, session),
+                    inflation=sides.inflations[key],
                 )
             )
     return result

@@ -1,8 +1,10 @@
 """Parquet files that others may have written or damaged: whatever the reader makes of them."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -12,6 +14,32 @@ from opamc_cli.errors import InputError
 
 MOST_ROWS = 50_000_000
 """Of a stage table, which is read as a whole: years of nights have less."""
+
+
+class _Absent:
+    """A finder of modules for which pandas is not installed."""
+
+    def find_spec(self, name: str, path: object = None, target: object = None) -> None:
+        del path, target
+        if name == "pandas":
+            raise ModuleNotFoundError(name, name=name)
+
+
+def forgo_pandas() -> None:
+    """Have pyarrow make arrays without pandas, in a process that is ours.
+
+    Where pandas is installed, pyarrow loads it at its first array, to know a data frame if it sees
+    one; it takes as long as to judge a joint. It sees none here. It asks once, and who asks for a
+    data frame later (`to_pandas`) gets one.
+    """
+    if "pandas" in sys.modules:
+        return
+    absent: Any = _Absent()
+    sys.meta_path.insert(0, absent)
+    try:
+        pa.array([None])
+    finally:
+        sys.meta_path.remove(absent)
 
 
 @contextmanager

@@ -14,7 +14,6 @@ from opamc_cli.joint.change.lines import (
     grown_lines,
     order_spectra,
     strokes,
-    turned_back,
 )
 from opamc_cli.joint.change.slow import Shift
 from opamc_cli.joint.change.units import own_fit, read_side
@@ -195,18 +194,6 @@ def test_a_stroke_is_long_and_goes_one_way(units):
     few = np.zeros_like(unit.fine_rows)
     few[found[0][0] : found[0][0] + 49] = True
     assert strokes(unit.fine, few) == []
-
-
-def test_a_residual_is_turned_back_where_phases_were_logged(units):
-    residual = np.arange(units[0].fine.size, dtype=float)
-    assert turned_back(units[0], residual) is None
-    field = 0.3 * residual
-    fine = replace(units[0].fine, electrical_rad=field)
-    assert turned_back(replace(units[0], fine=fine), residual) is None
-    fine = replace(fine, channels=fine.channels | {"phases"})
-    along, across = turned_back(replace(units[0], fine=fine), residual)
-    np.testing.assert_allclose(along, residual * np.cos(field))
-    np.testing.assert_allclose(across, residual * np.sin(field))
 
 
 def test_a_fast_residual_is_the_own_fit_s_without_a_shift(units):

@@ -16,6 +16,7 @@ from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.effects.second_order import discrete
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
+from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, averaged, block_mean, coarsen
@@ -34,6 +35,17 @@ def test_regressors_are_finite_and_as_long_as_the_track(name):
         assert columns.shape[0] == track.size
         assert np.all(np.isfinite(columns))
         assert set(effect.limits(track)) <= set(guess)
+
+
+@pytest.mark.parametrize("name", [*VOCABULARY, *unnamed_library()])
+def test_regressors_at_some_samples_are_those_of_all(name):
+    _, track = track_of()
+    effect = {**unnamed_library(), **built_in_library()}[name]
+    waves = np.where(track.moving, np.cos(5 * track.machine_angle_rad), 0.0)
+    rows = np.random.default_rng(0).permutation(track.size)[:400]
+    for guess in effect.guesses(track, waves)[:3]:
+        some = effect.columns_at(track, guess, rows)
+        np.testing.assert_allclose(some, effect.columns(track, guess)[rows], rtol=1e-12)
 
 
 def test_a_place_is_sought_where_the_fitted_samples_have_been():

@@ -55,11 +55,11 @@ def slow_gain(chain, columns, fine):
     known = list(zip(chain.fit.terms, chain.fit.coefficients, strict=True))
     blocks = []
     for term, values in known:
-        block = dataset.columns(term, fine)
         if term.effect.fast and not fine:
-            current = current - block @ values
+            grids = dataset.fine.track, dataset.coarse.track
+            current = current - term.averaged(*grids, dataset.factor) @ values
         else:
-            blocks.append(block)
+            blocks.append(dataset.columns(term, fine))
     base = np.concatenate(blocks, axis=1)[parts.rows]
     both = np.concatenate([base, columns], axis=1)
     target = current[parts.rows]

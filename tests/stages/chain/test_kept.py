@@ -37,21 +37,35 @@ def test_an_added_run_costs_that_run_and_the_tables_are_the_same(kept_and_plain)
     before = files_of(kept)
     run_chain(RUNS, config, folder / "again", kept=kept)
     added = files_of(kept) - before
-    assert len(before) == 2 * 3 * 3  # two runs of three axes, three stages
-    assert len(added) == 3 * 3
+    # two runs of three axes, three stages; what follows on the segments as a whole
+    assert len(before) == 2 * 3 * 3 + 1
+    assert len(added) == 3 * 3 + 1
     assert tables(folder / "again") == tables(folder / "plain")
 
 
 def test_nothing_is_computed_twice(kept_and_plain, monkeypatch):
     folder, config, kept = kept_and_plain
-    run_chain(RUNS[:2], config, folder / "once", kept=kept)
+    once = run_chain(RUNS[:2], config, folder / "once", kept=kept)
+    plain = run_chain(RUNS[:2], config, folder / "neither")
 
     def fail(*_: object) -> None:
         pytest.fail("computed again")
 
     monkeypatch.setattr(KeptResults, "keep", fail)
-    run_chain(RUNS[:2], config, folder / "twice", kept=kept)
-    assert tables(folder / "twice") == tables(folder / "once")
+    twice = run_chain(RUNS[:2], config, folder / "twice", kept=kept)
+    assert tables(folder / "twice") == tables(folder / "once") == tables(folder / "neither")
+    assert twice.notes == once.notes == plain.notes
+    assert twice.runs_done == once.runs_done == plain.runs_done
+
+
+def test_who_is_left_out_makes_another_baseline(kept_and_plain, tmp_path):
+    _, config, kept = kept_and_plain
+    lacking = [("session-001", 2)]
+    for folder, where in (("kept", kept), ("plain", None)):
+        run_chain(RUNS[:2], config, tmp_path / folder, check=lambda _: lacking, kept=where)
+    assert tables(tmp_path / "kept") == tables(tmp_path / "plain")
+    whole = run_chain(RUNS[:2], config, tmp_path / "whole", kept=kept)
+    assert whole.motions.read_bytes() != (tmp_path / "kept" / "motions.parquet").read_bytes()
 
 
 def test_other_options_are_other_results(kept_and_plain, tmp_path):

@@ -243,8 +243,9 @@ def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc
     }
     opamc("nightly", cell, "--quiet")
     new = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()} - kept
-    # two axes of the one file, three stages; its channels, and what tells it from a copy
-    assert len(new) == 2 * 3 + 2
+    # two axes of the one file, three stages; its channels, and what tells it from a copy; of the
+    # whole baseline its tables, and how far its cycles scatter
+    assert len(new) == 2 * 3 + 2 + 2
 
     # what was judged stays judged when logs are cleared away
     shutil.rmtree(logs / "r1" / NIGHTS[3])
@@ -355,6 +356,70 @@ def test_workers_that_die_are_a_sentence(monkeypatch):
     slow = answers("behave", ["sleep", "fine"], seconds=4.0)
     assert slow["sleep"].kind == "time"
     assert slow["fine"] == "FINE"
+
+
+FORKING = """
+import json, sys
+import worker_jobs
+from opamc_cli.stages.nightly.workers.workers import can_fork, run_all
+
+worker_jobs.LOADED = True
+held = open(__file__)
+assert can_fork()
+found = {}
+for kinds, seconds, memory_gb in json.loads(sys.argv[1]):
+    answers = run_all(
+        "worker_jobs:behave", kinds, 2, seconds=seconds, memory_gb=memory_gb
+    )
+    found |= {job: answer if isinstance(answer, str) else answer.text for job, answer in answers}
+print(json.dumps(found))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux only")
+def test_workers_that_are_forked_hold_nothing_and_keep_the_limits(tmp_path):
+    script = tmp_path / "start.py"
+    script.write_text(FORKING)
+    rounds = [
+        (["loaded", "files", "die", "raise", "refuse", "fine"], 60.0, None),
+        (["eat"], 60.0, 0.2),
+        (["sleep", "nap"], 2.0, None),
+    ]
+    ended = subprocess.run(
+        [sys.executable, script, json.dumps(rounds)],
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent), "OPENBLAS_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert json.loads(ended.stdout) == {
+        "loaded": "True",
+        "files": "1",  # its pipe
+        "die": "its worker was ended by SIGKILL",
+        "raise": "a bug: ZeroDivisionError: division by zero",
+        "refuse": "the disk is full",
+        "fine": "FINE",
+        "eat": "needed more than 0.2 GB (limits.memory_gb)",
+        "sleep": "took longer than 2 s (limits.seconds)",
+        "nap": "NAP",
+    }
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux only")
+def test_a_start_loads_no_pandas_and_can_be_copied(cell):
+    asked = (
+        "import sys\n"
+        "def hear(event, _):\n"
+        "    if event == 'os.fork': print(event, 'pandas' in sys.modules)\n"
+        "sys.addaudithook(hear)\n"
+        "from opamc_cli.__main__ import main\n"
+        f"main(['nightly', {str(cell)!r}, '--robot', 'r1', '--night', {NIGHTS[3]!r}, '--quiet'])"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", asked], capture_output=True, text=True, check=False
+    )
+    assert ended.stdout.split() == ["os.fork", "False"], ended.stderr
 
 
 def test_what_follows_is_the_same_in_whatever_order_nights_come(cell, opamc):

@@ -3,8 +3,12 @@
 import os
 import signal
 import time
+from pathlib import Path
 
 from opamc_cli.errors import UsageError
+
+LOADED = False
+"""Set by a parent, of which a forked worker is a copy."""
 
 
 def behave(kind: str) -> str:
@@ -17,6 +21,10 @@ def behave(kind: str) -> str:
         raise UsageError(msg)
     if kind == "eat":
         return str(len(bytearray(1 << 30)))
+    if kind == "loaded":
+        return str(LOADED)
+    if kind == "files":
+        return str(sum(int(one.name) > 2 for one in Path("/proc/self/fd").iterdir()) - 1)
     if kind == "nap":
         time.sleep(0.2)
     if kind == "sleep":

@@ -5,9 +5,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+import numpy.typing as npt
 import pyarrow as pa
 
-from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, group_patterns
+from opamc_cli.decision.witnesses.patterns import inflation_within_sessions
+from opamc_cli.stages.chain.compared.pattern_rows import (
+    Key,
+    PatternRows,
+    cycle_counts,
+    group_patterns,
+)
+from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.recordings.sessions import Sessions, in_words, lie_in_folders, sessions_of
 from opamc_cli.storage.schemas.tables import PATTERNS
@@ -54,6 +63,15 @@ def read_side(patterns: Path) -> Side:
     )
 
 
+Cycles = tuple[npt.NDArray[np.float64], npt.NDArray[np.int64]]
+"""Counts of each cycle, and its session; see `cycle_counts`."""
+
+
+def _inflations(cycles: tuple[Cycles, ...]) -> tuple[float, ...]:
+    """Return how many times more the cycles of one session scatter than chance, key by key."""
+    return tuple(inflation_within_sessions(counts, session) for counts, session in cycles)
+
+
 @dataclass(frozen=True)
 class Sides:
     """Baseline and target, and how their recordings make sessions."""
@@ -63,6 +81,8 @@ class Sides:
     """With `baseline`: tables of either side."""
     day_starts_at_h: float = 12.0
     """Hour of the day, UTC, at which a night ends."""
+    kept: KeptResults | None = None
+    """Where what the baseline alone tells may lie."""
 
     @cached_property
     def sessions(self) -> tuple[Sessions, Sessions]:
@@ -82,6 +102,18 @@ class Sides:
             for side, sessions in zip((self.baseline, self.target), self.sessions, strict=True)
         )
         return own, other
+
+    @cached_property
+    def baseline_cycles(self) -> dict[Key, Cycles]:
+        """The baseline's segments pooled by cycle."""
+        return {key: cycle_counts(part) for key, part in self.rows[0].items()}
+
+    @cached_property
+    def inflations(self) -> dict[Key, float]:
+        """How many times more the baseline's cycles scatter than independent patterns would."""
+        cycles = self.baseline_cycles
+        found = remembered(_inflations, self.kept)(tuple(cycles.values()))
+        return dict(zip(cycles, found, strict=True))
 
     def notes(self) -> list[str]:
         """Say what is worth knowing about the sessions."""

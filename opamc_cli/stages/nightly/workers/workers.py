@@ -2,25 +2,30 @@
 
 `concurrent.futures` gives up the whole pool when one worker dies, and has no time limit for a task;
 that is why this is here. Workers live for many nights, since starting one takes longer than
-a short night; one that failed is replaced.
+a short night; one that failed is replaced. They are forked where nothing speaks against it: what
+the start has loaded they need as well, and to load it anew is a tenth of a single night.
 """
 
 import importlib
 import os
 import resource
 import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, get_context
 from multiprocessing.connection import Connection
-from multiprocessing.context import SpawnProcess
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from opamc_cli.errors import OpamcError
+from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
+from opamc_cli.stages.processes.interruption import SIGNALS
 from opamc_cli.stages.processes.parallel import die_with, one_thread_each
+from opamc_cli.storage.files.parquet import forgo_pandas
 
 Job = TypeVar("Job")
 
@@ -41,7 +46,7 @@ class Broken:
 
 @dataclass
 class _Worker(Generic[Job]):
-    process: SpawnProcess
+    process: BaseProcess
     pipe: Connection
     job: Job | None = None
     until: float = float("inf")
@@ -53,14 +58,19 @@ class _Pool(Generic[Job]):
         self._seconds = seconds
         self._memory = None if memory_gb is None else round(memory_gb * GIGABYTE)
         self._workers: list[_Worker[Job]] = []
-        self._context = get_context("spawn")
 
     def start(self) -> _Worker[Job]:
-        here, there = self._context.Pipe()
-        process = self._context.Process(
-            target=_serve, args=(there, self._function, self._memory, os.getpid()), daemon=True
-        )
-        process.start()
+        forked = can_fork()
+        context = get_context("fork") if forked else get_context("spawn")
+        here, there = context.Pipe()
+        arguments = (there, self._function, self._memory, os.getpid(), forked)
+        process: BaseProcess = context.Process(target=_serve, args=arguments, daemon=True)
+        # what ends this process must not unwind its copy
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, SIGNALS)
+        try:
+            process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
         there.close()
         worker: _Worker[Job] = _Worker(process, here)
         self._workers.append(worker)
@@ -166,12 +176,60 @@ def called(name: str) -> Callable[[Any], Any]:
     return found
 
 
-def _serve(pipe: Connection, name: str, memory: int | None, parent: int) -> None:
+FORKS_ITSELF = "jemalloc_bg_thd"
+"""Name of a thread of pyarrow's allocator, which sees to itself when a process is forked."""
+
+
+def can_fork() -> bool:
+    """Whether a copy of this process would work: threads are not copied, what they hold stays held.
+
+    Elsewhere than on Linux the system's own libraries do not survive it.
+    """
+    threads = Path("/proc/self/task")
+    if sys.platform != "linux" or not threads.is_dir():
+        return False
+    try:
+        names = [(one / "comm").read_text().strip() for one in threads.iterdir()]
+    except OSError:  # one has just ended: ask again another time
+        return False
+    return sum(name != FORKS_ITSELF for name in names) == 1
+
+
+def _let_go(pipe: Connection) -> None:
+    """Close what a copy has of its parent's files: the lock, the history, other workers' pipes.
+
+    The lock would be held for longer than by a parent that is killed.
+    """
+    own = {0, 1, 2, pipe.fileno()}
+    for one in [int(path.name) for path in Path("/proc/self/fd").iterdir()]:
+        if one not in own:
+            with suppress(OSError):  # the listing's own is closed
+                os.close(one)
+
+
+def _take_signals() -> None:
+    """End as any process does, whatever the parent does about its own signals.
+
+    An interrupt from the keyboard reaches the whole group: the parent answers it. What is ignored,
+    as after nohup, stays ignored.
+    """
+    for number in SIGNALS:
+        if number == signal.SIGINT:
+            signal.signal(number, signal.SIG_IGN)
+        elif signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+
+
+def _serve(pipe: Connection, name: str, memory: int | None, parent: int, forked: bool) -> None:
     """Answer jobs until the parent is gone."""
+    if forked:
+        _let_go(pipe)
     die_with(parent)
-    # an interrupt from the keyboard reaches the whole group: the parent answers it
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _take_signals()
+    look_for_garbage_seldom()
     function = called(name)
+    forgo_pandas()
     if memory is not None:
         _limit_memory(memory)
     while True:

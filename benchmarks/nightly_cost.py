@@ -1,0 +1,120 @@
+"""What a new night of one robot costs beside `opamc diagnose` of the same recordings.
+
+Both are whole processes begun cold, in seconds of computing (their workers' too); six baseline
+nights, which an earlier night has read, and one target night of one recording.
+
+    python benchmarks/nightly_cost.py --rounds 3
+"""
+
+import argparse
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+
+import cell_logs
+import numpy as np
+
+from opamc_cli.config.testbed import load_testbed
+from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.testbed.robot import simulate
+
+BASELINE = 6
+FAULTY_AXIS = 3
+KINDS = ("healthy", "first faulty", "next faulty")
+OPTIONS = {"joint.gear_ratio": 100, "joint.pole_pairs": 5}
+
+
+def record_short(path: Path, index: int, faulty: bool) -> None:
+    """Record six channels for 6 s, as in the demo."""
+    cell_logs.record(path, 500, index, severity=1.0 if faulty else 0.0)
+
+
+def record_long(path: Path, index: int, faulty: bool) -> None:
+    """Record eighteen channels for 104 s."""
+    config = load_testbed(cell_logs.ROOT / "configs" / "testbed.yaml")
+    damage = {FAULTY_AXIS: config.robot.damage} if faulty else {}
+    # the same robot on another day of its own
+    made = simulate(config.robot, config.program, seed=5, session=index, faults=damage)
+    columns = {
+        f"axis{number}_{phase}": np.ascontiguousarray(signals.phases_a[:, k])
+        for number, signals in made.axes.items()
+        for k, phase in enumerate("abc")
+    }
+    started = f"{cell_logs.night(index)}T22:00:00+00:00"
+    save_run(path, RunInfo(made.sampling_rate_hz, program="cycle", started_at=started), columns)
+
+
+def computing_s(*arguments: object) -> float:
+    """Run opamc and return the seconds that it and its workers computed."""
+    before = os.times()
+    command = [sys.executable, "-m", "opamc_cli", *map(str, arguments), "--jobs", "1", "--quiet"]
+    ended = subprocess.run(command, stdout=subprocess.DEVNULL, check=False)
+    assert ended.returncode in (0, 1), ended
+    after = os.times()
+    children = (after.children_user, after.children_system)
+    return sum(children) - before.children_user - before.children_system
+
+
+def measure(
+    folder: Path, record: Callable[[Path, int, bool], None], rounds: int
+) -> dict[str, list[tuple[float, float]]]:
+    """Return a night's and its diagnosis's seconds, by kind of night."""
+    for index in range(BASELINE + 1):
+        record(folder / "logs" / "r1" / cell_logs.night(index) / "run.parquet", index, False)
+    cell = folder / "cell.yaml"
+    options = ", ".join(f"{key}: {value}" for key, value in OPTIONS.items())
+    cell.write_text(
+        "runs: logs/{robot}/{night}/*.parquet\n"
+        f"baseline: {{nights: {BASELINE}}}\nset: {{{options}}}\n"
+    )
+    computing_s("nightly", cell)
+    shutil.copytree(folder / "nightly", folder / "before")
+    given = [part for key, value in OPTIONS.items() for part in ("--set", f"{key}={value}")]
+    for index in range(BASELINE):
+        given += ["--baseline", folder / "logs" / "r1" / cell_logs.night(index)]
+    found: dict[str, list[tuple[float, float]]] = {kind: [] for kind in KINDS}
+    index = BASELINE + 1
+    for _ in range(rounds):
+        shutil.rmtree(folder / "nightly")
+        shutil.copytree(folder / "before", folder / "nightly")
+        for kind in KINDS:
+            night = cell_logs.night(index)
+            target = folder / "logs" / "r1" / night
+            record(target / "run.parquet", index, kind != "healthy")
+            nightly = computing_s("nightly", cell, "--night", night)
+            out = folder / "diagnosed" / night
+            diagnosed = computing_s("diagnose", *given, "--target", target, "--out", out)
+            found[kind].append((nightly, diagnosed))
+            index += 1
+    return found
+
+
+def main() -> None:
+    """Print a line per length and state."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--long-only", action="store_true")
+    arguments = parser.parse_args()
+    lengths = {"6 channels, 6 s": record_short, "18 channels, 104 s": record_long}
+    if arguments.long_only:
+        del lengths["6 channels, 6 s"]
+    for name, record in lengths.items():
+        with tempfile.TemporaryDirectory() as folder:
+            found = measure(Path(folder), record, arguments.rounds)
+        for kind, pairs in found.items():
+            shares = [night / diagnosis for night, diagnosis in pairs]
+            night, diagnosis = (median(side) for side in zip(*pairs, strict=True))
+            print(
+                f"{name}, {kind}: {night:.1f} s beside {diagnosis:.1f} s; "
+                f"{min(shares):.0%} to {max(shares):.0%}, median {median(shares):.0%}",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main()
