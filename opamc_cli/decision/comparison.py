@@ -1,7 +1,7 @@
 """The joints of a diagnosis side by side: how improbable each one's distances are."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -52,6 +52,10 @@ with 0.35; what is found changes by less than that.
 MAD_EFFICIENCY = 0.37
 """Share of the values that a median absolute deviation is worth (Huber, 1981)."""
 
+LEAST_BY_RANK = 0.02
+"""Least p-value that being the first of all sessions gives, however far ahead: what lies below is
+the tails' to say."""
+
 LEAST_SCALE = 0.01
 """Distances that agree to a percent agree: none weighs infinitely."""
 
@@ -66,6 +70,16 @@ class Shift:
     """Standard deviation of a healthy session's log distance."""
     spread: Spread
     """Standard deviation of `log_ratio` if nothing has changed."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """How sessions are exchanged between baseline and target."""
+
+    permutations: int
+    """Most relabellings evaluated."""
+    seed: int
+    """Of the draw if there are more."""
 
 
 @dataclass(frozen=True)
@@ -113,32 +127,25 @@ def compare_sessions(
     exceeded by a healthy session its rank decides; with several targets whole sessions are
     exchanged.
     """
-    joints = {
-        axis: _Joint(kinds, *sessions[axis], permutations, seed) for axis, kinds in evidence.items()
-    }
+    joints = {axis: Joint(kinds, *sessions[axis]) for axis, kinds in evidence.items()}
     shifts: dict[Voice, dict[int, Shift]] = {}
     for voice in dict.fromkeys(voice for joint in joints.values() for voice in joint.voices):
         own = {axis: joint for axis, joint in joints.items() if voice in joint.voices}
         shifts[voice] = _shifts(own, voice)
-    scales = {
-        voice: _scale(
-            [j.distances[voice].each for j in joints.values() if voice in j.voices], joints, voice
-        )
-        for voice in shifts
-    }
+    scales = scales_of(joints.values())
+    exchange = Exchange(permutations, seed)
     found = {}
     for axis, joint in joints.items():
-        joint.scales = scales
         own_shifts = {voice: shifts[voice][axis] for voice in joint.voices}
         taken_off = {
             voice: common_log_ratio(shifts[voice], axis, largest=voice[1] == "score")
             for voice in joint.voices
         }
         tails = joint.tails(own_shifts, {})
-        p_value = joint.p_value(own_shifts, {})
+        p_value = joint.p_value(own_shifts, {}, scales, exchange)
         p_alone = p_value
         if any(taken_off.values()):
-            p_alone = max(p_value, joint.p_value(own_shifts, taken_off))
+            p_alone = max(p_value, joint.p_value(own_shifts, taken_off, scales, exchange))
         together = joint.together(own_shifts, {})
         common = together.log_ratio - joint.together(own_shifts, taken_off).log_ratio
         found[axis] = Compared(
@@ -185,20 +192,12 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     return max(0.0, plain, scaled * shifts[axis].spread.scale)
 
 
-class _Joint:
+class Joint:
     """One axis's voices, those that lack a session left out."""
 
-    def __init__(
-        self,
-        evidence: Mapping[str, Evidence],
-        n_baseline: int,
-        n_target: int,
-        permutations: int,
-        seed: int,
-    ) -> None:
+    def __init__(self, evidence: Mapping[str, Evidence], n_baseline: int, n_target: int) -> None:
         self.n_baseline, self.n_target = n_baseline, n_target
         self._evidence = evidence
-        self._permutations, self._seed = permutations, seed
         found = {
             name: session_distances(one, n_baseline, n_target) for name, one in evidence.items()
         }
@@ -224,7 +223,6 @@ class _Joint:
             None,
         )
         self._labelled: dict[Voice, FloatArray] | None = None
-        self.scales: Mapping[Voice, float] = {}
 
     def expected(self, voice: Voice) -> float:
         """Return the spread of healthy log distances that is expected of a voice."""
@@ -264,24 +262,26 @@ class _Joint:
         dof = min(shifts[voice].spread.dof for voice in self.voices)
         return Shift(ratio, unit, Spread(unit * share, dof))
 
-    def p_value(self, shifts: Mapping[Voice, Shift], taken_off: Mapping[Voice, float]) -> float:
+    def p_value(
+        self,
+        shifts: Mapping[Voice, Shift],
+        taken_off: Mapping[Voice, float],
+        scales: Mapping[Voice, float],
+        exchange: Exchange,
+    ) -> float:
         """Probability of such distances, after some of them is taken off; NaN if unknown."""
         if not self.voices:
             return math.nan
         tail = _combined(self.tails(shifts, taken_off))
         if self.n_target > 1:
-            return self._p_by_exchange(tail, taken_off)
-        places = self._places(taken_off)
+            return self._p_by_exchange(tail, taken_off, exchange)
+        places = self.places(scales, taken_off)
         above = int((places[:-1] >= places[-1]).sum())
-        step = 1 / len(places)
-        if not above:
-            return min(step, tail)
-        gaps = places[:-1] - np.median(places)
-        return spliced_p_value(
-            gaps, float(places[-1] - np.median(places)), Spread(1.0, BETWEEN_SESSIONS.dof), above
-        )
+        gaps, place = places[:-1] - np.median(places), float(places[-1] - np.median(places))
+        by_rank = spliced_p_value(gaps, place, Spread(1.0, BETWEEN_SESSIONS.dof), above)
+        return by_rank if above else min(max(by_rank, LEAST_BY_RANK), max(tail, 1e-300))
 
-    def _places(self, taken_off: Mapping[Voice, float]) -> FloatArray:
+    def places(self, scales: Mapping[Voice, float], taken_off: Mapping[Voice, float]) -> FloatArray:
         """Place every session, the target last, by all voices; nothing knows which one it is."""
         rows = []
         unusual = 0.0
@@ -292,12 +292,14 @@ class _Joint:
             each = self.distances[voice].each.copy()
             middle = np.median(each)
             each[-1] -= taken_off.get(voice, 0.0)
-            standard = (each - middle) / self.scales[voice]
+            standard = (each - middle) / scales[voice]
             rows.append(standard - unusual if voice[1] == "orthogonal" else standard)
         return soft_maximum(np.array(rows), self._weights)
 
-    def _p_by_exchange(self, tail: float, taken_off: Mapping[Voice, float]) -> float:
-        labels = relabellings(self.n_baseline, self.n_target, self._permutations, self._seed)
+    def _p_by_exchange(
+        self, tail: float, taken_off: Mapping[Voice, float], exchange: Exchange
+    ) -> float:
+        labels = relabellings(self.n_baseline, self.n_target, exchange.permutations, exchange.seed)
         if self._labelled is None:
             by_witness = {
                 name: labelled_distances(self._evidence[name], labels)
@@ -325,17 +327,25 @@ class _Joint:
         return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
 
 
-def _scale(each: Sequence[FloatArray], joints: Mapping[int, _Joint], voice: Voice) -> float:
+def scales_of(joints: Iterable[Joint]) -> dict[Voice, float]:
     """Spread of all sessions' log distances, the target's among them, the same for all joints.
 
     By median absolute deviation: taken from the baseline alone, or by squares, it would tell which
     session is the target's.
     """
-    deviations = [MAD_TO_SIGMA * float(np.median(np.abs(one - np.median(one)))) for one in each]
-    expected = next(j.expected(voice) for j in joints.values() if voice in j.voices)
-    dof = MAD_EFFICIENCY * sum(len(one) for one in each)
-    prior = Spread(expected, EXPECTED_DOF)
-    return moderated_spread(float(np.median(deviations)) ** 2, dof, prior).scale
+    each: dict[Voice, list[FloatArray]] = {}
+    expected: dict[Voice, float] = {}
+    for joint in joints:
+        for voice in joint.voices:
+            each.setdefault(voice, []).append(joint.distances[voice].each)
+            expected[voice] = joint.expected(voice)
+    scales = {}
+    for voice, own in each.items():
+        deviations = [np.median(np.abs(one - np.median(one))) for one in own]
+        dof = MAD_EFFICIENCY * sum(len(one) for one in own)
+        variance = (MAD_TO_SIGMA * float(np.median(deviations))) ** 2
+        scales[voice] = moderated_spread(variance, dof, Spread(expected[voice], EXPECTED_DOF)).scale
+    return scales
 
 
 def _combined(tails: Mapping[Voice, float]) -> float:
@@ -344,7 +354,7 @@ def _combined(tails: Mapping[Voice, float]) -> float:
     return harmonic_mean(list(tails.values()), [WEIGHTS[kind] for _, kind in tails])
 
 
-def _shifts(joints: Mapping[int, _Joint], voice: Voice) -> dict[int, Shift]:
+def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
     """Place the target of each joint by one voice."""
     distances = {axis: joint.distances[voice] for axis, joint in joints.items()}
     variances = {

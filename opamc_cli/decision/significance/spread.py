@@ -31,8 +31,11 @@ influences: in simulation 0.06 (counting noise alone) to 0.6 (one influence that
 Three degrees of freedom keep false alarms at 1 % up to twice this spread.
 """
 
+EXPECTED = Spread(BETWEEN_SESSIONS.scale, 1.0)
+"""The same where labellings speak for themselves: then it counts for one value only."""
 
-def moderated_spread(variance: float, dof: float, prior: Spread = BETWEEN_SESSIONS) -> Spread:
+
+def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> Spread:
     """Blend a variance from few values with what is known of such variances.
 
     Parameters

@@ -97,15 +97,17 @@ class PatternEvidence:
         """Return the square roots of the probabilities of each motion and order.
 
         Their squared difference is the Hellinger distance, to which the Jensen-Shannon divergence
-        is proportional where it is small; chance gives each of them the same variance.
+        is proportional where it is small; chance gives each of them the same variance, and a
+        quarter of a count takes the mean error of a root away (M. S. Bartlett, 1947).
         """
         blocks = []
         for cell in self.cells:
             counts = np.concatenate([cell.baseline, cell.target])
             total = counts.sum(axis=1)
-            pmf = counts / np.where(total > 0, total, np.nan)[:, np.newaxis]
+            independent = np.where(total > 0, total, np.nan)[:, np.newaxis] / cell.inflation
+            roots = np.sqrt((counts / cell.inflation + 0.25) / independent)
             within = np.full(counts.shape[1], cell.inflation / 4)
-            blocks.append(Block(np.sqrt(pmf), total, within, LEAST_VARIANCE))
+            blocks.append(Block(roots, total, within, LEAST_VARIANCE))
         return blocks
 
     def effect(self) -> float:
