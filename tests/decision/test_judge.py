@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from opamc_cli.decision.comparison import Shift, common_log_ratio
 from opamc_cli.decision.judge import (
     HEALTHY_SHIFT_SPREAD,
     Bundle,
     Policy,
+    Shift,
+    common_log_ratio,
     one_session_log_ratio,
     one_session_shift,
 )

@@ -30,21 +30,19 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def harmonic_mean(p_values: ArrayLike, weights: ArrayLike | None = None) -> float:
+def harmonic_mean(p_values: ArrayLike) -> float:
     """Combine p-values of one hypothesis that may depend on each other.
 
     Parameters
     ----------
     p_values : array_like, shape (N,)
         Without NaN.
-    weights : array_like, shape (N,), optional
-        Positive; all alike by default.
 
     Returns
     -------
     float
-        Between the least of them, if all agree, and that over its share of the weights
-        (Bonferroni), if one alone is small.
+        Between the least of them, if all agree, and N times that (Bonferroni), if one alone is
+        small.
 
     Notes
     -----
@@ -53,5 +51,4 @@ def harmonic_mean(p_values: ArrayLike, weights: ArrayLike | None = None) -> floa
     """
     # a tail too small for a floating point number is zero
     p = np.maximum(np.asarray(p_values, dtype=np.float64), np.finfo(np.float64).tiny)
-    w = np.ones_like(p) if weights is None else np.asarray(weights, dtype=np.float64)
-    return float(w.sum() / np.sum(w / p))
+    return float(p.size / np.sum(1 / p))

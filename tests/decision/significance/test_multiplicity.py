@@ -33,9 +33,3 @@ def test_two_witnesses_together_keep_the_level_and_lie_between_the_least_and_its
     assert (together <= 2 * least).all()
     assert np.mean(together <= 0.01) == pytest.approx(0.0103, abs=0.0012)
     assert harmonic_mean([0.0, 0.5]) < 1e-300
-
-
-def test_a_witness_of_less_weight_has_to_be_surer():
-    assert harmonic_mean([1e-6, 1.0], [1, 1]) == pytest.approx(2e-6)
-    assert harmonic_mean([1e-6, 1.0], [0.5, 1.5]) == pytest.approx(4e-6, rel=1e-4)
-    assert harmonic_mean([0.02, 0.02], [0.1, 3]) == pytest.approx(0.02)
