@@ -85,11 +85,9 @@ class Change:
 
     causes: tuple[Cause, ...]
     """Serious ones first, then by share; empty where healthy units show as much."""
-    excess_a: float
-    """Root of how much larger the mean square residual is in the target than in the baseline,
-    beyond the sessions' own differences."""
     explained_share: float
-    """Share of that excess which all causes explain together."""
+    """Share that all causes explain together of how much larger the mean square residual is in the
+    target than in the baseline, beyond the sessions' own differences."""
     harmless: bool
     """True where harmless causes explain at least half of the excess and no cause is serious."""
     units: tuple[int, int] = (0, 0)
@@ -141,14 +139,14 @@ def explain_change(
     after = read_side(target, joint, after=True, cycles=cycles)
     if not before or not after:
         side = "target" if before else "baseline"
-        return Change((), 0.0, 0.0, False, why_not=f"too little motion in the {side}")
+        return Change((), 0.0, False, why_not=f"too little motion in the {side}")
     terms = usable_terms(before + after, [effect_named(library, name) for name in declared])
     before, after = followed(before, after, terms)
     if len(before) < 2 or not after:
         why = "too few cycles or recordings whose torque axis can be followed"
-        return Change((), 0.0, 0.0, False, why_not=why)
+        return Change((), 0.0, False, why_not=why)
     if not any(unit.current_a().any() for unit in before):
-        return Change((), 0.0, 0.0, False, why_not="no current in the baseline")
+        return Change((), 0.0, False, why_not="no current in the baseline")
     population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
     units = [unit.with_model(terms, population.mean) for unit in before + after]
 
@@ -185,7 +183,6 @@ def explain_change(
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(
         causes=tuple(causes),
-        excess_a=float(np.sqrt(whole)) if causes else float(np.sqrt(energy.total)),
         explained_share=min(sum(cause.share for cause in causes), 1.0),
         harmless=harmless >= HARMLESS_SHARE and not serious,
         units=(len(before), len(after)),

@@ -29,7 +29,6 @@ SAMPLED = (
     "load_a",
     "model_a",
     "temperature_c",
-    "current_d_a",
     "electrical_rad",
     "open_samples",
     "blur",
@@ -90,10 +89,8 @@ class Track:
     """What was logged or follows from it: position, logged (motion beside the current), scale,
     temperature, phases, electrical."""
     temperature_c: Floats | None = None
-    current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
-    """With `temperature_c`, `current_d_a`: where known: temperature, current in the flux axis,
-    electrical angle; (n,) or None."""
+    """With `temperature_c`: where known; (n,) or None."""
     period_samples: int | None = None
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
