@@ -1,5 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -194,6 +195,16 @@ class Reference:
 
 class Regressors(Protocol):
     """What has regressors on every track: a fitted term."""
+
+    @property
+    def key(self) -> Hashable:
+        """What makes two of them the same."""
+        ...
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the regressors stay the same whatever the fitted model is."""
+        ...
 
     def columns(self, track: Track) -> Floats:
         """Regressors, shape (n, k)."""

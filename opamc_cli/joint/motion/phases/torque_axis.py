@@ -21,7 +21,7 @@ SLOWEST_SHARE = 0.05
 def torque_current(
     phases_a: Floats, electrical_rad: Floats, velocity: Floats, position_rad: Floats
 ) -> Floats:
-    """Current along the electrical angle.
+    """Take the current along the electrical angle.
 
     Parameters
     ----------
