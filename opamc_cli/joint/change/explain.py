@@ -17,6 +17,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
+"""The joint's model; what the recordings cannot show of it is left out."""
 
 FEWEST_SESSIONS = 3
 """Fewer baseline recordings say nothing of how sessions differ: their cycles stand for them."""
@@ -104,7 +105,6 @@ def explain_change(
     baseline: list[Recording],
     target: list[Recording],
     joint: Joint,
-    declared: tuple[str, ...] = DECLARED,
     library: Library | None = None,
     follow: Follow = follow,
 ) -> Change:
@@ -122,8 +122,6 @@ def explain_change(
         phases.
     joint : Joint
         Gear ratio and pole pairs, where known.
-    declared : tuple of str
-        Effects of the joint's model; those that the recordings cannot show are left out.
     library : Library, optional
         Effects that may be causes; the built-in ones by default.
     follow : callable
@@ -140,7 +138,7 @@ def explain_change(
     if not before or not after:
         side = "target" if before else "baseline"
         return Change((), 0.0, False, why_not=f"too little motion in the {side}")
-    terms = usable_terms(before + after, [effect_named(library, name) for name in declared])
+    terms = usable_terms(before + after, [effect_named(library, name) for name in DECLARED])
     before, after = followed(before, after, terms)
     if len(before) < 2 or not after:
         why = "too few cycles or recordings whose torque axis can be followed"
