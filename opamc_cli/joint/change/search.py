@@ -120,27 +120,16 @@ def _one_grease(
     ready: list[Prepared], population: Population, found: list[SlowCause]
 ) -> list[SlowCause]:
     """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
-    grease = [cause for cause in found if cause.effect == "thermal_viscous"]
-    dry = [cause for cause in found if cause.effect == "coulomb"]
-    if not grease or not dry or not _mostly_wet(*_relative(ready, population)):
+    names = [cause.effect for cause in found]
+    pair = {"thermal_viscous", "coulomb"}
+    if not pair <= set(names) or not _mostly_wet(*_relative(ready, population)):
         return found
-    rest = [cause for cause in found if cause not in (*grease, *dry)]
-    joint = _in_turn(ready, population, [*grease, *dry, *rest])
-    return [replace(joint[0], shift=joint[1].shift), *joint[2:]]
-
-
-def _in_turn(
-    ready: list[Prepared], population: Population, found: list[SlowCause]
-) -> list[SlowCause]:
-    """Fit each cause jointly with those before it, as they stand in the end."""
-    settled = []
-    terms: tuple[Term, ...] = ()
-    for cause in found:
-        last = cause.shift.terms[-1]
-        again = shifts(ready, population, terms, [last])
-        terms = (*terms, last)
-        settled.append(replace(cause, shift=again[0]) if again else cause)
-    return settled
+    first, last = sorted(names.index(name) for name in pair)
+    one = [*found]
+    one[first] = replace(found[names.index("thermal_viscous")], shift=found[first].shift)
+    # Each cause's shift holds those before it: what comes before the later one takes it over.
+    one[last - 1] = replace(one[last - 1], shift=found[last].shift)
+    return [*one[:last], *one[last + 1 :]]
 
 
 def _next(
