@@ -135,6 +135,11 @@ def test_cold_grease_that_stiffens_dry_friction_a_little_is_one_cause():
     assert names == [["viscous"], ["viscous", "payload_change", "coulomb"]]
 
 
+def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
+    """Beside what sessions differ by it was sublinear, dry and quadratic friction."""
+    assert causes_of(lambda q, v, a, t: 0.1 * np.cos(50 * q + 1)) == []
+
+
 def test_two_causes_are_fitted_together():
     found = causes_of(lambda q, v, a, t: payload(q, v, a, t) + heavy(q, v, a, t))
     assert {cause.effect for cause in found} == {"payload_change", "coulomb"}
