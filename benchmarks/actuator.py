@@ -238,7 +238,7 @@ def table(machine: Machine, n_baseline: int, n_target: int, draws: int, argument
     limit = {}
     if not arguments.no_rivals:
         limit = limits(machine, n_baseline, n_target, 60 if arguments.quick else 252, 0)
-    names = ["opamc", *limit, "patterns", "spectrum", "profile"]
+    names = ["opamc", *limit, "patterns", "spectrum", "profile", "amplitude"]
     print("state," + ",".join(names) + ",median effect")
     for state in machine.currents:
         if state == HEALTHY:

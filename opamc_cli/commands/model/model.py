@@ -100,9 +100,11 @@ def close(
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages.model import model as stage
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result
     from opamc_cli.storage.runs import find_runs
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     declared = load_joint_model(model, overrides or ())
     extended = [path.name for path in out.glob("model_axis*.yaml")]

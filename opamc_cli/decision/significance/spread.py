@@ -32,7 +32,7 @@ Three degrees of freedom keep false alarms at 1 % up to twice this spread.
 """
 
 EXPECTED = Spread(BETWEEN_SESSIONS.scale, 1.0)
-"""The same where sessions or siblings speak for themselves: then it counts for one value only."""
+"""The same where labellings speak for themselves: then it counts for one value only."""
 
 
 def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> Spread:
@@ -65,15 +65,9 @@ def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> S
     return Spread(float(np.exp(log_variance / 2)), total)
 
 
-SIBLING_SHARE = 0.15
-"""Share of the siblings' degrees of freedom that counts for a joint: joints differ in spread.
-
-Of 2160 healthy joints of virtual fleets 0.69 % have p below 0.01 with 0.1, 0.93 % with 0.15; of
-half of them 1.48 % with 0.25.
-"""
-
-
-def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> Spread:
+def spread_among_siblings(
+    variance: float, siblings: ArrayLike, dof: float, expected: Spread
+) -> Spread:
     """Spread of one joint's healthy sessions, from its own and its siblings'.
 
     Parameters
@@ -84,18 +78,20 @@ def spread_among_siblings(variance: float, siblings: ArrayLike, dof: float) -> S
         Those of the other joints; NaN where unknown.
     dof : float
         Degrees of freedom of each, positive.
+    expected : Spread
+        Spread expected beforehand.
 
     Returns
     -------
     Spread
-        Of the joint's own, the siblings' median, which one odd sibling cannot move, and
-        `EXPECTED`.
+        Of the joint's own, the siblings' median, which one odd sibling cannot move, and what is
+        expected.
     """
     values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
-    prior = EXPECTED
+    prior = expected
     if values.size:
-        shared = SIBLING_SHARE * dof * values.size
+        shared = dof * values.size
         median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
         share = prior.dof / (prior.dof + shared)
         scale = prior.scale**share * median.scale ** (1 - share)
@@ -121,23 +117,24 @@ def upper_tail(distance: float, spread: Spread) -> float:
     return float(stdtr(spread.dof, -distance / spread.scale))
 
 
-def tail_of_one_influence(log_ratio: float, dof: int) -> float:
-    """Probability of a squared distance where one influence makes all that sessions differ by.
+def tail_of_influences(log_ratio: float, dof: float, dof_healthy: float) -> float:
+    """Probability of a squared distance that is made of as many influences.
 
     Parameters
     ----------
     log_ratio : float
         Log of the distance over that of a healthy session.
-    dof : int
-        Healthy sessions less one.
+    dof : float
+        Number of influences.
+    dof_healthy : float
+        That times the healthy sessions less one.
 
     Returns
     -------
     float
-        That of a Student t whose square is the ratio. More influences make a large ratio less
-        probable still.
+        That of an F ratio: of one influence, of a Student t whose square it is.
     """
-    return float(fdtrc(1, dof, math.exp(min(log_ratio, 100.0))))
+    return float(fdtrc(dof, dof_healthy, math.exp(min(log_ratio, 100.0))))
 
 
 def spliced_p_value(

@@ -38,69 +38,6 @@ def variance_within_sessions(
     return np.asarray(np.divide(squares, dof, out=np.full(len(dof), np.nan), where=dof > 0))
 
 
-def deviation_from_rest(
-    sessions: FloatArray,
-    cycles: FloatArray,
-    within: FloatArray,
-    units: NDArray[np.int64],
-    rest: NDArray[np.int64],
-    least_variance: float,
-) -> FloatArray:
-    """Mean squared deviation of sessions from others, in units of what healthy ones deviate by.
-
-    Parameters
-    ----------
-    sessions : ndarray, shape (B + T, F)
-        Mean of each session's cycles; NaN where nothing is known.
-    cycles : ndarray, shape (B + T,)
-        Cycles that each mean is of.
-    within : ndarray, shape (F,)
-        Variance of a single cycle about its session's mean; NaN if unknown.
-    units : ndarray, shape (U,)
-        Indices of the sessions to be judged.
-    rest : ndarray, shape (R,)
-        Indices of the sessions they are compared with; none of `units` is among them.
-    least_variance : float
-        Sessions that agree within it agree.
-
-    Returns
-    -------
-    ndarray, shape (U,)
-        About 1 for a healthy session, whatever the number of its cycles; NaN where the rest has
-        neither two sessions nor a session of two cycles.
-
-    Notes
-    -----
-    The variance of a session's mean is that between sessions plus that of a cycle over the number
-    of cycles. The rest's own sessions show both together; what a unit of more or fewer cycles has
-    less or more is corrected for, and the rest's mean has an error of its own. Few sessions say
-    little of one bin, so that its variance is moderated by the motion's mean (Smyth 2004).
-    """
-    mean, n = mean_of_known(sessions[rest])
-    squares = np.nansum((sessions[rest] - mean) ** 2, axis=0)
-    within = moderated(within, 1.0)
-    share = np.mean(1 / cycles[rest][cycles[rest] > 0]) if (n > 0).any() else np.nan
-    dof = np.maximum(n - 1, 0)
-    if (dof > 0).any():
-        typical = squares.sum() / dof.sum()
-        variance = (PRIOR_DOF * typical + squares) / (PRIOR_DOF + dof)
-    else:
-        # A single session shows no variation between sessions; its cycles show what is least.
-        variance = within * share
-    result = np.full(len(units), np.nan)
-    for k, unit in enumerate(units):
-        if cycles[unit] == 0:
-            continue
-        own = 1 / cycles[unit]
-        expected = np.fmax(variance + np.nan_to_num(within) * (own - share), within * own)
-        expected = expected + variance / np.maximum(n, 1)
-        ratio = (sessions[unit] - mean) ** 2 / np.maximum(expected, least_variance)
-        known = np.isfinite(ratio)
-        if known.any():
-            result[k] = float(ratio[known].mean())
-    return result
-
-
 def change_between(sessions: FloatArray, n_baseline: int) -> tuple[FloatArray, FloatArray]:
     """Change of each part's mean, and its variance among healthy sessions; NaN if unknown.
 

@@ -1,40 +1,40 @@
-"""What speaks for a change between sessions, and how several such things are weighed together."""
+"""What speaks for a change between sessions, and how far each lies from the others by it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
+from opamc_cli.decision.significance.spread import Spread
+from opamc_cli.decision.witnesses.departure import Block, Distances, distances
 
 FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-
-LEAST_RATIO = 1e-6
-"""Identical recordings have distance zero; a millionth of a healthy one stands for it."""
-
-LEAST_SCALE = 0.01
-"""Distances that agree to a percent agree: none weighs infinitely."""
+Kind = Literal["orthogonal", "score"]
 
 
 class Evidence(Protocol):
     """One way of telling sessions apart; sessions are numbered, baseline first."""
 
     @property
-    def ranks(self) -> bool:
-        """Whether sessions are ranked by it; if not, it counts where it is sure by itself."""
+    def kinds(self) -> Sequence[Kind]:
+        """Which of its distances are asked: beyond what healthy sessions differ by, or along it."""
+
+    @property
+    def healthy_spread(self) -> Spread:
+        """Expected spread of a healthy session's log distance beyond."""
+
+    @property
+    def tells_conditions(self) -> bool:
+        """Whether its distance along says how unusual the conditions of a session were."""
 
     @property
     def cells(self) -> Sequence[object]:
         """What it rests on, one for each motion; nothing is known without any."""
 
-    def log_distances(self, units: IntArray, rest: IntArray) -> FloatArray:
-        """Return the log distance of each of some sessions from the others."""
-
-    def pooled(self, is_target: NDArray[np.bool_]) -> FloatArray:
-        """Return the distance between two groups of sessions, one for each labelling."""
+    def blocks(self) -> Sequence[Block]:
+        """Return the numbers that it knows of each session, motion by motion."""
 
     def effect(self) -> float:
         """Return the relative change beyond the baseline's own; NaN if unknown."""
@@ -42,13 +42,13 @@ class Evidence(Protocol):
 
 @dataclass(frozen=True)
 class SessionDistances:
-    """Log distances of one axis's sessions."""
+    """Log distances of one axis's sessions, of one kind."""
 
     own: FloatArray
     """Of baseline session i from the other baseline sessions; shape (B,)."""
     target: FloatArray
     """Of each target session from the baseline without session i: the two numbers of a pair differ
-    in nothing but the session, same pool, same level, same finite-sample bias; shape (B, T)."""
+    in nothing but the session, same rest, same finite-sample bias; shape (B, T)."""
     each: FloatArray
     """Of every session from all others, the first target session last: all on the same footing, so
     that the target's rank among them is that of any healthy session; shape (B + 1,)."""
@@ -58,8 +58,22 @@ class SessionDistances:
         """Whether no session lacks its distance."""
         return all(np.isfinite(part).all() for part in (self.own, self.target, self.each))
 
+    def log_ratio(self, kind: Kind) -> float:
+        """Log of the target's distance over a baseline session's.
 
-def session_distances(evidence: Evidence, n_baseline: int, n_target: int) -> SessionDistances:
+        Of distances beyond the geometric means are compared, of those along, which are squares of
+        the same few influences, the arithmetic ones.
+        """
+        if kind == "orthogonal":
+            return float(np.mean(self.target) - np.mean(self.own))
+        largest = max(float(self.target.max()), float(self.own.max()))
+        target, own = (np.exp(part - largest).mean() for part in (self.target, self.own))
+        return float(np.log(target) - np.log(own))
+
+
+def session_distances(
+    evidence: Evidence, n_baseline: int, n_target: int
+) -> dict[Kind, SessionDistances]:
     """Hold each session against the rest.
 
     Parameters
@@ -71,7 +85,8 @@ def session_distances(evidence: Evidence, n_baseline: int, n_target: int) -> Ses
 
     Returns
     -------
-    SessionDistances
+    dict of str to SessionDistances
+        Of both kinds.
 
     Notes
     -----
@@ -79,118 +94,49 @@ def session_distances(evidence: Evidence, n_baseline: int, n_target: int) -> Ses
     (2021); `each` is full conformal prediction (V. Vovk et al., Algorithmic Learning in a Random
     World, 2005).
     """
-    baseline = np.arange(n_baseline)
-    targets = np.arange(n_baseline, n_baseline + n_target)
-    pairs = np.array(
-        [
-            evidence.log_distances(np.concatenate([[i], targets]), np.delete(baseline, i))
-            for i in baseline
-        ]
-    )
-    everyone = np.arange(n_baseline + 1)
-    each = [evidence.log_distances(everyone[[i]], np.delete(everyone, i))[0] for i in everyone]
-    return SessionDistances(pairs[:, 0], pairs[:, 1:], np.array(each))
+    n = n_baseline + n_target
+    sessions = np.eye(n, dtype=bool)
+    in_baseline = np.arange(n) < n_baseline
+    units, rests = [], []
+    for i in range(n_baseline):
+        # each baseline session, and every target session beside it, against the same rest
+        units += [sessions[i], *sessions[n_baseline:]]
+        rests += [in_baseline & ~sessions[i]] * (1 + n_target)
+    everyone = in_baseline | sessions[n_baseline]
+    for i in range(n_baseline + 1):
+        units.append(sessions[i])
+        rests.append(everyone & ~sessions[i])
+    found = distances(evidence.blocks(), np.array(units), np.array(rests))
+    by_kind: dict[Kind, SessionDistances] = {}
+    for kind in ("orthogonal", "score"):
+        values = getattr(found, kind)
+        pairs = values[: -(n_baseline + 1)].reshape(n_baseline, 1 + n_target)
+        by_kind[kind] = SessionDistances(pairs[:, 0], pairs[:, 1:], values[-(n_baseline + 1) :])
+    return by_kind
 
 
-def weigh_together(
-    by_axis: Mapping[int, Mapping[str, SessionDistances]],
-) -> dict[int, SessionDistances]:
-    """Combine the distances by several witnesses into one for each axis.
+def labelled_distances(evidence: Evidence, is_target: NDArray[np.bool_]) -> Distances:
+    """Return the log distances between two groups of sessions under every labelling.
+
+    They are in units of the scatter of all sessions, which no labelling changes.
+    """
+    everyone = np.ones((1, is_target.shape[1]), dtype=bool)
+    return distances(evidence.blocks(), is_target, ~is_target, everyone)
+
+
+def soft_maximum(values: FloatArray) -> FloatArray:
+    """Log of the mean of exponentials.
 
     Parameters
     ----------
-    by_axis : mapping of int to mapping of str to SessionDistances
-        By axis and witness; the first witness of an axis stands in where none is complete.
+    values : ndarray, shape (V, ...)
+        Standardised, one row for each witness.
 
     Returns
     -------
-    dict of int to SessionDistances
-        Soft maximum of the log distances, each from its own middle and in units of its own scatter
-        between sessions: in the middle over all axes for the scatter, of the axis for the middle.
-        A witness that lacks a session is left out.
-
-    Notes
-    -----
-    A fault that one witness sees must not be outvoted by those that do not see it, as in a mean:
-    there each further witness costs all others. Middle and scatter are those of all sessions, the
-    target among them, by median and median absolute deviation: taken from the baseline alone they
-    would favour the witness by which the target is odd, and the target would rank first too often.
+    ndarray, shape (...)
+        Between the mean and the largest value: what one witness sees is not outvoted by those that
+        do not see it, and what several see counts for more.
     """
-    scatter: dict[str, list[float]] = {}
-    for kinds in by_axis.values():
-        for name, one in kinds.items():
-            if one.known:
-                scatter.setdefault(name, []).append(_robust_scale(one.each))
-    scale = {name: max(float(np.median(s)), LEAST_SCALE) for name, s in scatter.items()}
-    combined = {}
-    for axis, kinds in by_axis.items():
-        used = {name: one for name, one in kinds.items() if one.known}
-        if len(used) < 2:
-            combined[axis] = next(iter((used or kinds).values()))
-            continue
-        scales = np.array([scale[name] for name in used])
-        middles = np.array([np.median(one.each) for one in used.values()])
-        combined[axis] = SessionDistances(
-            *(
-                soft_maximum([getattr(one, part) for one in used.values()], middles, scales)
-                for part in ("own", "target", "each")
-            )
-        )
-    return combined
-
-
-def pooled_together(logs: Sequence[FloatArray]) -> FloatArray:
-    """Distance between two groups of sessions by several witnesses.
-
-    Parameters
-    ----------
-    logs : sequence of ndarray, shape (R,)
-        Log of each witness's `Evidence.pooled`, one value per labelling.
-
-    Returns
-    -------
-    ndarray, shape (R,)
-        Soft maximum, as in `weigh_together`, over middle and scatter of all labellings.
-    """
-    known = [log for log in logs if np.isfinite(log).all()] or logs[:1]
-    if len(known) < 2:
-        return np.asarray(np.exp(known[0]))
-    scales = np.array([max(_robust_scale(log), LEAST_SCALE) for log in known])
-    middles = np.array([np.median(log) for log in known])
-    return np.asarray(np.exp(soft_maximum(known, middles, scales)))
-
-
-def soft_maximum(
-    values: Sequence[FloatArray], middles: FloatArray, scales: FloatArray
-) -> FloatArray:
-    """Log of the mean of the exponentials of standardised values, in the scales' harmonic mean.
-
-    Parameters
-    ----------
-    values : sequence of ndarray, each of one shape
-        By each witness.
-    middles, scales : ndarray, shape (number of witnesses,)
-        Of each.
-
-    Returns
-    -------
-    ndarray
-        Of the values' shape; 0 if all are at their middle.
-    """
-    z = np.array([(v - m) / s for v, m, s in zip(values, middles, scales, strict=True)])
-    largest = z.max(axis=0)
-    mean = np.exp(z - largest).mean(axis=0)
-    return np.asarray((largest + np.log(mean)) / np.mean(1 / scales))
-
-
-def _robust_scale(values: FloatArray) -> float:
-    return MAD_TO_SIGMA * float(np.median(np.abs(values - np.median(values))))
-
-
-def log_mean(ratios: FloatArray) -> FloatArray:
-    """Log of the mean of the known values along the last axis; NaN without any."""
-    known = np.isfinite(ratios)
-    total = np.where(known, ratios, 0.0).sum(axis=-1)
-    n = known.sum(axis=-1)
-    mean = np.divide(total, n, out=np.full(total.shape, np.nan), where=n > 0)
-    return np.asarray(np.log(np.maximum(mean, LEAST_RATIO)))
+    largest = values.max(axis=0)
+    return np.asarray(largest + np.log(np.exp(values - largest).mean(axis=0)))

@@ -17,6 +17,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
+"""The joint's model; what the recordings cannot show of it is left out."""
 
 FEWEST_SESSIONS = 3
 """Fewer baseline recordings say nothing of how sessions differ: their cycles stand for them."""
@@ -85,11 +86,9 @@ class Change:
 
     causes: tuple[Cause, ...]
     """Serious ones first, then by share; empty where healthy units show as much."""
-    excess_a: float
-    """Root of how much larger the mean square residual is in the target than in the baseline,
-    beyond the sessions' own differences."""
     explained_share: float
-    """Share of that excess which all causes explain together."""
+    """Share that all causes explain together of how much larger the mean square residual is in the
+    target than in the baseline, beyond the sessions' own differences."""
     harmless: bool
     """True where harmless causes explain at least half of the excess and no cause is serious."""
     units: tuple[int, int] = (0, 0)
@@ -106,7 +105,6 @@ def explain_change(
     baseline: list[Recording],
     target: list[Recording],
     joint: Joint,
-    declared: tuple[str, ...] = DECLARED,
     library: Library | None = None,
     follow: Follow = follow,
 ) -> Change:
@@ -124,8 +122,6 @@ def explain_change(
         phases.
     joint : Joint
         Gear ratio and pole pairs, where known.
-    declared : tuple of str
-        Effects of the joint's model; those that the recordings cannot show are left out.
     library : Library, optional
         Effects that may be causes; the built-in ones by default.
     follow : callable
@@ -141,14 +137,14 @@ def explain_change(
     after = read_side(target, joint, after=True, cycles=cycles)
     if not before or not after:
         side = "target" if before else "baseline"
-        return Change((), 0.0, 0.0, False, why_not=f"too little motion in the {side}")
-    terms = usable_terms(before + after, [effect_named(library, name) for name in declared])
+        return Change((), 0.0, False, why_not=f"too little motion in the {side}")
+    terms = usable_terms(before + after, [effect_named(library, name) for name in DECLARED])
     before, after = followed(before, after, terms)
     if len(before) < 2 or not after:
         why = "too few cycles or recordings whose torque axis can be followed"
-        return Change((), 0.0, 0.0, False, why_not=why)
+        return Change((), 0.0, False, why_not=why)
     if not any(unit.current_a().any() for unit in before):
-        return Change((), 0.0, 0.0, False, why_not="no current in the baseline")
+        return Change((), 0.0, False, why_not="no current in the baseline")
     population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
     units = [unit.with_model(terms, population.mean) for unit in before + after]
 
@@ -185,7 +181,6 @@ def explain_change(
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(
         causes=tuple(causes),
-        excess_a=float(np.sqrt(whole)) if causes else float(np.sqrt(energy.total)),
         explained_share=min(sum(cause.share for cause in causes), 1.0),
         harmless=harmless >= HARMLESS_SHARE and not serious,
         units=(len(before), len(after)),

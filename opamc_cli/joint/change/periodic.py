@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 from opamc_cli.joint.change.energy import comb_energy
 from opamc_cli.joint.change.lines import (
     Line,
-    OrderSpectra,
     clocked,
     grown_lines,
     order_spectra,
@@ -77,9 +76,12 @@ def _picked_up(
 ) -> Periodic | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
     sides = _quadratures(timed, residuals)
-    spectra = _standing_spectra(timed, sides)
-    beats = [] if spectra is None else grown_lines(spectra, between)
-    if spectra is None or not beats or beats[0].excess < STANDING * strongest.excess:
+    one, other = (order_spectra(timed, side) for side in sides) if sides else (None, None)
+    if one is None or other is None:
+        return None
+    spectra = replace(one, before=one.before + other.before, after=one.after + other.after)
+    beats = grown_lines(spectra, between)
+    if not beats or beats[0].excess < STANDING * strongest.excess:
         return None
     reading = read_frequency(beats[0], spectra.resolution)
     if reading is None:
@@ -87,16 +89,6 @@ def _picked_up(
     # Half of it is there; the other half turns twice as fast as the field.
     held = 2 * sum(comb_energy(timed, side, reading.fundamental) for side in sides)
     return Periodic(reading, held)
-
-
-def _standing_spectra(timed: list[Unit], sides: list[list[Floats]]) -> OrderSpectra | None:
-    """Power over frequency in the phases' frame, summed over its two axes."""
-    if not sides:
-        return None
-    one, other = order_spectra(timed, sides[0]), order_spectra(timed, sides[1])
-    if one is None or other is None:
-        return None
-    return replace(one, before=one.before + other.before, after=one.after + other.after)
 
 
 def _quadratures(units: list[Unit], residuals: list[Floats]) -> list[list[Floats]]:

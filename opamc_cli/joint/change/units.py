@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -184,11 +183,10 @@ def own_fit(
 def followed(
     before: list[Unit], after: list[Unit], terms: tuple[Term, ...]
 ) -> tuple[list[Unit], list[Unit]]:
-    """Set right, or leave out, the units whose torque axis was followed wrongly.
+    """Leave out the units whose torque axis was followed wrongly.
 
-    Phases alone lose the side of the torque axis where there is no current for a while. The
-    baseline's units that fit well tell the side of every stretch of motion in the others; what
-    still fits badly is left out. Where motion was logged, nothing is lost.
+    Phases alone lose the side of the torque axis where there is no current for a while. Where
+    motion was logged, nothing is lost.
 
     Parameters
     ----------
@@ -203,49 +201,15 @@ def followed(
     """
     if not before or "logged" in before[0].fine.channels:
         return before, after
-    before = _agreeing(before, terms)
-    usual = float(np.quantile([_rms(unit, terms) for unit in before], 0.25))
-    model = np.median(
-        [own_fit(unit, terms)[0] for unit in before if _rms(unit, terms) <= LOST * usual], axis=0
-    )
-    after = _agreeing([_better(unit, terms, model) for unit in after], terms)
+    old, new = ([_rms(unit, terms) for unit in side] for side in (before, after))
+    usual = float(np.quantile(old, 0.25))
     # A changed joint may leave more everywhere: the target has a usual residual of its own.
-    limit = LOST * max(usual, min((_rms(unit, terms) for unit in after), default=usual))
+    limit = LOST * max(usual, min(new, default=usual))
     return (
-        [unit for unit in before if _rms(unit, terms) <= LOST * usual],
-        [unit for unit in after if _rms(unit, terms) <= limit],
+        [unit for unit, left in zip(before, old, strict=True) if left <= LOST * usual],
+        [unit for unit, left in zip(after, new, strict=True) if left <= limit],
     )
-
-
-def _agreeing(units: list[Unit], terms: tuple[Term, ...]) -> list[Unit]:
-    """Set the sides of all units by the model of the one that fits best."""
-    if not units:
-        return units
-    best = min(units, key=lambda unit: _rms(unit, terms))
-    model = own_fit(best, terms)[0]
-    return [_better(unit, terms, model) for unit in units]
-
-
-def _better(unit: Unit, terms: tuple[Term, ...], model: Floats) -> Unit:
-    return min((unit, _sided(unit, terms, model)), key=lambda one: _rms(one, terms))
 
 
 def _rms(unit: Unit, terms: tuple[Term, ...]) -> float:
     return float(np.sqrt(np.mean(own_fit(unit, terms)[1] ** 2)))
-
-
-def _sided(unit: Unit, terms: tuple[Term, ...], coefficients: Floats) -> Unit:
-    """Turn every stretch of motion to the side on which it agrees with a model."""
-    track = unit.fine
-    model = np.concatenate([term.columns(track) for term in terms], axis=1) @ coefficients
-    # The side is lost at rest, or where the torque passes zero.
-    stretch = np.where(track.moving, np.sign(model), 0.0)
-    edges = np.flatnonzero(np.diff(stretch, prepend=0.0, append=0.0))
-    side = np.ones(track.size)
-    for start, stop in pairwise(edges):
-        if float(np.dot(track.current_a[start:stop], model[start:stop])) < 0:
-            side[start:stop] = -1.0
-    if np.all(side > 0):
-        return unit
-    fine = replace(track, current_a=side * track.current_a)
-    return replace(unit, fine=fine, coarse=coarsen(fine, unit.factor))

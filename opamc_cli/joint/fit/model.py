@@ -132,9 +132,11 @@ class Dataset:
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones have none on the coarse one."""
         track = self.grid_of(fine).track
-        if not term.is_constant:
+        beside = track.static_terms if term.effect.from_terms else ()
+        if not all(one.is_constant for one in (beside or (term,))):
             return term.columns(track)
-        return self.cache.columns((term.key, track is self.fine.track), lambda: term.columns(track))
+        key = term.key, track is self.fine.track, *(one.key for one in beside)
+        return self.cache.columns(key, lambda: term.columns(track))
 
     def sums_of(self, blocks: list[Floats], fine: bool) -> Sums:
         """Products of regressors with one another and the current, over each part."""

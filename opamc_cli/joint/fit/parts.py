@@ -101,9 +101,16 @@ class Parts:
 
     def products(self, left: Floats, right: Floats) -> Floats:
         """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
-        sums = np.empty((len(self.slices), left.shape[1], right.shape[1]))
+        return self.products_of([left], right)[0]
+
+    def products_of(self, lefts: Sequence[Floats], right: Floats) -> list[Floats]:
+        """Likewise for several, while the processor's cache holds a part of the right one."""
+        count, width = len(self.slices), right.shape[1]
+        sums = [np.empty((count, left.shape[1], width)) for left in lefts]
         for i, (start, stop) in enumerate(self.slices):
-            sums[i] = left[start:stop].T @ right[start:stop]
+            part = right[start:stop]
+            for left, found in zip(lefts, sums, strict=True):
+                found[i] = left[start:stop].T @ part
         return sums
 
 

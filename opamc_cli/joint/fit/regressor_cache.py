@@ -68,9 +68,9 @@ class RegressorCache:
             ]
             if not missing:
                 continue
-            mine = self.rows(block, parts, fine)
-            for other in missing:
-                product = parts.products(self.rows(other, parts, fine), mine)
+            others = [self.rows(other, parts, fine) for other in missing]
+            products = parts.products_of(others, self.rows(block, parts, fine))
+            for other, product in zip(missing, products, strict=True):
                 self._products[id(other), id(block), fine] = product
                 self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
         own = [

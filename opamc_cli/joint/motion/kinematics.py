@@ -389,7 +389,7 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         msg = "a recording needs a position, a velocity or three phase currents"
         raise ValueError(msg)
 
-    current_d = electrical = None
+    electrical = None
     if phases is not None and phase_angle is not None:
         if recording.position_rad is not None or recording.velocity_rad_s is not None:
             known = poles * ratio if poles and ratio else None
@@ -401,12 +401,10 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
                 motion = motion.later(lag_s, rate)
         else:
             electrical = phase_angle.angle_rad
-        current, current_d = torque_current(
-            phases, electrical, motion.velocity, motion.position_rad
-        )
+        current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
-            current, current_d = side * current, side * current_d
+            current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)
         channels |= {"electrical"}
@@ -460,7 +458,6 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         joint=joint,
         channels=frozenset(channels),
         temperature_c=None if temperature is None else unstepped(filled(temperature)),
-        current_d_a=current_d,
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,

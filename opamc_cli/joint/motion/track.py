@@ -1,5 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Protocol
@@ -29,7 +30,6 @@ SAMPLED = (
     "load_a",
     "model_a",
     "temperature_c",
-    "current_d_a",
     "electrical_rad",
     "open_samples",
     "blur",
@@ -90,10 +90,8 @@ class Track:
     """What was logged or follows from it: position, logged (motion beside the current), scale,
     temperature, phases, electrical."""
     temperature_c: Floats | None = None
-    current_d_a: Floats | None = None
     electrical_rad: Floats | None = None
-    """With `temperature_c`, `current_d_a`: where known: temperature, current in the flux axis,
-    electrical angle; (n,) or None."""
+    """With `temperature_c`: where known; (n,) or None."""
     period_samples: int | None = None
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
@@ -197,6 +195,16 @@ class Reference:
 
 class Regressors(Protocol):
     """What has regressors on every track: a fitted term."""
+
+    @property
+    def key(self) -> Hashable:
+        """What makes two of them the same."""
+        ...
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the regressors stay the same whatever the fitted model is."""
+        ...
 
     def columns(self, track: Track) -> Floats:
         """Regressors, shape (n, k)."""

@@ -46,13 +46,7 @@ class Pool:
     asked beside the others."""
 
     @classmethod
-    def of(
-        cls,
-        dataset: Dataset,
-        library: Library,
-        least_share: float = LEAST_SHARE,
-        without: Collection[str] = (),
-    ) -> "Pool":
+    def of(cls, dataset: Dataset, library: Library, without: Collection[str] = ()) -> "Pool":
         """Lay every effect's grid of parameters on a dataset's coarse grid."""
         track = dataset.coarse.track
         terms = [
@@ -61,7 +55,7 @@ class Pool:
             if not effect.fast and effect.from_motion and not effect.untestable(track)
             for term in guessed(effect, dataset)
         ]
-        share = 0.0 if "share" in without else least_share
+        share = 0.0 if "share" in without else LEAST_SHARE
         return cls(batches_of(dataset, terms, fine=False), library, share, without)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
+from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_amplitude
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
@@ -79,6 +80,14 @@ def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> s
         return (
             f"The mean {_called(unit)} is {part.change_a:+.2g} {unit} off in motion {part.motion}, "
             f"{part.start:.0%} to {part.stop:.0%}; its size {part.scale:.2f} times ({by})."
+        )
+    if isinstance(witness, AmplitudeEvidence):
+        size = clearest_amplitude(witness.cells, witness.n_baseline)
+        if size is None:
+            return None
+        return (
+            f"The {_called(unit)}'s {size.size} is {size.ratio:.2f} times the baseline's in motion "
+            f"{size.motion} ({by})."
         )
     return None
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
+from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_amplitude
 from opamc_cli.decision.witnesses.patterns import Cell, effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
@@ -130,6 +131,7 @@ def _change(
         _pattern_change(judgement, cells, motions),
         *_size_change(judgement, bundle),
         *_course_change(judgement, bundle, unit),
+        *_amplitude_change(judgement, bundle, unit),
     ]
 
 
@@ -197,6 +199,20 @@ def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]
     ]
 
 
+def _amplitude_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
+    witness = bundle.witnesses.get("amplitude")
+    if not isinstance(witness, AmplitudeEvidence):
+        return []
+    change = clearest_amplitude(witness.cells, witness.n_baseline)
+    if change is None or not math.isfinite(judgement.effects["amplitude"]):
+        return []
+    what = "torque" if unit == "Nm" else "current"
+    return [
+        f"The size of the {what} changed most clearly in motion {change.motion}: its "
+        f"{change.size} is {change.ratio:.3g} times the baseline's."
+    ]
+
+
 def _certainty(judgement: Judgement) -> str:
     own = f"A healthy joint shows this or more with probability {_p(judgement.p_value)}"
     if judgement.p_adjusted != judgement.p_value:
@@ -232,10 +248,7 @@ def _siblings(judgement: Judgement) -> list[str]:
     factor = math.exp(judgement.common_log_ratio)
     if factor < 1.5:
         return []
-    text = (
-        f"The other joints' patterns have moved too, {factor:.3g} times as far as usual in the "
-        "middle"
-    )
+    text = f"The other joints have moved too, {factor:.3g} times as far as usual in the middle"
     if judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted:
         return [
             f"{text}: what moves all joints together (temperature, supply, logger, payload) is "

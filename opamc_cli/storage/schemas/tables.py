@@ -20,7 +20,7 @@ COLUMNS: Mapping[pa.DataType, str] = {
     "gain t_value time_s position_rad velocity_rad_s residual_before_a residual_after_a before_a "
     "after_a",
     pa.list_(pa.int64()): "counts",
-    pa.list_(pa.float32()): "log_power current_a",
+    pa.list_(pa.float32()): "log_power current_a log_amplitude",
 }
 """A column is of one type in all tables but one, see `ORDER_SPECTRUM`."""
 
@@ -48,6 +48,7 @@ PATTERNS = _table(
 )
 SPECTRA = _table(f"{_PLACE} frames bins bin_hz log_power")
 PROFILES = _table(f"{_PLACE} parts current_a")
+AMPLITUDES = _table(f"{_PLACE} parts log_amplitude")
 SCORES = _table(
     "role run axis cycle motion segment order tau n_patterns n_pool left_out jsd chance excess base"
 )
@@ -71,6 +72,7 @@ TABLES: Mapping[str, pa.Schema] = {
     files.PATTERNS: PATTERNS,
     files.SPECTRA: SPECTRA,
     files.PROFILES: PROFILES,
+    files.AMPLITUDES: AMPLITUDES,
     files.SCORES: SCORES,
     files.FEATURES: FEATURES,
     files.SWEEP: SWEEP,

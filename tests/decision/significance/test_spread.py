@@ -5,17 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import digamma
-from scipy.stats import f as f_ratio
 from scipy.stats import t as student_t
 
 from opamc_cli.decision.significance.spread import (
-    EXPECTED,
-    SIBLING_SHARE,
     Spread,
     moderated_spread,
     spliced_p_value,
     spread_among_siblings,
-    tail_of_one_influence,
+    tail_of_influences,
     upper_tail,
 )
 
@@ -42,14 +39,16 @@ def test_a_moderated_spread_is_right_in_the_middle_over_many_samples():
 
 
 def test_one_odd_sibling_does_not_move_the_spread():
-    usual = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 0.01], 5)
-    odd = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 100.0], 5)
+    usual = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 0.01], 5, Spread(0.3, 8.0))
+    odd = spread_among_siblings(0.01, [0.01, 0.011, 0.009, 0.012, 100.0], 5, Spread(0.3, 8.0))
     assert odd.scale == pytest.approx(usual.scale, rel=0.1)
-    assert spread_among_siblings(0.01, [], 5).dof < usual.dof
+    assert spread_among_siblings(0.01, [], 2, Spread(0.3, 8.0)).dof < usual.dof
 
 
 def test_more_siblings_draw_a_joint_nearer_to_their_spread():
-    own = [spread_among_siblings(0.01, [4.0] * count, 5) for count in (0, 1, 5, 500)]
+    own = [
+        spread_among_siblings(0.01, [4.0] * count, 5, Spread(0.3, 8.0)) for count in (0, 1, 5, 500)
+    ]
     scales = [spread.scale for spread in own]
     assert scales == sorted(scales)
     assert [spread.dof for spread in own] == sorted(spread.dof for spread in own)
@@ -63,17 +62,16 @@ def test_the_tail_widens_with_fewer_degrees_of_freedom():
 
 
 def test_a_spread_among_siblings_is_the_mean_of_log_variances_by_their_freedom():
-    """Its own, a tenth of what the siblings' median says, and what is usual elsewhere."""
+    """Its own, what the siblings' median says, and what is expected."""
 
-    def unbiased(variance):
-        return np.log(variance) - (digamma(2.5) - np.log(2.5))
+    def unbiased(variance, dof):
+        return np.log(variance) - (digamma(dof / 2) - np.log(dof / 2))
 
-    usual = 2 * np.log(EXPECTED.scale)
-    freedom = np.array([5.0, SIBLING_SHARE * 5 * 3, EXPECTED.dof])
-    logs = np.array([unbiased(0.02), unbiased(0.03), usual])
-    found = spread_among_siblings(0.02, [0.01, 0.04, np.nan, 0.03], 5)
-    assert found.dof == pytest.approx(freedom.sum())
+    freedom = np.array([2.0, 2.0 * 3, 8.0])
+    logs = np.array([unbiased(0.02, 2.0), unbiased(0.03, 2.0), 2 * np.log(0.5)])
+    found = spread_among_siblings(0.02, [0.01, 0.04, np.nan, 0.03], 2, Spread(0.5, 8.0))
     assert found.scale == pytest.approx(np.exp((freedom @ logs) / freedom.sum() / 2))
+    assert found.dof == pytest.approx(freedom.sum())
 
 
 def test_the_tail_is_student_s():
@@ -98,10 +96,15 @@ def test_a_splice_shares_its_step_as_the_tail_does():
     )
 
 
-def test_the_tail_of_one_influence_is_that_of_its_squared_student_t():
+def test_the_tail_of_influences_is_that_of_their_ratio_of_squares():
     for ratio, dof in ((0.3, 2), (9.0, 4), (400.0, 6)):
+        # of one influence: of a Student t whose square it is
         expected = 2 * student_t.sf(np.sqrt(ratio), dof)
-        assert tail_of_one_influence(np.log(ratio), dof) == pytest.approx(expected)
-    assert tail_of_one_influence(np.inf, 3) < 1e-60
-    # with more influences a large ratio is less probable, so that one is the safe side
-    assert f_ratio.sf(20.0, 2, 8) < tail_of_one_influence(np.log(20.0), 4)
+        assert tail_of_influences(np.log(ratio), 1, dof) == pytest.approx(expected)
+    assert tail_of_influences(np.inf, 1, 3) < 1e-60
+    rng = np.random.default_rng(3)
+    target = (rng.normal(size=(200_000, 3)) ** 2).mean(axis=1)
+    healthy = (rng.normal(size=(200_000, 12)) ** 2).mean(axis=1)
+    assert tail_of_influences(np.log(4.0), 3, 12) == pytest.approx(
+        np.mean(target / healthy > 4), rel=0.03
+    )

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
-from opamc_cli.decision.witnesses.evidence import session_distances, weigh_together
+from opamc_cli.decision.comparison import Joint, scales_of
+from opamc_cli.decision.witnesses.evidence import (
+    SessionDistances,
+    session_distances,
+    soft_maximum,
+)
 from opamc_cli.decision.witnesses.patterns import PatternEvidence
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, judge, spectra
@@ -35,14 +40,20 @@ def test_no_session_is_favoured_for_being_the_target():
         ranks = []
         for place in range(5):
             patterns, powers = turned(plan, seed, place)
-            by_axis = {
-                axis: {
-                    "patterns": session_distances(PatternEvidence(patterns[axis]), 4, 1),
-                    "spectrum": session_distances(SpectrumEvidence(powers[axis], 4), 4, 1),
-                }
+            joints = {
+                axis: Joint(
+                    {
+                        "patterns": PatternEvidence(patterns[axis]),
+                        "spectrum": SpectrumEvidence(powers[axis], 4),
+                    },
+                    4,
+                    1,
+                )
                 for axis in patterns
             }
-            ranks += [[int((d.each > d.each[-1]).sum()) for d in weigh_together(by_axis).values()]]
+            scales = scales_of(joints.values())
+            places = [joint.places(scales, {}) for joint in joints.values()]
+            ranks += [[int((own > own[-1]).sum()) for own in places]]
         # over all choices of the target each rank occurs once, on every axis
         np.testing.assert_array_equal(np.sort(ranks, axis=0), np.tile(np.arange(5), (2, 1)).T)
 
@@ -108,3 +119,26 @@ def test_two_sessions_are_judged_by_patterns_alone():
     plan = Fleet(n_baseline=2, n_axes=3, severity=1.0)
     judged, alone = judge(cells(plan, 0), spectra_by_axis=spectra(plan, 0)), judge(cells(plan, 0))
     assert [j.p_value for j in judged.values()] == [j.p_value for j in alone.values()]
+
+
+def test_each_session_is_held_against_the_same_rest_as_the_target():
+    plan = Fleet(n_axes=1, n_baseline=4, n_target=2)
+    evidence = SpectrumEvidence(spectra(plan, 3)[1], 4)
+    found = session_distances(evidence, 4, 2)["orthogonal"]
+    assert (found.own.shape, found.target.shape, found.each.shape) == ((4,), (4, 2), (5,))
+    without = [replace(c, sessions=c.sessions[1:], cycles=c.cycles[1:]) for c in evidence.cells]
+    # the first target session beside baseline 1 to 3 is what `each` says of it without session 0
+    fewer = session_distances(SpectrumEvidence(without, 3), 3, 2)["orthogonal"]
+    assert fewer.each[-1] == pytest.approx(found.target[0, 0])
+
+
+def test_a_ratio_is_of_geometric_means_beyond_and_of_arithmetic_ones_along():
+    one = SessionDistances(np.log([1.0, 4.0]), np.log([[2.0], [8.0]]), np.zeros(3))
+    assert one.log_ratio("orthogonal") == pytest.approx(np.log(4.0 / 2.0))
+    assert one.log_ratio("score") == pytest.approx(np.log(5.0 / 2.5))
+
+
+def test_a_soft_maximum_lies_between_the_mean_and_the_largest():
+    values = np.array([[0.0, 5.0], [0.0, 0.0], [0.0, 0.0]])
+    found = soft_maximum(values)
+    np.testing.assert_allclose(found, [0.0, np.log((np.exp(5.0) + 2) / 3)])

@@ -5,19 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opamc_cli.decision.significance.permutation import relabellings
-from opamc_cli.decision.witnesses.deviation import PRIOR_DOF, change_between, deviation_from_rest
-from opamc_cli.decision.witnesses.spectra import (
-    LEAST_VARIANCE,
-    clearest_change,
-    pooled_deviation,
-    size_effect,
-)
+from opamc_cli.decision.witnesses.deviation import change_between
+from opamc_cli.decision.witnesses.spectra import clearest_change, size_effect
 from tests.decision.fleet import Fleet, cells, judge, spectra
-
-
-def squared_deviation(cell, units, rest):
-    return deviation_from_rest(cell.sessions, cell.cycles, cell.within, units, rest, LEAST_VARIANCE)
 
 
 @pytest.mark.long
@@ -36,36 +26,6 @@ def test_identical_spectra_are_no_evidence():
     cell = spectra(plan, 0)[1][0]
     cell.sessions[:] = cell.sessions[0]
     assert size_effect([cell], plan.n_baseline) == 0.0
-    (ratio,) = squared_deviation(cell, np.array([6]), np.arange(6))
-    assert ratio == pytest.approx(0.0, abs=1e-9)
-
-
-def slow_pooled(cells, row):
-    """The definition for one labelling: differences of means by each bin's moderated variance."""
-    ratios = []
-    for cell in cells:
-        known = np.isfinite(cell.sessions).all(axis=1)
-        a, b = cell.sessions[known & row], cell.sessions[known & ~row]
-        if len(a) and len(b):
-            own = cell.sessions[known].var(axis=0)
-            n = int(known.sum())
-            variance = (PRIOR_DOF * own.mean() + n * own) / (PRIOR_DOF + n)
-            difference = (a.mean(axis=0) - b.mean(axis=0)) ** 2
-            ratios.append((difference / np.maximum(variance, LEAST_VARIANCE)).mean())
-    return np.mean(ratios) if ratios else np.nan
-
-
-def test_pools_of_sessions_differ_by_their_definition():
-    plan = Fleet(n_axes=1, n_baseline=4, n_target=2)
-    own = spectra(plan, 1)[1]
-    own[0].sessions[2] = np.nan
-    labels = relabellings(4, 2)
-    expected = [slow_pooled(own, row) for row in labels]
-    np.testing.assert_allclose(pooled_deviation(own, labels), expected, rtol=1e-9)
-    lone = np.zeros((1, 6), dtype=bool)
-    lone[0, 2] = True
-    own[1].sessions[2] = own[2].sessions[2] = np.nan
-    assert np.isnan(pooled_deviation(own, lone)).all()
 
 
 def test_the_clearest_change_is_told_by_place_frequency_and_size():

@@ -1,20 +1,32 @@
-"""Divergence between sessions and between pools of them."""
+"""What ordinal patterns tell of sessions."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from opamc_cli.decision.significance.permutation import relabellings
-from opamc_cli.decision.witnesses.patterns import PatternEvidence, pooled_divergence
+from opamc_cli.decision.divergence.jensen_shannon import jensen_shannon
+from opamc_cli.decision.witnesses.patterns import PatternEvidence
 from tests.decision.fleet import Fleet, cells
 
 
-def test_pools_of_relabelled_sessions_are_compared_one_by_one():
-    own = cells(Fleet(n_baseline=3, n_target=2), 0)[1]
-    labels = relabellings(3, 2)
-    together = pooled_divergence(own, labels)
-    alone = [pooled_divergence(own, row[np.newaxis])[0] for row in labels]
-    np.testing.assert_allclose(together, alone)
+def test_small_divergences_are_squared_differences_of_the_blocks():
+    """Jensen-Shannon in bits is half of the squared distance over the natural logarithm of 2."""
+    own = cells(Fleet(n_baseline=2, between_sessions=0.05, n_motions=1), 0)[1]
+    (block,) = PatternEvidence(own).blocks()
+    squared = ((block.sessions[0] - block.sessions[1]) ** 2).sum()
+    divergence = jensen_shannon(own[0].baseline[0], own[0].baseline[1])
+    assert squared / (2 * np.log(2)) == pytest.approx(float(divergence), rel=0.02)
+    np.testing.assert_array_equal(block.weight[:2], own[0].baseline.sum(axis=1))
+    assert (block.within == own[0].inflation / 4).all()
+
+
+def test_sessions_without_a_motion_are_unknown_in_its_block():
+    (own,) = cells(Fleet(n_motions=1, n_axes=1), 0)[1]
+    own.baseline[2] = 0
+    (block,) = PatternEvidence([own]).blocks()
+    assert np.isnan(block.sessions[2]).all()
+    assert np.isfinite(np.delete(block.sessions, 2, axis=0)).all()
 
 
 def test_the_largest_change_is_that_of_what_the_target_holds():

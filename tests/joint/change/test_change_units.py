@@ -1,4 +1,4 @@
-"""Units of comparison: their samples, their own fit, and the side on which phases are followed."""
+"""Units of comparison: their samples, their own fit, and the phases that are followed."""
 
 from dataclasses import replace
 
@@ -137,32 +137,14 @@ def by_phases(unit, current=None):
     return replace(unit, fine=fine, coarse=coarsen(fine, unit.factor))
 
 
-def turned(unit):
-    """Lose the side of the torque axis where the torque passes zero, in the second half."""
-    model = np.concatenate([term.columns(unit.fine) for term in TERMS], axis=1) @ COEFFICIENTS
-    passed = np.cumsum(np.diff(np.sign(model), prepend=0.0) != 0)
-    side = np.where(unit.fine.moving & (passed > 0.5 * passed[-1]), -1.0, 1.0)
-    return by_phases(unit, side * unit.fine.current_a)
-
-
-def test_a_lost_side_is_found_again(units):
-    before = [by_phases(units[0]), turned(units[1]), by_phases(units[2])]
-    old, new = followed(before, [turned(units[3])], TERMS)
-    assert (len(old), len(new)) == (3, 1)
-    for unit in (*old, *new):
-        np.testing.assert_allclose(own_fit(unit, TERMS)[0], COEFFICIENTS, atol=0.05)
-    # What has its side is left alone.
-    assert old[0] is before[0]
-
-
-def test_where_motion_was_logged_nothing_is_turned(units):
+def test_where_motion_was_logged_nothing_is_left_out(units):
     fine = replace(units[1].fine, current_a=-units[1].fine.current_a)
     before, after = [units[0], replace(units[1], fine=fine)], [units[3]]
     assert followed(before, after, TERMS) == (before, after)
     assert followed([], after, TERMS) == ([], after)
 
 
-def test_what_still_fits_badly_is_left_out(units):
+def test_what_fits_badly_is_left_out(units):
     noise = np.random.default_rng(0).normal(size=units[0].fine.size)
     wrong = by_phases(units[2], units[2].fine.current_a + 0.5 * noise)
     right = [by_phases(unit) for unit in units[:2]]

@@ -57,6 +57,18 @@ def test_what_looks_at_the_terms_alone_is_fitted_once(monkeypatch):
     # Another round, with the fitted model on the grid, would change nothing.
     again = once(fitted.dataset, terms)
     np.testing.assert_allclose(again.residual_a, fitted.residual_a, atol=1e-12)
+    late = terms[-1]
+    assert again.dataset.columns(late, True) is fitted.dataset.columns(late, True)
+    fewer = fit_terms(dataset, (*terms[1:-1], late)).dataset
+    for one in (fewer, again.dataset):
+        own = late.columns(one.fine.track)
+        np.testing.assert_array_equal(one.columns(late, True), own)
+    # Beside what follows the load it changes with the fit.
+    beside = fit_terms(dataset, (*rigid(), term("load_friction"), late)).dataset
+    moved = beside.with_model(
+        beside.fine.track.load_a + 1.0, beside.fine.track.model_a, beside.fine.track.static_terms
+    )
+    assert not np.allclose(moved.columns(late, True), beside.columns(late, True))
 
 
 def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(monkeypatch):

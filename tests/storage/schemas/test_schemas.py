@@ -17,7 +17,7 @@ UNITLESS = {
     *("lda", "self_consistency", "patterns_per_cell", "coefficient", "standard_error", "low"),
     *("high", "condition_number", "score", "p_value", "gain", "t_value", "order"),
 }
-SAID = {"variance": "A²", "log_power": "power in A²"}
+SAID = {"variance": "A²", "log_power": "power in A²", "log_amplitude": "each in A"}
 """Units that no name ends in."""
 
 

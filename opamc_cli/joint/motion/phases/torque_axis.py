@@ -20,8 +20,8 @@ SLOWEST_SHARE = 0.05
 
 def torque_current(
     phases_a: Floats, electrical_rad: Floats, velocity: Floats, position_rad: Floats
-) -> tuple[Floats, Floats]:
-    """Split the current along and across the electrical angle.
+) -> Floats:
+    """Take the current along the electrical angle.
 
     Parameters
     ----------
@@ -36,16 +36,14 @@ def torque_current(
 
     Returns
     -------
-    torque_a, flux_a : arrays of shape (n,)
+    array of shape (n,)
     """
-    rotated = current_vector(phases_a) * np.exp(-1j * electrical_rad)
-    torque = rotated.real
+    torque: Floats = (current_vector(phases_a) * np.exp(-1j * electrical_rad)).real
     speeds = np.abs(velocity)
     moving = speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     columns = np.concatenate([_frictions(velocity), _powers(position_rad)], axis=1)[moving]
     friction = _frictions(velocity)[moving] @ _fitted(columns, torque[moving])[:2]
-    side = 1.0 if float(np.dot(friction, velocity[moving])) >= 0 else -1.0
-    return side * torque, side * rotated.imag
+    return torque if float(np.dot(friction, velocity[moving])) >= 0 else -torque
 
 
 def _frictions(velocity: Floats) -> Floats:

@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.decision.witnesses.evidence import Evidence
-from opamc_cli.stages.chain.witnesses import profile, spectrum
+from opamc_cli.stages.chain.witnesses import amplitude, profile, spectrum
 from opamc_cli.stages.chain.witnesses.kept_rows import Names
 
 
@@ -44,5 +44,6 @@ class Witness(Protocol):
 WITNESSES: tuple[Witness, ...] = (
     spectrum,
     profile,
+    amplitude,
 )
 """In the order in which they are asked."""

@@ -1,0 +1,389 @@
+"""The joints of a diagnosis side by side: how improbable each one's distances are."""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
+from opamc_cli.decision.significance.multiplicity import harmonic_mean
+from opamc_cli.decision.significance.permutation import relabelled_p_value, relabellings
+from opamc_cli.decision.significance.spread import (
+    BETWEEN_SESSIONS,
+    Spread,
+    moderated_spread,
+    spliced_p_value,
+    spread_among_siblings,
+    tail_of_influences,
+    upper_tail,
+)
+from opamc_cli.decision.witnesses.departure import influences
+from opamc_cli.decision.witnesses.evidence import (
+    Evidence,
+    Kind,
+    SessionDistances,
+    labelled_distances,
+    session_distances,
+    soft_maximum,
+)
+
+FloatArray = NDArray[np.float64]
+Voice = tuple[str, Kind]
+"""A witness and one of its two distances."""
+
+ALONG_SPREAD = Spread(1.3, 8.0)
+"""Expected of a healthy session's log distance along: of one influence's square it is 2.2, of four
+1.0; 1.0 to 1.7 in the middle of joints of three simulators."""
+
+CONDITIONS = 2.0
+"""Spreads by which a session's distances beyond may grow for each e-fold of its distance along.
+
+No influence is quite linear: a night four standard deviations warmer than the others differs in
+all. The course itself is spared: its error grows with its distance along already. See the table of
+docs/decision.md.
+"""
+
+MAD_EFFICIENCY = 0.37
+"""Share of the values that a median absolute deviation is worth (Huber, 1981)."""
+
+LEAST_SCALE = 0.01
+"""Distances that agree to a percent agree: none weighs infinitely."""
+
+
+@dataclass(frozen=True)
+class Shift:
+    """How far the target lies from the baseline."""
+
+    log_ratio: float
+    """Log of the target's distance over that of a healthy session."""
+    unit: float
+    """Standard deviation of a healthy session's log distance."""
+    spread: Spread
+    """Standard deviation of `log_ratio` if nothing has changed."""
+
+
+@dataclass(frozen=True)
+class Exchange:
+    """How sessions are exchanged between baseline and target."""
+
+    permutations: int
+    """Most relabellings evaluated."""
+    seed: int
+    """Of the draw if there are more."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One joint's place among healthy sessions."""
+
+    shift: Shift
+    """By all voices together."""
+    p_value: float
+    """Probability of at least such distances if the joint is healthy; NaN if unknown."""
+    p_alone: float
+    """The same after what the siblings have in common is taken off."""
+    common_log_ratio: float
+    """What was taken off, not negative."""
+    witnesses: Mapping[str, float]
+    """p-value by each witness alone."""
+
+
+def compare_sessions(
+    evidence: Mapping[int, Mapping[str, Evidence]],
+    sessions: Mapping[int, tuple[int, int]],
+    permutations: int,
+    seed: int,
+) -> dict[int, Compared]:
+    """Say of each joint how improbable its target is.
+
+    Parameters
+    ----------
+    evidence : mapping of int to mapping of str to Evidence
+        By axis and witness; the first witness of an axis is the one that every axis has.
+    sessions : mapping of int to (int, int)
+        Numbers of baseline (two at least) and target sessions of each axis.
+    permutations, seed : int
+        Most relabellings evaluated, and the seed of the draw if there are more.
+
+    Returns
+    -------
+    dict of int to Compared
+
+    Notes
+    -----
+    A witness's distance beyond what healthy sessions differ by is judged by the Student tail of its
+    logarithm, its distance along by the F tail of as many influences as the baseline shows. The
+    p-values are combined by their harmonic mean (D. J. Wilson, 2019). Where a single target is
+    exceeded by a healthy session its rank decides; with several targets whole sessions are
+    exchanged.
+    """
+    joints = {axis: Joint(kinds, *sessions[axis]) for axis, kinds in evidence.items()}
+    shifts: dict[Voice, dict[int, Shift]] = {}
+    for voice in dict.fromkeys(voice for joint in joints.values() for voice in joint.voices):
+        own = {axis: joint for axis, joint in joints.items() if voice in joint.voices}
+        shifts[voice] = _shifts(own, voice)
+    scales = scales_of(joints.values())
+    exchange = Exchange(permutations, seed)
+    found = {}
+    for axis, joint in joints.items():
+        own_shifts = {voice: shifts[voice][axis] for voice in joint.voices}
+        taken_off = {
+            voice: common_log_ratio(shifts[voice], axis, largest=voice[1] == "score")
+            for voice in joint.voices
+        }
+        tails = joint.tails(own_shifts, {})
+        p_value = joint.p_value(own_shifts, {}, scales, exchange)
+        p_alone = p_value
+        if any(taken_off.values()):
+            p_alone = max(p_value, joint.p_value(own_shifts, taken_off, scales, exchange))
+        together = joint.together(own_shifts, {})
+        common = together.log_ratio - joint.together(own_shifts, taken_off).log_ratio
+        found[axis] = Compared(
+            shift=together,
+            p_value=p_value,
+            p_alone=p_alone,
+            common_log_ratio=max(common, 0.0),
+            witnesses={
+                name: _combined(p for voice, p in tails.items() if voice[0] == name)
+                for name in evidence[axis]
+            },
+        )
+    return found
+
+
+def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = False) -> float:
+    """Shift that the siblings of a joint have in common.
+
+    Parameters
+    ----------
+    shifts : mapping of int to Shift
+        All joints of the session.
+    axis : int
+        The joint in question.
+    largest : bool
+        The largest of the siblings' shifts instead of their median, as a log ratio.
+
+    Returns
+    -------
+    float
+        Median over the siblings, the lower one of an even number, as a log ratio, or in units of
+        each joint's own spread if that is more; 0 if negative, with fewer than two siblings, or
+        if the joint itself was not compared.
+    """
+    others = [shift for key, shift in shifts.items() if key != axis]
+    if axis not in shifts or len(others) < 2:
+        return 0.0
+    if largest:
+        return max(0.0, *(shift.log_ratio for shift in others))
+    # of two siblings the one that moved less: else one that fails would excuse the others
+    plain = float(np.quantile([shift.log_ratio for shift in others], 0.5, method="lower"))
+    moved = [shift.log_ratio / shift.spread.scale for shift in others]
+    scaled = float(np.quantile(moved, 0.5, method="lower"))
+    return max(0.0, plain, scaled * shifts[axis].spread.scale)
+
+
+class Joint:
+    """One axis's voices, those that lack a session left out."""
+
+    def __init__(self, evidence: Mapping[str, Evidence], n_baseline: int, n_target: int) -> None:
+        self.n_baseline, self.n_target = n_baseline, n_target
+        self._evidence = evidence
+        found = {
+            name: session_distances(one, n_baseline, n_target) for name, one in evidence.items()
+        }
+        self.distances = {
+            (name, kind): found[name][kind]
+            for name, one in evidence.items()
+            for kind in one.kinds
+            if found[name][kind].known
+        }
+        self.voices = list(self.distances)
+        self._influences = {
+            name: influences(one.blocks(), np.arange(n_baseline))
+            for name, one in evidence.items()
+            if (name, "score") in self.distances
+        }
+        self._conditions = next(
+            (
+                self.distances[name, "score"]
+                for name, one in evidence.items()
+                if one.tells_conditions and (name, "score") in self.distances
+            ),
+            None,
+        )
+        self._labelled: dict[Voice, FloatArray] | None = None
+
+    def expected(self, voice: Voice) -> Spread:
+        """Return the spread of healthy log distances that is expected of a voice."""
+        return self._evidence[voice[0]].healthy_spread if voice[1] == "orthogonal" else ALONG_SPREAD
+
+    def depends_on_conditions(self, voice: Voice) -> bool:
+        """Whether unusual conditions move a voice by more than its own error allows for."""
+        return voice[1] == "orthogonal" and not self._evidence[voice[0]].tells_conditions
+
+    def unusual(self) -> float:
+        """How much further along the target lies than a healthy session does, as a log ratio."""
+        if self._conditions is None:
+            return 0.0
+        own = self._conditions.own - self._conditions.own.mean()
+        target = self._conditions.target - self._conditions.own.mean()
+        return float(np.maximum(target, 0.0).mean() - np.maximum(own, 0.0).mean())
+
+    def tails(
+        self, shifts: Mapping[Voice, Shift], taken_off: Mapping[Voice, float]
+    ) -> dict[Voice, float]:
+        """Return the p-value by each voice, after some of its shift is taken off."""
+        found = {}
+        for voice in self.voices:
+            left = shifts[voice].log_ratio - taken_off.get(voice, 0.0)
+            if voice[1] == "orthogonal":
+                found[voice] = upper_tail(left, shifts[voice].spread)
+            else:
+                dof = self._influences[voice[0]]
+                found[voice] = tail_of_influences(left, dof, dof * (self.n_baseline - 1))
+        return found
+
+    def together(self, shifts: Mapping[Voice, Shift], taken_off: Mapping[Voice, float]) -> Shift:
+        """Return one shift for all voices, in the harmonic mean of their units."""
+        if not self.voices:
+            return Shift(math.nan, math.nan, BETWEEN_SESSIONS)
+        units = np.array([shifts[voice].unit for voice in self.voices])
+        left = np.array([shifts[v].log_ratio - taken_off.get(v, 0.0) for v in self.voices])
+        unit = float(1 / (1 / units).mean())
+        ratio = unit * float(soft_maximum(left / units))
+        share = math.sqrt(1 / self.n_baseline + 1 / self.n_target)
+        dof = min(shifts[voice].spread.dof for voice in self.voices)
+        return Shift(ratio, unit, Spread(unit * share, dof))
+
+    def p_value(
+        self,
+        shifts: Mapping[Voice, Shift],
+        taken_off: Mapping[Voice, float],
+        scales: Mapping[Voice, float],
+        exchange: Exchange,
+    ) -> float:
+        """Probability of such distances, after some of them is taken off; NaN if unknown."""
+        if not self.voices:
+            return math.nan
+        tail = _combined(self.tails(shifts, taken_off).values())
+        if self.n_target > 1:
+            return self._p_by_exchange(tail, taken_off, exchange)
+        places = self.places(scales, taken_off)
+        above = int((places[:-1] >= places[-1]).sum())
+        gaps, place = places[:-1] - np.median(places), float(places[-1] - np.median(places))
+        by_rank = spliced_p_value(gaps, place, Spread(1.0, BETWEEN_SESSIONS.dof), above)
+        # the first of all is in the lowest step; how deep in it, only the tails know
+        half_step = 0.5 / len(places)
+        return by_rank if above else min(max(by_rank, half_step), max(tail, 1e-300))
+
+    def places(self, scales: Mapping[Voice, float], taken_off: Mapping[Voice, float]) -> FloatArray:
+        """Place every session, the target last, by all voices; nothing knows which one it is."""
+        rows = []
+        unusual = 0.0
+        if self._conditions is not None:
+            each = self._conditions.each
+            unusual = CONDITIONS * np.maximum(each - each.mean(), 0.0)
+        for voice in self.voices:
+            each = self.distances[voice].each.copy()
+            middle = np.median(each)
+            each[-1] -= taken_off.get(voice, 0.0)
+            standard = (each - middle) / scales[voice]
+            rows.append(standard - unusual if self.depends_on_conditions(voice) else standard)
+        return soft_maximum(np.array(rows))
+
+    def _p_by_exchange(
+        self, tail: float, taken_off: Mapping[Voice, float], exchange: Exchange
+    ) -> float:
+        labels = relabellings(self.n_baseline, self.n_target, exchange.permutations, exchange.seed)
+        if self._labelled is None:
+            by_witness = {
+                name: labelled_distances(self._evidence[name], labels)
+                for name in dict.fromkeys(name for name, _ in self.voices)
+            }
+            self._labelled = {
+                (name, kind): getattr(by_witness[name], kind) for name, kind in self.voices
+            }
+        rows = []
+        for voice in self.voices:
+            logs = self._labelled[voice].copy()
+            if not np.isfinite(logs).all():
+                continue
+            scale = MAD_TO_SIGMA * float(np.median(np.abs(logs - np.median(logs))))
+            middle = np.median(logs)
+            logs[0] -= taken_off.get(voice, 0.0)
+            rows.append((logs - middle) / max(scale, LEAST_SCALE))
+        if not rows:
+            return 1.0
+        values = np.exp(np.clip(soft_maximum(np.array(rows)), -300, 300))
+        relabelled = relabelled_p_value(values, self.n_baseline + self.n_target)
+        # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
+        # observed one, the pairs' own tail may go below it, doubled for the second look.
+        return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
+
+
+def scales_of(joints: Iterable[Joint]) -> dict[Voice, float]:
+    """Spread of all sessions' log distances, the target's among them, the same for all joints.
+
+    By median absolute deviation: taken from the baseline alone, or by squares, it would tell which
+    session is the target's.
+    """
+    each: dict[Voice, list[FloatArray]] = {}
+    expected: dict[Voice, Spread] = {}
+    for joint in joints:
+        for voice in joint.voices:
+            each.setdefault(voice, []).append(joint.distances[voice].each)
+            expected[voice] = joint.expected(voice)
+    scales = {}
+    for voice, own in each.items():
+        deviations = [np.median(np.abs(one - np.median(one))) for one in own]
+        dof = MAD_EFFICIENCY * sum(len(one) for one in own)
+        variance = (MAD_TO_SIGMA * float(np.median(deviations))) ** 2
+        scales[voice] = moderated_spread(variance, dof, expected[voice]).scale
+    return scales
+
+
+def _combined(tails: Iterable[float]) -> float:
+    known = list(tails)
+    return harmonic_mean(known) if known else math.nan
+
+
+def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
+    """Place the target of each joint by one voice."""
+    distances = {axis: joint.distances[voice] for axis, joint in joints.items()}
+    variances = {
+        axis: float(one.own.var(ddof=1)) if len(one.own) > 2 else math.nan
+        for axis, one in distances.items()
+    }
+    shares = {axis: 1 / len(one.own) + 1 / one.target.shape[1] for axis, one in distances.items()}
+    shifts = {}
+    for axis, one in distances.items():
+        siblings = [key for key in distances if key != axis]
+        if len(one.own) > 2:
+            unit = spread_among_siblings(
+                variances[axis],
+                [variances[key] for key in siblings],
+                len(one.own) - 1,
+                joints[axis].expected(voice),
+            )
+        else:
+            unit = _spread_by_siblings([distances[key] for key in siblings], shares[axis])
+        ratio = one.log_ratio(voice[1])
+        if joints[axis].depends_on_conditions(voice):
+            ratio -= CONDITIONS * unit.scale * joints[axis].unusual()
+        scale = unit.scale * math.sqrt(shares[axis])
+        shifts[axis] = Shift(ratio, unit.scale, Spread(scale, unit.dof))
+    return shifts
+
+
+def _spread_by_siblings(siblings: Sequence[SessionDistances], share: float) -> Spread:
+    """Spread where two sessions, which have one distance from each other, show none.
+
+    What the target's session did to the siblings stands in for it.
+    """
+    if len(siblings) < 2:
+        return BETWEEN_SESSIONS
+    moved = np.array([one.log_ratio("orthogonal") / math.sqrt(share) for one in siblings])
+    deviation = MAD_TO_SIGMA * float(np.median(np.abs(moved)))
+    return moderated_spread(deviation**2, MAD_EFFICIENCY * len(moved), BETWEEN_SESSIONS)

@@ -1,0 +1,88 @@
+"""The joints of a diagnosis side by side."""
+
+import numpy as np
+import pytest
+
+from opamc_cli.decision.comparison import compare_sessions
+from opamc_cli.decision.significance.multiplicity import harmonic_mean
+from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
+from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
+
+BINS = 40
+
+
+def joint(seed: int, *, colder: float = 0.0, spectrum: float = 0.0, n_target: int = 1):
+    """Six nights that a hidden temperature moves, and the target's; the spectrum bends with it."""
+    rng = np.random.default_rng(seed)
+    n = 6 + n_target
+    cold = rng.normal(size=n)
+    cold[6:] = colder
+    is_target = (np.arange(n) >= 6)[:, np.newaxis]
+    shapes = np.random.default_rng(1).normal(size=(3, BINS))
+    power = 0.1 * cold[:, np.newaxis] * shapes[0] + 0.02 * cold[:, np.newaxis] ** 2 * shapes[1]
+    power = power + is_target * spectrum * shapes[2] + 0.05 * rng.normal(size=(n, BINS))
+    session = np.repeat(np.arange(n), 4)
+    course = 1 + 0.05 * cold[session, np.newaxis] * shapes[0][:20]
+    course = course + 0.005 * rng.normal(size=course.shape)
+    within = np.full(BINS, 4 * 0.05**2)
+    return {
+        "spectrum": SpectrumEvidence(
+            [SpectrumCell(0, power, np.full(n, 4.0), within, 4, 10, 1.0)], 6
+        ),
+        "profile": ProfileEvidence([profile_cell(0, course, session, n)], 6),
+    }
+
+
+def compared(joints, n_target: int = 1):
+    sizes = dict.fromkeys(joints, (6, n_target))
+    return compare_sessions(joints, sizes, permutations=200, seed=0)
+
+
+def test_a_night_of_unusual_weather_is_excused_and_a_change_is_not():
+    p = {}
+    for name, case in {"usual": {}, "cold": {"colder": 4.0}, "changed": {"spectrum": 0.3}}.items():
+        p[name] = [compared({1: joint(s, **case)})[1].witnesses["spectrum"] for s in range(20)]
+    assert np.mean(np.array(p["usual"]) < 0.05) <= 0.15
+    assert np.median(p["cold"]) > 0.05
+    assert np.median(p["changed"]) < 1e-3
+
+
+def test_the_witnesses_are_joined_by_the_harmonic_mean_of_their_voices():
+    found = compared({1: joint(0, spectrum=0.3)})[1]
+    assert found.p_value <= 3 * min(found.witnesses.values())
+    assert found.p_value >= harmonic_mean(list(found.witnesses.values())) / 3
+
+
+def test_what_all_joints_share_is_taken_off():
+    joints = {axis: joint(axis, spectrum=0.3) for axis in range(1, 5)}
+    for one in compared(joints).values():
+        assert one.p_value < 0.01
+        assert one.common_log_ratio > 1
+        assert one.p_alone > 0.05
+    joints = {axis: joint(axis, spectrum=0.3 if axis == 2 else 0.0) for axis in range(1, 5)}
+    found = compared(joints)
+    assert found[2].p_alone < 0.01
+    assert found[1].p_value > 0.01
+
+
+def test_the_order_of_joints_and_the_place_of_a_joint_do_not_count():
+    joints = {axis: joint(axis, spectrum=0.1 * axis) for axis in (1, 2, 3)}
+    turned = compared({axis: joints[axis] for axis in (3, 1, 2)})
+    for axis, one in compared(joints).items():
+        assert turned[axis].p_value == pytest.approx(one.p_value)
+        assert turned[axis].p_alone == pytest.approx(one.p_alone)
+
+
+def test_the_first_of_all_sessions_is_in_the_lowest_step_and_no_deeper_by_its_rank():
+    for seed in range(20):
+        found = compared({1: joint(seed)})[1]
+        if found.p_value < 0.5 / 7:
+            # below half a step the tails' own word is needed
+            assert min(found.witnesses.values()) < 0.5 / 7
+
+
+def test_several_targets_are_exchanged_as_whole_sessions():
+    changed = compared({1: joint(3, spectrum=0.3, n_target=3)}, n_target=3)[1]
+    healthy = compared({1: joint(3, n_target=3)}, n_target=3)[1]
+    assert changed.p_value < 0.01
+    assert healthy.p_value > 0.01
