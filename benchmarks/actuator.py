@@ -30,7 +30,7 @@ from opamc_cli.decision.judge import Bundle, Judgement, judge
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
-from opamc_cli.stages.verdict.cause import explain
+from opamc_cli.stages.verdict.cause import explain, moving_samples
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs import RunInfo, save_run
 
@@ -206,6 +206,8 @@ def causes(machine: Machine, draws: int, seed: int) -> None:
     for state in machine.currents:
         if state == HEALTHY:
             continue
+        sides = [machine.sides[side].patterns for side in (HEALTHY, state)]
+        moving = {run: at for side in sides for run, at in moving_samples(side)[1].items()}
         rng = np.random.default_rng([seed, *state.encode()])
         named: Counter[str] = Counter()
         for _ in range(draws):
@@ -213,7 +215,7 @@ def causes(machine: Machine, draws: int, seed: int) -> None:
             for side in (HEALTHY, state):
                 runs = rng.choice(list(machine.currents[side]), 5, replace=False)
                 sources.append([s for s in machine.sides[side].sources if s.name in runs])
-            found = explain(1, *sources, config)
+            found = explain(1, *sources, config, moving)
             named[found["effect"] if found else "none"] += 1
         print(state, dict(named.most_common()), flush=True)
 

@@ -1,15 +1,18 @@
-"""Measured phase currents through the public commands."""
+"""Measured currents of two machines through the public commands."""
 
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from opamc_cli.__main__ import main
 from opamc_cli.errors import ExitCode
+from opamc_cli.storage.runs import RunInfo, save_run
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "itsc_phase_current"
+SCREW = ROOT.parent / "shared" / "data" / "linear_actuator"
 
 pytestmark = [
     pytest.mark.usefixtures("undrawn"),
@@ -57,3 +60,43 @@ def test_a_healthy_recording_left_out_stays_healthy(recordings, tmp_path, left_o
     assert code == ExitCode.DONE
     axis = json.loads((tmp_path / "verdict.json").read_text())["axes"][0]
     assert axis["state"] == "healthy"
+
+
+@pytest.fixture(scope="module")
+def screw(tmp_path_factory):
+    """A ball screw, healthy and without grease: position and unsigned current at 25 Hz."""
+    if not SCREW.is_dir():
+        pytest.skip(f"no measured recordings at {SCREW}")
+    out = tmp_path_factory.mktemp("screw")
+    for state in ("normal", "lackLubrication1"):
+        for file in sorted((SCREW / state).glob("*.csv")):
+            table = np.genfromtxt(file, delimiter=",", names=True)
+            columns = {
+                "axis1_current": table["current_a"].astype(np.float32),
+                "axis1_position": 0.02 * table["position_mm"],
+            }
+            info = RunInfo(sampling_rate_hz=25.0, program="strokes")
+            save_run(out / state / f"{file.stem}.parquet", info, columns)
+    return out
+
+
+def sides(baseline, target):
+    runs = [("--baseline", run) for run in baseline] + [("--target", run) for run in target]
+    return [argument for pair in runs for argument in pair]
+
+
+@pytest.mark.parametrize("target", [slice(0, 5), slice(5, 10), slice(0, 10, 2)])
+def test_a_screw_without_grease_is_at_fault_and_its_friction_is_why(screw, tmp_path, target):
+    """Which the 25 Hz of its log hardly show: an acceleration in its noise would take the name."""
+    normal, dry = (sorted((screw / s).glob("*")) for s in ("normal", "lackLubrication1"))
+    code = opamc("diagnose", *sides(normal[:5], dry[target]), "--out", tmp_path, "--quiet")
+    assert code == ExitCode.UNHEALTHY
+    axis = json.loads((tmp_path / "verdict.json").read_text())["axes"][0]
+    assert axis["state"] == "fault"
+    assert axis["cause"]["effect"] in ("viscous", "coulomb", "sublinear_friction")
+
+
+def test_a_healthy_screw_stays_healthy(screw, tmp_path):
+    normal = sorted((screw / "normal").glob("*"))
+    code = opamc("diagnose", *sides(normal[:5], normal[5:]), "--out", tmp_path, "--quiet")
+    assert code == ExitCode.DONE

@@ -87,7 +87,7 @@ class PatternEvidence:
     """All motions and orders of one axis."""
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal",)
     healthy_spread: ClassVar[Spread] = Spread(0.6, 4.0)
-    """0.13, 1.2 and 0.6 in the middle of joints of three simulators (6 to 120 robots each)."""
+    """0.1, 0.5 and 1.0 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = False
 
     def blocks(self) -> list[Block]:

@@ -90,7 +90,7 @@ class ProfileEvidence:
     """Number of baseline sessions."""
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal", "score")
     healthy_spread: ClassVar[Spread] = Spread(0.65, 8.0)
-    """0.41, 0.67 and 0.54 in the middle of joints of three simulators (6 to 120 robots each)."""
+    """0.47, 0.67 and 0.83 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = True
 
     def blocks(self) -> list[Block]:

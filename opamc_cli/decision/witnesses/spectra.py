@@ -50,7 +50,7 @@ class SpectrumEvidence:
     """Number of baseline sessions."""
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal",)
     healthy_spread: ClassVar[Spread] = Spread(0.15, 8.0)
-    """0.07, 0.16 and 0.22 in the middle of joints of three simulators (6 to 120 robots each)."""
+    """0.06, 0.22 and 0.17 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = False
 
     def blocks(self) -> list[Block]:

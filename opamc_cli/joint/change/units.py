@@ -119,7 +119,7 @@ def read_side(
         group = grouping.group if cycles else np.where(grouping.group >= 0, 0, -1)
         fine = replace(track, group=group)
         width = 1.0 / float(np.sum(fine.kernel**2))
-        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), 1)
+        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), fine.quiet, 1)
         coarse = coarsen(fine, factor)
         members = _cycles(fine, grouping.names) if cycles else [fine.group >= 0]
         for member in members:

@@ -105,6 +105,8 @@ class Track:
     evenly_smooth: bool = False
     """True where position and speed have gone through it as well; otherwise the coarse grid puts
     them through it."""
+    quiet: int = 1
+    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
     full: "Track | None" = None

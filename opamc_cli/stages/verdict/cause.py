@@ -113,11 +113,10 @@ def _recordings(
 ) -> list[Recording]:
     found = []
     for source in sources:
-        rate_hz = source.info.sampling_rate_hz
-        beside = round(BESIDE_S * rate_hz)
+        # seconds are those of a log of this rate: a slower one costs no more for being longer
+        rate_hz = max(source.info.sampling_rate_hz, LEAST_HZ)
+        beside, most = round(BESIDE_S * rate_hz), round(seconds / len(sources) * rate_hz)
         first, last = moving.get(source.name, (0, source.n_samples))
-        # minutes are those of a log of this rate: a slower one costs no more for being longer
-        most = round(seconds / len(sources) * max(rate_hz, LEAST_HZ))
         start, stop = max(first - beside, 0), min(last + beside, first + most)
         try:
             with source.open() as run:
