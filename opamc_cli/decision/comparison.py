@@ -88,6 +88,9 @@ class Compared:
     """What was taken off, not negative."""
     witnesses: Mapping[str, float]
     """p-value by each witness alone."""
+    unusual_log_ratio: float = 0.0
+    """Log of how many times further the target lies along what sessions differ by than a healthy
+    one: what it has beyond is allowed for by as much."""
 
 
 def compare_sessions(
@@ -149,6 +152,7 @@ def compare_sessions(
                 name: _combined(p for voice, p in tails.items() if voice[0] == name)
                 for name in evidence[axis]
             },
+            unusual_log_ratio=joint.unusual(),
         )
     return found
 

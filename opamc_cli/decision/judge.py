@@ -106,6 +106,8 @@ class Judgement:
     """p-value by each witness alone, not corrected for the number of joints."""
     method: Method
     """sessions, relabelled-sessions, one-session or none."""
+    unusual_log_ratio: float
+    """Log of how unusual the target's conditions are, by its current's course; 0 if unknown."""
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
@@ -176,6 +178,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             effects=effects,
             witnesses=witnesses[axis],
             method=methods[axis],
+            unusual_log_ratio=compared[axis].unusual_log_ratio,
             n_baseline_sessions=_present(cells[axis], "baseline"),
             n_target_sessions=_present(cells[axis], "target"),
             n_baseline_cycles=max((len(cell.cycles) for cell in cells[axis]), default=0),

@@ -47,6 +47,15 @@ def test_a_night_of_unusual_weather_is_excused_and_a_change_is_not():
     assert np.median(p["changed"]) < 1e-3
 
 
+def test_unusual_weather_is_told():
+    told = {
+        c: [compared({1: joint(s, colder=c)})[1].unusual_log_ratio for s in range(9)]
+        for c in (0, 4)
+    }
+    assert np.median(told[0]) < 0.5
+    assert np.median(told[4]) > 1
+
+
 def test_the_witnesses_are_joined_by_the_harmonic_mean_of_their_voices():
     found = compared({1: joint(0, spectrum=0.3)})[1]
     assert found.p_value <= 3 * min(found.witnesses.values())

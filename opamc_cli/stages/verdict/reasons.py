@@ -16,6 +16,9 @@ from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_chan
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.sources import RunSource, current_unit
 
+UNUSUAL = 1.0
+"""An e-fold: from there on two spreads or more of a healthy session are allowed for."""
+
 INSPECT = (
     "Inspect the joint's strain wave gear first: backlash by hand with the motor held, flexspline "
     "and circular spline teeth, wave generator bearing, grease; then brake, motor connector and "
@@ -82,6 +85,7 @@ def reasons(
         _certainty(judgement),
         _rest(judgement, sources),
         *_siblings(judgement),
+        *_conditions(judgement),
     ]
     if unhealthy and cause is not None:
         meaning = cause.get("interpretation") or cause.get("effect")
@@ -255,6 +259,17 @@ def _siblings(judgement: Judgement) -> list[str]:
             "not taken for a fault of one."
         ]
     return [f"{text}; what this joint shows beyond that has p = {_p(judgement.p_alone)}."]
+
+
+def _conditions(judgement: Judgement) -> list[str]:
+    if judgement.state != "healthy" or judgement.unusual_log_ratio < UNUSUAL:
+        return []
+    return [
+        "Conditions were unusual: along what healthy sessions differ by (temperature, say) it lies "
+        f"{math.exp(judgement.unusual_log_ratio):.3g} times as far as they do. What patterns and "
+        "fluctuations show was allowed for by as much, and so would be a fault that looks alike; "
+        "record under the baseline's conditions to be sure."
+    ]
 
 
 def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:
