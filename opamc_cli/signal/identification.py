@@ -13,9 +13,9 @@ SAME_PROGRAM = 0.05
 it draws. Of half of its segments: the edges of short ones move with the current."""
 
 REPEATED = 2.0
-"""Squared distance of segments, in their spreads, within which a shift repeats a series: of the true
-shift it is below 0.01 in a noisy closed loop and up to 1.7 in a joint of the testbed that hardly
-draws a current, of others it is 2.1 to 28."""
+"""Squared distance of segments, in their spreads, within which a shift repeats a series: of the
+true shift it is below 0.01 in a noisy closed loop and up to 1.7 in a joint of the testbed that
+hardly draws a current, of others it is 2.1 to 28."""
 
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
