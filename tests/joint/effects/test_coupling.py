@@ -112,3 +112,11 @@ def test_of_joints_beside_only_those_that_move_are_guessed():
         effect.columns(track, {"axis": 3.0})
     part = replace(runs[0]).cut(slice(100, 300))
     np.testing.assert_array_equal(part.others_rad[4], others[4][100:300])
+
+
+def test_what_another_joint_asks_is_not_called_closed_where_no_effect_holds_it():
+    first, second = waves(1), waves(2)
+    noise = 0.05 * np.random.default_rng(4).normal(size=first[0].size)
+    laid = recording(shoulder(first, second) + noise, first[0], {2: second[0]})
+    lacking = built_in_library(("coupling",))
+    assert close_loop(fit_declared([laid], base=DECLARED), lacking).verdict != "closed"
