@@ -1,7 +1,7 @@
 """Recordings that hold a program less than twice, or begin anywhere in it.
 
-Single joints of the closed loop, six baseline nights; a hall that is 5 K colder or warmer from night
-to night. Each recording is so many rounds of the program long.
+Single joints of the closed loop, six baseline nights; a hall that is 5 K colder or warmer from
+night to night. Each recording is so many rounds of the program long.
 
     python benchmarks/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8
     python benchmarks/rounds.py --first 9500 --joints 40 --rounds 1.4 1.8 --anywhere
