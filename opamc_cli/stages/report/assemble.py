@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import jinja2
 
 from opamc_cli.stages.report import wording
+from opamc_cli.stages.report.figures.loading import undocumented
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.focus import by_severity, choose_focus
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs, read_inputs
@@ -90,7 +91,8 @@ def render(
         evidence = Section((), ("figures: not drawn of healthy joints",))
         drawn = inputs if figures_of_healthy else inputs.unhealthy()
         if drawn.axes:
-            from opamc_cli.stages.report.figures.shown import EVIDENCE
+            with undocumented():
+                from opamc_cli.stages.report.figures.shown import EVIDENCE
 
             evidence = _draw(EVIDENCE, lambda draw: draw(drawn, focus))
         views = {axis: axis_view(inputs, axis, focus) for axis in by_severity(inputs)}
@@ -134,7 +136,8 @@ def _notes(inputs: ReportInputs) -> list[str]:
 
 
 def _loop_part(inputs: ReportInputs, entry: Mapping[str, Any]) -> dict[str, Any]:
-    from opamc_cli.stages.report.figures.shown import LOOP
+    with undocumented():
+        from opamc_cli.stages.report.figures.shown import LOOP
 
     view = loop_view(entry)
     return {**view, "section": _draw(LOOP, lambda draw: draw(inputs, view["axis"]))}

@@ -1,5 +1,8 @@
 import itertools
 import math
+import os
+import subprocess
+import sys
 
 import numpy as np
 import pyarrow as pa
@@ -161,6 +164,28 @@ def test_reckoned_margins_hold_what_matplotlib_measures(rows, columns, scale) ->
         assert 0 <= box.y0 < box.y1 <= drawing.bbox.height
     for one, other in itertools.combinations(boxes, 2):
         assert not one.overlaps(other)
+
+
+@pytest.mark.parametrize(("backend", "listed"), [("agg", False), ("svg", True)])
+def test_matplotlibs_own_documentation_is_left_out_by_the_command_alone(
+    backend: str, listed: bool
+) -> None:
+    program = (
+        "from opamc_cli.stages.report.figures.loading import undocumented\n"
+        "with undocumented():\n"
+        "    from opamc_cli.stages.report.figures import shown\n"
+        "from matplotlib import artist, lines\n"
+        "of_lines = lines.Line2D.set.__doc__\n"
+        "print('zorder: float' in of_lines, 'zorder: float' in artist.kwdoc(lines.Line2D))"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, "MPLBACKEND": backend},
+    )
+    assert ended.stdout.split() == [str(listed), "True"]
 
 
 def test_colours_differ_and_are_read_on_their_page() -> None:
