@@ -306,17 +306,20 @@ class Fit:
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     """Fit all terms jointly; where some scale with the load or the model, until that settles.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Recordings.
-    terms : tuple of Term
-        Model.
-
-    Returns
-    -------
-    Fit
+    The same terms have the same fit, whatever was fitted before.
     """
+    load, model, coefficients, residual, sums = dataset.cache.fitted(
+        tuple(term.key for term in terms), lambda: _settled(dataset, terms)
+    )
+    fitted = dataset.with_model(load, model, static_terms(terms))
+    return Fit(terms, coefficients, fitted, residual, sums)
+
+
+Found = tuple[Floats, Floats, tuple[Floats, ...], Floats, Sums]
+"""A fit's load, model, coefficients, residual and sums: what does not hold its dataset."""
+
+
+def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
     track = dataset.fine.track
     dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
@@ -330,7 +333,8 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
         if not circular or settled:
             break
         dataset, before = _with_newton_load(fitted), error
-    return fitted
+    track = fitted.dataset.fine.track
+    return track.load_a, track.model_a, fitted.coefficients, fitted.residual_a, fitted.sums
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:
