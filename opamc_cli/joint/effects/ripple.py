@@ -99,13 +99,13 @@ class Ripple(Effect):
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Likewise: of a hundred columns nothing is written that nobody looks at."""
-        angle = parameters["order"] * track.machine_angle_rad
-        turning = [np.cos(angle), np.sin(angle)]
-        waves = [wave[rows] for wave in turning]
+        answering = _answering(track, parameters)
+        at = track.machine_angle_rad if answering else track.machine_angle_rad[rows]
+        turning = [np.cos(parameters["order"] * at), np.sin(parameters["order"] * at)]
+        waves = [wave[rows] for wave in turning] if answering else turning
         scale = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
         following = _following_model(waves, track.model_a[rows], parameters)
-        answering = _answering(track, parameters)
         turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
         plain = 2 + len(swelling)
         last = plain + 4 * len(answering)

@@ -10,6 +10,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from opamc_cli.joint.least_squares import solve
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -37,6 +39,10 @@ SAMPLED = (
 """Attributes of a track that have a value per sample, or are None."""
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """Those of which a block has something else than the mean, or nothing."""
+
+
+ROWS_OF_THE_LOAD = 10_000
+"""Samples by which the inertia's part of the load is told: the load has no noise."""
 
 
 @dataclass(frozen=True)
@@ -138,6 +144,16 @@ class Track:
         return (
             0.0 if self.temperature_c is None else float(np.mean(self.temperature_c[self.moving]))
         )
+
+    @cached_property
+    def load_inertia(self) -> float:
+        """Current of the fitted load that follows the acceleration, in A by rad/s²."""
+        rows = np.flatnonzero(self.moving)
+        rows = rows[:: max(rows.size // ROWS_OF_THE_LOAD, 1)]
+        place = self.position_rad[rows]
+        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
+        columns = np.stack(shapes, axis=0).T
+        return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
 
     @cached_property
     def static_columns(self) -> Floats:
