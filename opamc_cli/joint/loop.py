@@ -123,16 +123,8 @@ def close_loop(
     before : Fit
         The declared model, fitted to the open groups; the sealed ones are looked at once, at the
         end.
-    library : dict of str to Effect
-        Effects that may be added.
-    seed : int
-        Of the decoys.
     without_rules : collection of str
         Rules of `opamc_cli.joint.name.rules` to switch off, for the ablation.
-
-    Returns
-    -------
-    Loop
     """
     start = chain_of(before, 0)
     dataset = before.dataset

@@ -27,11 +27,6 @@ LEAST_LINE = 0.02
 def highest_order(track: Track) -> float:
     """Highest order that is not folded at the median speed.
 
-    Parameters
-    ----------
-    track : Track
-        Track at the full rate.
-
     Returns
     -------
     float
@@ -66,8 +61,6 @@ def order_spectrum(
 
     Parameters
     ----------
-    track : Track
-        Track at the full rate.
     residual : array of shape (n,)
         Zero where samples do not count.
     top : float, optional
@@ -125,8 +118,6 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
 
     Parameters
     ----------
-    track : Track
-        Track at the full rate.
     residual : array of shape (n,)
         Zero where samples do not count.
     count : int

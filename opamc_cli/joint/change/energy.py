@@ -41,15 +41,9 @@ def energy_of(
 
     Parameters
     ----------
-    units : list of Unit
-        Of both sides.
-    population : Population
-        The baseline's.
     slow_found : bool
         Whether the coefficients lie outside the baseline's; if not, their difference is that of
         healthy sessions and counts as nothing.
-    shift : Shift, optional
-        Effects that are taken from the target's current.
     """
     after = np.array([unit.after for unit in units])
     moved = np.zeros(len(units))
@@ -102,15 +96,6 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
 
     Every stroke has its own amplitudes and phases, which follow its course; what such a comb
     takes from the baseline's noise and kinematic error is taken off.
-
-    Parameters
-    ----------
-    units : list of Unit
-        Of both sides.
-    plain : list of arrays
-        Residuals of every unit's own fit on its fine track.
-    fundamental : float
-        Order of the machine angle.
     """
     held: dict[bool, list[float]] = {False: [], True: []}
     for unit, residual in zip(units, plain, strict=True):

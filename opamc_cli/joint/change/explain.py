@@ -120,16 +120,10 @@ def explain_change(
     baseline, target : list of Recording
         Recordings of one joint at one rate, each with a signed current and its motion, or three
         phases.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
     library : Library, optional
         Effects that may be causes; the built-in ones by default.
     follow : callable
         How the baseline's recordings are followed: `units.follow`, or what remembers its results.
-
-    Returns
-    -------
-    Change
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS

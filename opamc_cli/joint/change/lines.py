@@ -66,10 +66,6 @@ def fast_residuals(units: list[Unit], terms: tuple[Term, ...], shift: Shift | No
 
     Parameters
     ----------
-    units : list of Unit
-        Of both sides.
-    terms : tuple of Term
-        The joint's model.
     shift : Shift or None
         Slow effects that are taken from the target's current first.
     """
@@ -168,13 +164,9 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
 
     Parameters
     ----------
-    spectra : OrderSpectra
-        Of both sides.
     between : float
         Variance of the logarithm of a line's power that is added to what the units show, where
         these are cycles of one session.
-    most : int
-        Number of lines at most.
     """
     orders = spectra.orders
     if orders.size < 2 * NEIGHBOURHOOD:

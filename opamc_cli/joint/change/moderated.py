@@ -66,8 +66,6 @@ def shift_p(shift: Floats, covariance: Floats, units: int) -> float:
         Difference of the means.
     covariance : array of shape (k, k)
         Of the shift.
-    units : int
-        Baseline units behind the covariance.
     """
     size = shift.size
     square = float(shift @ np.linalg.pinv(covariance, hermitian=True) @ shift)

@@ -69,10 +69,6 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
 
     Parameters
     ----------
-    lines : list of Line
-        Strongest first.
-    track : Track
-        Gives the kind of angle and the joint's constants.
     resolution : float
         Smallest difference of orders that a stroke can tell apart.
     """
@@ -95,8 +91,6 @@ def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
 
     Parameters
     ----------
-    line : Line
-        Its order is a frequency in Hz.
     resolution_hz : float
         Smallest difference of frequencies that a stroke can tell apart.
     """

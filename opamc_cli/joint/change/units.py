@@ -11,14 +11,7 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.track import (
-    Bools,
-    Floats,
-    Joint,
-    Track,
-    block_mean,
-    coarsen,
-)
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 FEWEST_SAMPLES = 10
@@ -89,16 +82,8 @@ def read_side(
 
     Parameters
     ----------
-    recordings : list of Recording
-        Of one joint.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-    after : bool
-        True for the target.
     cycles : bool
         Whether cycles (or blocks) are the units, and not recordings.
-    follow : callable
-        `follow`, or what remembers its results.
 
     Returns
     -------
@@ -156,18 +141,8 @@ def own_fit(
 
     Parameters
     ----------
-    unit : Unit
-        Whose samples are fitted.
-    terms : tuple of Term
-        The joint's model.
-    fine : bool
-        On the recording's own grid.
     current : array, optional
         Another current on the unit's samples.
-
-    Returns
-    -------
-    coefficients, residual : arrays
     """
     columns = unit.stacked(terms, fine)
     values = unit.current_a(fine) if current is None else current
@@ -187,17 +162,6 @@ def followed(
 
     Phases alone lose the side of the torque axis where there is no current for a while. Where
     motion was logged, nothing is lost.
-
-    Parameters
-    ----------
-    before, after : list of Unit
-        Baseline and target.
-    terms : tuple of Term
-        The joint's model.
-
-    Returns
-    -------
-    before, after : list of Unit
     """
     if not before or "logged" in before[0].fine.channels:
         return before, after

@@ -91,8 +91,6 @@ class Effect:
 
         Parameters
         ----------
-        track : Track
-            The recording at the rate at which the effect is evaluated.
         residual : array of shape (n,)
             Zero where samples do not count.
         """

@@ -75,13 +75,7 @@ class UnknownEffectError(ConfigError):
 
 
 def built_in_library(without: tuple[str, ...] = ()) -> Library:
-    """Every effect that comes with the package.
-
-    Parameters
-    ----------
-    without : tuple of str
-        Names to leave out.
-    """
+    """Every effect that comes with the package."""
     return {effect.name: effect() for effect in BUILT_IN if effect.name not in without}
 
 
@@ -103,11 +97,6 @@ def effect_named(library: Library, name: str) -> Effect:
 
 def load_user_effects(path: Path) -> list[Effect]:
     """Effects that a user's Python file defines.
-
-    Parameters
-    ----------
-    path : Path
-        A file with at least one subclass of `Effect`.
 
     Raises
     ------

@@ -235,8 +235,6 @@ def order_ties(order: float, track: Track) -> list[str]:
     ----------
     order : float
         As found, per revolution of the track's machine angle.
-    track : Track
-        Tells constants of the joint and the resolution.
 
     Returns
     -------
@@ -261,8 +259,6 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
     ----------
     order : float
         Cycles per revolution of the track's machine angle.
-    track : Track
-        Gives the kind of angle, gear ratio, pole pairs and angular resolution.
     compared : bool
         Whether the line has grown between recordings. Many healthy gears have one of the gear's
         lines: without a comparison nothing is to be inspected.

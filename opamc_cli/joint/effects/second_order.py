@@ -27,10 +27,6 @@ def answers(
         As if each recording's first value had lasted for ever: no ringing from the start.
     rad_per_s, damping : float
         Undamped angular frequency, below pi times the rate, and damping ratio.
-    rate_hz : float
-        Sampling rate.
-    bounds : tuple of (int, int)
-        Half-open recordings.
     rows : int array of shape (m,), optional
         Samples that somebody looks at; else all n of them.
     out : array of shape (2 k, m), optional
@@ -88,8 +84,6 @@ def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats
     ----------
     above, below : tuple of 3 floats
         Coefficients of s^2, s and 1 in numerator and denominator.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------

@@ -83,11 +83,7 @@ class TimeDelay(Effect):
 
 
 def late_means(
-    sums: Floats,
-    bounds: tuple[tuple[int, int], ...],
-    samples: float,
-    factor: int,
-    wanted: Bools,
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int, wanted: Bools
 ) -> Floats:
     """Means of blocks of columns that come later, the first and the last values held.
 
@@ -96,12 +92,8 @@ def late_means(
     sums : array of shape (n + recordings, k)
         Running sums of uniformly sampled columns, from zero in each recording: with them a delay
         costs no more than there are blocks.
-    bounds : tuple of (int, int)
-        Half-open recordings among the n samples.
     samples : float
         Delay; between samples, what a straight line between them gives.
-    factor : int
-        Samples per block.
     wanted : bool array of shape (n // factor per recording,)
         Blocks that somebody looks at.
 
@@ -141,8 +133,6 @@ def lagging(columns: Floats, samples: float) -> Floats:
     ----------
     columns : array of shape (n, k)
         Uniformly sampled.
-    samples : float
-        Time constant.
     """
     smooth: Floats = _lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T
     return smooth

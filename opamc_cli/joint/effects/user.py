@@ -68,13 +68,6 @@ TEXTS = ("needs", "searches", "forms")
 def checked(effect: Effect, path: Path) -> Effect:
     """Have every answer of a user's effect checked, and say where the method is that gave it.
 
-    Parameters
-    ----------
-    effect : Effect
-        Of a user's file.
-    path : Path
-        The file.
-
     Raises
     ------
     ConfigError

@@ -56,7 +56,6 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
     ----------
     track : Track
         Other recordings, at the full rate, with the reference that the terms were fitted with.
-    terms : sequence of Term
     coefficients : sequence of arrays
         One for each term.
     """

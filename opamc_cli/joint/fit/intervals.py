@@ -35,10 +35,6 @@ def certainty(fit: Fit) -> Certainty:
     fit : Fit
         A joint fit with at least one term.
 
-    Returns
-    -------
-    Certainty
-
     References
     ----------
     Liang and Zeger, Biometrika 73, 1986 (the cluster sandwich), with the factor units/(units-1).

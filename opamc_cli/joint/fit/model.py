@@ -163,19 +163,7 @@ class Dataset:
 
 
 def dataset_of(track: Track, grouping: Grouping) -> Dataset:
-    """Arrange a track for the loop.
-
-    Parameters
-    ----------
-    track : Track
-        At the full rate.
-    grouping : Grouping
-        Groups, and which are sealed.
-
-    Returns
-    -------
-    Dataset
-    """
+    """Arrange a track for the loop."""
     track = replace(track, group=grouping.group)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
@@ -406,12 +394,8 @@ def currents(
 
     Parameters
     ----------
-    terms : sequence of Term
     blocks : iterable of arrays of shape (size, k)
         Their regressors.
-    coefficients : sequence of arrays of shape (k,)
-    size : int
-        Samples.
     """
     total, model, load = np.zeros(size), np.zeros(size), np.zeros(size)
     for term, block, values in zip(terms, blocks, coefficients, strict=True):

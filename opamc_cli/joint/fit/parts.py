@@ -128,8 +128,6 @@ def parts_of(grid: Grouped, clear: Bools) -> Parts:
 
     Parameters
     ----------
-    grid : Grid
-        Its `fit` samples are fitted.
     clear : bool array of shape (n,)
         Those that are judged.
     """
@@ -208,14 +206,7 @@ class Sums:
         return Sums(gram, self.moment[:, index], self.power, self.parts)
 
     def given(self, known: Sequence[int], coefficients: Floats) -> "Sums":
-        """Take regressors with known coefficients out of the current.
-
-        Parameters
-        ----------
-        known : sequence of int
-            Places of the regressors.
-        coefficients : array of shape (len(known),)
-        """
+        """Take regressors with known coefficients out of the current."""
         if not len(known):
             return self
         left = [i for i in range(self.moment.shape[1]) if i not in set(known)]

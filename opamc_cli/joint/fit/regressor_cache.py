@@ -39,7 +39,7 @@ class RegressorCache:
         self._products.clear()
 
     def fitted(self, key: Hashable, fit: Callable[[], Result]) -> Result:
-        """What a fit found, computed where it is not at hand."""
+        """Return what a fit found, computed where it is not at hand."""
         found: Result = self._fits[key] if key in self._fits else fit()
         self._fits[key] = found
         self._fits.move_to_end(key)
@@ -64,10 +64,6 @@ class RegressorCache:
             Regressors, term by term.
         current : array of shape (n,)
             The same in every call for one grid.
-        parts : Parts
-            Likewise.
-        fine : bool
-            Which grid.
         """
         self._forget_strangers(blocks)
         target = current[:, None] if "target" + str(fine) not in self.shared else None

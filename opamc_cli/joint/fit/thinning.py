@@ -28,8 +28,6 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
 
     Parameters
     ----------
-    track : Track
-        With its groups.
     grouping : Grouping
         Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks
         the first and the last part is taken, so that whatever changes at some time is seen on
@@ -67,8 +65,6 @@ def cut(track: Track, pieces: Pieces) -> Track:
 
     Parameters
     ----------
-    track : Track
-        With its groups.
     pieces : list of (int, int)
         Half-open, ascending, not overlapping.
 

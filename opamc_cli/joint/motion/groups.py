@@ -42,8 +42,6 @@ def cycle_length(path: Floats, rate_hz: float) -> int | None:
     ----------
     path : array of shape (n,)
         Speed (or position) of one recording.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
@@ -107,14 +105,8 @@ def group_samples(
     ----------
     moving : bool array of shape (n,)
         Samples that count.
-    bounds : tuple of (int, int)
-        Half-open recordings.
     period : int or None
         Samples per cycle, if the motion repeats.
-    rate_hz : float
-        Sampling rate.
-    run_names : tuple of str
-        One name per recording.
 
     Returns
     -------
@@ -170,10 +162,7 @@ def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
     return sealed
 
 
-def _blocks(
-    moving: Bools,
-    run_names: tuple[str, ...],
-) -> Grouping | None:
+def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:
     indices = np.flatnonzero(moving)
     if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None

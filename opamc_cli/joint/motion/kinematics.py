@@ -164,14 +164,6 @@ def motion_from_position(
         Logged position.
     velocity_rad_s : array of shape (n,) or None
         Logged speed: used where it agrees with the position and is the cleaner of the two.
-    rate_hz : float
-        Sampling rate.
-    smoothing : Smoothing, optional
-        Another window.
-
-    Returns
-    -------
-    Motion
     """
     if smoothing is None:
         window = smoothing_window(position_rad, rate_hz, derivative=2)
@@ -224,8 +216,6 @@ def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) ->
     ----------
     position_rad, velocity_rad_s : arrays of shape (n,)
         Logged side by side.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
@@ -260,8 +250,6 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
 
     Parameters
     ----------
-    motion : Motion
-        Smoothed motion.
     usable : bool array of shape (n,)
         Samples whose readings are finite.
 
@@ -300,10 +288,6 @@ def build_track(
     ----------
     recordings : list of Recording
         All at the same rate; each with a signed current, or three phases.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-    smoothing : Smoothing, optional
-        Another window than the noise of each path asks for.
 
     Returns
     -------

@@ -18,13 +18,6 @@ ENOUGH_SAMPLES = 200_000
 def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
     """Lay recordings on one grid and split them into groups.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        In time order, all at one rate.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-
     Returns
     -------
     track : Track
@@ -46,13 +39,6 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
 
 def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:
     """Enough of long recordings to choose by how they are differentiated, from the first motion on.
-
-    Parameters
-    ----------
-    recordings : list of Recording
-        In time order.
-    track : Track
-        All of them.
 
     Returns
     -------

@@ -61,8 +61,6 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     ----------
     path : array of shape (n,)
         Position (derivative 2) or speed (derivative 1).
-    rate_hz : float
-        Sampling rate.
     derivative : int
         Derivative that must come out clean.
 
@@ -91,12 +89,6 @@ def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | I
 
     Parameters
     ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        Order of the derivative.
     at : int or array of shape (k,)
         Sample at which it is asked for, from the middle.
 
@@ -114,17 +106,7 @@ def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | I
 
 
 def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
-    """Compute the standard deviation of a derivative of white noise of unit deviation.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        Order of the derivative.
-    """
+    """Compute the standard deviation of a derivative of white noise of unit deviation."""
     return float(np.linalg.norm(polynomial_weights(rate_hz, window, derivative)))
 
 
@@ -133,13 +115,6 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
 
     The second derivative of a Savitzky-Golay filter is the plain second difference of the path
     averaged with these weights; what is fitted to that derivative has to be averaged alike.
-
-    Parameters
-    ----------
-    window : int
-        Odd number of samples.
-    derivative : int
-        1 or 2.
 
     Returns
     -------
@@ -165,10 +140,6 @@ def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Float
     ----------
     path : array of shape (n,)
         Position or speed.
-    rate_hz : float
-        Sampling rate.
-    window, derivative : int
-        Of the local polynomial.
 
     Returns
     -------
@@ -187,15 +158,6 @@ def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Float
 
 def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     """Compute the standard deviation of what a window takes from a derivative a second time.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        1 or 2.
 
     Returns
     -------
@@ -220,10 +182,6 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
         Standard deviation of the path's white noise.
     scale : float
         Standard deviation of the derivative.
-    rate_hz : float
-        Sampling rate.
-    window, derivative : int
-        Of the local polynomial.
 
     Returns
     -------
@@ -248,8 +206,6 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
     ----------
     path : array of shape (n,)
         Uniformly sampled path, n >= window.
-    rate_hz : float
-        Sampling rate.
     window : int
         Odd number of samples, at least 5.
     derivative : int

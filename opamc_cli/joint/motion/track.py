@@ -232,15 +232,6 @@ class Regressors(Protocol):
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
     """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
 
-    Parameters
-    ----------
-    values : array of shape (n,) or (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
-    factor : int
-        Samples per block, at least 1.
-
     Returns
     -------
     array of shape (n // factor per recording,) or with m columns
@@ -263,10 +254,6 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
 
     Parameters
     ----------
-    values : array of shape (n,) or (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
     kernel : array of odd length
         Weights.
     """
@@ -293,14 +280,8 @@ def averaged_blocks(
 
     Parameters
     ----------
-    values : array of shape (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
     kernel : array of odd length
         Weights of the moving average.
-    factor : int
-        Samples per block, at least 1.
     """
     weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
     half = kernel.size // 2
@@ -317,8 +298,6 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
 
     Parameters
     ----------
-    track : Track
-        Any track.
     inside : bool array of shape (n,)
         Samples that keep their group; all others get none.
     spans : tuple of (int, int)
@@ -341,13 +320,6 @@ def coarsen(track: Track, factor: int) -> Track:
     Current, position and speed are first put through the moving average that the acceleration has
     gone through: next to a step of the acceleration, a speed that is rounded off less than the
     current is some per cent off, which looks like friction of another form.
-
-    Parameters
-    ----------
-    track : Track
-        Track at the full rate.
-    factor : int
-        Samples per block.
 
     Returns
     -------

@@ -49,14 +49,8 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
 
     Parameters
     ----------
-    best : Chain
-        With the effect.
     drop : float
         What the effect takes off the held-out mean square error, in A^2.
-    term : Term
-        The effect.
-    unnamed : Pool
-        Functions that have no name.
 
     Returns
     -------
@@ -80,15 +74,7 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
 
 
 def curve_of(fit: Fit, place: int) -> Curve:
-    """Draw an effect and the residual over the effect's covariate.
-
-    Parameters
-    ----------
-    fit : Fit
-        Final model.
-    place : int
-        Of the term in the fit.
-    """
+    """Draw an effect and the residual over the effect's covariate."""
     dataset = fit.dataset
     grid = dataset.sharp
     term, values = fit.terms[place], fit.coefficients[place]

@@ -34,13 +34,6 @@ class Named:
 def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]:
     """Drop what is not worth its price, take the name off what a function without one does better.
 
-    Parameters
-    ----------
-    best : Chain
-        From the beam.
-    pool, unnamed : Pool
-        Effects, and functions that have no name.
-
     Returns
     -------
     Chain

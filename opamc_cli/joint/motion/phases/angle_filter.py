@@ -31,8 +31,6 @@ def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: flo
     ----------
     angle_noise_rad : float
         Standard deviation per sample.
-    rate_hz, bandwidth_hz : float
-        Sampling rate and the smoother's bandwidth.
 
     Returns
     -------
@@ -56,8 +54,6 @@ def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float)
         Standard deviation of the measured angle per sample.
     acceleration : float
         Standard deviation of the acceleration, rad/s^2.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
@@ -76,11 +72,6 @@ def smoothing_kernel(rate_hz: float, bandwidth_hz: float) -> Floats:
     """Weights by which the smoother averages a steady recording, odd length, sum 1.
 
     With ``b`` the bandwidth, the smoother's gain at frequency f is ``1 / (1 + (f / b)^6)``.
-
-    Parameters
-    ----------
-    rate_hz, bandwidth_hz : float
-        Sampling rate and bandwidth.
     """
     half = int(1.5 * rate_hz / bandwidth_hz)
     length = 16 * half

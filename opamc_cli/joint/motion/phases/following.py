@@ -71,10 +71,7 @@ class _Followed:
 
 
 def _followed(
-    vector: NDArray[np.complex128],
-    start: NDArray[np.complex128],
-    rate_hz: float,
-    bandwidth: float,
+    vector: NDArray[np.complex128], start: NDArray[np.complex128], rate_hz: float, bandwidth: float
 ) -> _Followed:
     """Follow a vector; its noise is that of the one before anything small was taken out of it."""
     length = np.abs(start)
@@ -104,8 +101,6 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     ----------
     phases_a : array of shape (n, 3)
         Finite phase currents, n > 16; the electrical frequency below a quarter of the rate.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
@@ -188,8 +183,6 @@ def averaged_angle(
         Standard deviation of each of the vector's components.
     floor : float
         Length below which a vector never counts.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------

@@ -92,15 +92,6 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     stretch of current has the angle that it had one cycle earlier; in the first cycle, the one
     that follows from the median of all cycles' steps.
 
-    Parameters
-    ----------
-    angle : PhaseAngle
-        As followed.
-    period : int
-        Samples per cycle.
-    rate_hz : float
-        Sampling rate.
-
     Returns
     -------
     PhaseAngle
@@ -188,8 +179,6 @@ def lost(strong: Bools, rate_hz: float) -> Bools:
     ----------
     strong : bool array of shape (n,)
         Samples with enough current to tell an angle.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------

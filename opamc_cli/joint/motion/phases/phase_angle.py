@@ -54,8 +54,6 @@ class PhaseAngle:
             Joint angle and speed.
         ratio : float or None
             Electrical radians per joint radian, if known.
-        rate_hz : float
-            Sampling rate.
 
         Returns
         -------

@@ -79,10 +79,6 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     ----------
     torque_a : array of shape (n,)
         Current along the followed angle.
-    angle : PhaseAngle
-        The followed angle.
-    rate_hz : float
-        Sampling rate.
 
     Returns
     -------
