@@ -123,8 +123,8 @@ class Dataset:
     def parts(self) -> tuple[Parts, Parts]:
         """Open samples of the fine and of the coarse grid, in parts."""
         if "parts" not in self.cache.shared:
-            fine = parts_of(self.fine, self.fine.track.clear)
-            coarse = parts_of(self.coarse, self.coarse.track.clear)
+            fine = parts_of(self.fine.rows, self.fine.track.clear)
+            coarse = parts_of(self.coarse.rows, self.coarse.track.clear)
             self.cache.shared["parts"] = (fine, coarse)
         found: tuple[Parts, Parts] = self.cache.shared["parts"]
         return found
@@ -235,8 +235,7 @@ class Fit:
                 fast += dataset.columns(term, True) @ values[:, None]
         fast = averaged_blocks(fast, track.bounds, track.kernel, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        sums = dataset.sums_of([*slow, fast], False)
-        return sums.given([sums.moment.shape[1] - 1], np.ones(1)), slow, fast[:, 0]
+        return dataset.sums_of([*slow, fast], False).less_last(), slow, fast[:, 0]
 
     @cached_property
     def drift_free_error(self) -> Floats:

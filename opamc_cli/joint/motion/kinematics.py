@@ -37,6 +37,9 @@ SLOWEST_SHARE = 0.02
 """Samples below this share of the top speed do not count: their direction is not certain."""
 
 
+LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
+
+
 @dataclass(frozen=True)
 class Recording:
     """One joint's samples of one run, as they were logged."""
@@ -66,18 +69,8 @@ class Recording:
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
-
-        def part(values: Floats | None) -> Floats | None:
-            return None if values is None else values[span]
-
-        return replace(
-            self,
-            current_a=part(self.current_a),
-            phases_a=part(self.phases_a),
-            position_rad=part(self.position_rad),
-            velocity_rad_s=part(self.velocity_rad_s),
-            temperature_c=part(self.temperature_c),
-        )
+        logged = ((name, getattr(self, name)) for name in LOGGED)
+        return replace(self, **{name: one[span] for name, one in logged if one is not None})
 
 
 WINDOWS_S = (0.01, 0.02, 0.05, 0.12)

@@ -132,40 +132,21 @@ def smoothed_angle(
     walk = variance * step * (2 * np.pi * bandwidth_hz) ** 6
     first = np.flatnonzero(sure)
     start = float(rough_rad_s[first[0]]) if first.size and first[0] < rate_hz / 10 else 0.0
+    ease = np.ones(angle_rad.size) if spread is None else spread
+    jumps = np.zeros(angle_rad.size, dtype=bool) if free is None else free
+    rough_variance = (ROUGH_NOISE_RAD * rate_hz / 15) ** 2
     angle, speed, acceleration = _smooth(
-        angle_rad,
-        strong,
-        rough_rad_s,
-        sure,
-        step,
-        variance,
-        (ROUGH_NOISE_RAD * rate_hz / 15) ** 2,
-        walk,
-        start,
-        (2 * np.pi * bandwidth_hz) ** 2,
-        np.ones(angle_rad.size) if spread is None else spread,
-        np.zeros(angle_rad.size, dtype=bool) if free is None else free,
-        turn_rad,
-    )
+        angle_rad, strong, rough_rad_s, sure, step, variance, rough_variance, walk, start,
+        (2 * np.pi * bandwidth_hz) ** 2, ease, jumps, turn_rad,
+    )  # fmt: skip
     return angle, speed, acceleration
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc,unused-ignore]
 def _smooth(  # type: ignore[no-untyped-def]
-    measured,
-    strong,
-    rough,
-    sure,
-    step,
-    variance,
-    rough_variance,
-    walk,
-    start,
-    spread,
-    ease,
-    free,
+    measured, strong, rough, sure, step, variance, rough_variance, walk, start, spread, ease, free,
     turn,
-):
+):  # fmt: skip
     # Scalars throughout: three states are too few for matrix calls, which cost 20 times as much.
     n = measured.size
     x = np.empty((n, 3))

@@ -42,7 +42,7 @@ def torque_current(
     speeds = np.abs(velocity)
     moving = speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     columns = np.concatenate([_frictions(velocity), _powers(position_rad)], axis=1)[moving]
-    friction = _frictions(velocity)[moving] @ _fitted(columns, torque[moving])[:2]
+    friction = columns[:, :2] @ solve(columns.T @ columns, columns.T @ torque[moving])[:2]
     return torque if float(np.dot(friction, velocity[moving])) >= 0 else -torque
 
 
@@ -56,13 +56,6 @@ def _powers(position: Floats) -> Floats:
     place = position / max(float(np.ptp(position)), 1e-9) * 2
     place = place - place.mean()
     return np.stack([place**k for k in range(4)], axis=1)
-
-
-def _fitted(columns: Floats, values: Floats) -> Floats:
-    """Least squares, whatever the columns' units are."""
-    scale = np.sqrt(np.mean(columns**2, axis=0)) if columns.size else np.ones(columns.shape[1])
-    scaled = columns / (scale + 1e-300)
-    return solve(scaled.T @ scaled, scaled.T @ values) / (scale + 1e-300)
 
 
 def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
