@@ -39,11 +39,8 @@ def energy_of(
 ) -> Energy:
     """Change of the mean square residual, after a shift is taken from the target if one is given.
 
-    Parameters
-    ----------
-    slow_found : bool
-        Whether the coefficients lie outside the baseline's; if not, their difference is that of
-        healthy sessions and counts as nothing.
+    Without `slow_found` the coefficients do not lie outside the baseline's: their difference is
+    that of healthy sessions and counts as nothing.
     """
     after = np.array([unit.after for unit in units])
     moved = np.zeros(len(units))

@@ -27,13 +27,7 @@ class Periodic:
 def find_periodic(
     units: list[Unit], residuals: list[Floats], between: float = 0.0
 ) -> Periodic | None:
-    """Read the lines that grew.
-
-    Returns
-    -------
-    Periodic or None
-        None where no line grew, or one that keeps its frequency and is not the mains'.
-    """
+    """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
     spectra = order_spectra(units, residuals)
     lines = [] if spectra is None else grown_lines(spectra, between)
     if spectra is None or not lines:

@@ -117,13 +117,7 @@ def prepared(units: list[Unit], population: Population) -> list[Prepared]:
 def shifts(
     units: list[Prepared], population: Population, chosen: tuple[Term, ...], candidates: list[Term]
 ) -> list[Shift]:
-    """Compare target and baseline for every candidate beside the chosen terms.
-
-    Returns
-    -------
-    list of Shift
-        Least probable first.
-    """
+    """Compare both sides for every candidate beside the chosen terms; least likely first."""
     trials = []
     for candidate in candidates:
         terms = (*chosen, candidate)

@@ -78,17 +78,9 @@ def follow(recording: Recording, joint: Joint) -> Tracked | None:
 def read_side(
     recordings: list[Recording], joint: Joint, after: bool, cycles: bool, follow: Follow = follow
 ) -> list[Unit]:
-    """Turn the recordings of one side into units.
+    """Turn the recordings of one side into units, but for those that hardly move.
 
-    Parameters
-    ----------
-    cycles : bool
-        Whether cycles (or blocks) are the units, and not recordings.
-
-    Returns
-    -------
-    list of Unit
-        Recordings in which the joint hardly moves are left out.
+    Units are cycles (or blocks) where `cycles` asks for it, else recordings.
     """
     units = []
     for recording in recordings:
@@ -137,12 +129,9 @@ def usable_terms(units: list[Unit], effects: list[Effect]) -> tuple[Term, ...]:
 def own_fit(
     unit: Unit, terms: tuple[Term, ...], fine: bool = False, current: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Least squares of the terms on one unit alone.
+    """Coefficients and residual of least squares of the terms on one unit's samples alone.
 
-    Parameters
-    ----------
-    current : array, optional
-        Another current on the unit's samples.
+    Another `current` may be given on the same samples.
     """
     columns = unit.stacked(terms, fine)
     values = unit.current_a(fine) if current is None else current

@@ -76,13 +76,7 @@ def built_in_library(without: tuple[str, ...] = ()) -> Library:
 
 
 def effect_named(library: Library, name: str) -> Effect:
-    """Look an effect up.
-
-    Raises
-    ------
-    ConfigError
-        If the library has no such effect; names the nearest one.
-    """
+    """Look an effect up; a ConfigError names the nearest one where the library has no such."""
     if name in library:
         return library[name]
     near = get_close_matches(name, library, n=1)

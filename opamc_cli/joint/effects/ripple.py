@@ -229,17 +229,9 @@ def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
 
 
 def order_ties(order: float, track: Track) -> list[str]:
-    """Return the known lines that lie within the order resolution of another one.
+    """Names of the known lines within the order resolution of an order beside the nearest of them.
 
-    Parameters
-    ----------
-    order : float
-        As found, per revolution of the track's machine angle.
-
-    Returns
-    -------
-    list of str
-        Names of those beside the nearest; empty where orders have no meaning.
+    None where orders, as found per revolution of the track's machine angle, have no meaning.
     """
     ratio = track.joint.gear_ratio
     if track.angle_kind != "motor" or not ratio:

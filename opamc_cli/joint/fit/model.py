@@ -389,13 +389,7 @@ def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
 def currents(
     terms: Sequence[Term], blocks: Iterable[Floats], coefficients: Sequence[Floats], size: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Add up the current of all terms, of the static ones, and of those that carry the load.
-
-    Parameters
-    ----------
-    blocks : iterable of arrays of shape (size, k)
-        Their regressors.
-    """
+    """Add up the current of all terms, of the static ones, and of those that carry the load."""
     total, model, load = np.zeros(size), np.zeros(size), np.zeros(size)
     for term, block, values in zip(terms, blocks, coefficients, strict=True):
         part = block @ values

@@ -58,11 +58,7 @@ class Parts:
         """Stretch of time that each part lies in: half a unit, or as long as it moves both ways.
 
         Where a half is one stroke friction is an offset, and no drift. A single stroke has halves.
-
-        Parameters
-        ----------
-        direction : array of shape (n,)
-            Sign of the speed on the grid.
+        The direction is the sign of the speed on the grid, shape (n,).
         """
         halves = self.halves
         starts = [start for start, _ in self.slices]
@@ -147,15 +143,10 @@ class Sums:
     parts: Parts
 
     def without_drift(self, stretches: Ints) -> "Sums":
-        """Allow the current another offset in each stretch of time.
+        """Allow the current another offset in each stretch, (p,) as `Parts.stretches` tells.
 
         The last regressor has to be ones; the parts of what is returned are the stretches, without
         rows.
-
-        Parameters
-        ----------
-        stretches : int array of shape (p,)
-            Stretch of each part, as `Parts.stretches` tells.
         """
         count = int(stretches.max()) + 1
         gram, moment, power = (

@@ -56,14 +56,9 @@ class RegressorCache:
         return found
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
-        """Sum products over parts.
+        """Sum products of regressors, term by term (n, k), over parts.
 
-        Parameters
-        ----------
-        blocks : sequence of arrays of shape (n, k)
-            Regressors, term by term.
-        current : array of shape (n,)
-            The same in every call for one grid.
+        Of one grid, current, shape (n,), and parts are the same in every call.
         """
         self._forget_strangers(blocks)
         target = current[:, None] if "target" + str(fine) not in self.shared else None

@@ -24,17 +24,9 @@ ROUNDING = 1e-12
 def measurement_noise(path: Floats) -> float:
     """Estimate the standard deviation of what is not smooth in a path, from its fourth differences.
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Uniformly sampled path, n > 4.
-
-    Returns
-    -------
-    float
-        Robust estimate in the path's unit (median absolute difference; the sum of squares of
-        the fourth difference's weights 1, -4, 6, -4, 1 is 70). Where a path in steps of an
-        encoder hardly changes from sample to sample, most differences are none: they do not count.
+    In the path's unit, by the median absolute difference; the sum of squares of the fourth
+    difference's weights 1, -4, 6, -4, 1 is 70. Where a path in steps of an encoder hardly changes
+    from sample to sample, most differences are none: they do not count.
     """
     rounding = ROUNDING * float(np.max(np.abs(path)))
     differences = np.abs(np.diff(path, 4))
@@ -57,17 +49,8 @@ def _in_steps(path: Floats, rounding: float) -> bool:
 def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     """Shortest odd window whose derivative noise is small against the derivative itself.
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Position (derivative 2) or speed (derivative 1).
-    derivative : int
-        Derivative that must come out clean.
-
-    Returns
-    -------
-    int
-        Odd number of samples, 5 or more, at most 0.2 s or 15 samples.
+    Of a position (derivative 2) or a speed (1), shape (n,): 5 samples or more, at most 0.2 s or 15
+    samples.
     """
     longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
     longest = min(longest, (path.size - 1) | 1)
@@ -111,15 +94,10 @@ def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
 
 
 def averaging_kernel(window: int, derivative: int) -> Floats:
-    """Weights of the moving average that a local polynomial's derivative is a derivative of.
+    """Weights, of sum 1, of the average that a local polynomial's derivative is a derivative of.
 
     The second derivative of a Savitzky-Golay filter is the plain second difference of the path
     averaged with these weights; what is fitted to that derivative has to be averaged alike.
-
-    Returns
-    -------
-    array of shape (window,)
-        Sum 1.
     """
     weights = polynomial_weights(1.0, window, derivative)
     for _ in range(derivative):
@@ -131,20 +109,10 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
 
 
 def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats | None:
-    """Compare the derivative with those of a third and of three times the window.
+    """Compare the derivative with those of a third and of three times the window; (n, 2).
 
-    Where the motion is less smooth than the window, as at a step of the acceleration, the
-    current holds what the derivative lacks; these two span the lack.
-
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Position or speed.
-
-    Returns
-    -------
-    array of shape (n, 2) or None
-        None where the window is the shortest there is.
+    Where the motion is less smooth than the window, as at a step of the acceleration, the current
+    holds what the derivative lacks; these two span the lack. None where the window is the shortest.
     """
     if window <= SHORTEST_WINDOW:
         return None
@@ -159,10 +127,7 @@ def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Float
 def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     """Compute the standard deviation of what a window takes from a derivative a second time.
 
-    Returns
-    -------
-    float
-        For a path that is white noise of unit deviation.
+    For a path that is white noise of unit deviation.
     """
     kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
@@ -174,19 +139,8 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
     """Count the samples per block over which a derivative's noise averages to almost nothing.
 
     A regressor with noise invites every effect that is a smoother version of it. Blocks are long
-    enough when the noise that is left is below 0.25 % of the derivative.
-
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of the path's white noise.
-    scale : float
-        Standard deviation of the derivative.
-
-    Returns
-    -------
-    int
-        At least 1, at most 0.2 s.
+    enough when the noise that is left, of white noise in the path, is below 0.25 % of the
+    derivative's standard deviation, the `scale`; at most 0.2 s.
     """
     kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
@@ -229,18 +183,10 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
 
 
 def unstepped(values: Floats) -> Floats:
-    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature.
+    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature; (n,).
 
-    Parameters
-    ----------
-    values : array of shape (n,)
-        Uniformly sampled.
-
-    Returns
-    -------
-    array of shape (n,)
-        Straight lines through the middles of the steps, the first and the last value held; the
-        values themselves where more than a tenth of them are steps.
+    By straight lines through the middles of the steps, the first and the last value held; the
+    values themselves where more than a tenth of them are steps.
     """
     steps = np.flatnonzero(np.diff(values)) + 1
     if not steps.size or steps.size > values.size / 10:

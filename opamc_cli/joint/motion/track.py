@@ -250,13 +250,7 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
 
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
-    """Put signals through a moving average inside each recording; ends keep their last value.
-
-    Parameters
-    ----------
-    kernel : array of odd length
-        Weights.
-    """
+    """Put signals through a moving average inside each recording; ends keep their last value."""
     if kernel.size == 1:
         return values
     half = kernel.size // 2
@@ -276,13 +270,7 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
 def averaged_blocks(
     values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats, factor: int
 ) -> Floats:
-    """Average blocks of what went through a moving average; one sum of products a block.
-
-    Parameters
-    ----------
-    kernel : array of odd length
-        Weights of the moving average.
-    """
+    """Average blocks of what went through a moving average; one sum of products a block."""
     weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
     half = kernel.size // 2
     parts = []
@@ -294,14 +282,9 @@ def averaged_blocks(
 
 
 def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:
-    """Cut spans out of a track; each becomes a recording of its own.
+    """Cut spans out of a track, each inside one recording; each becomes a recording of its own.
 
-    Parameters
-    ----------
-    inside : bool array of shape (n,)
-        Samples that keep their group; all others get none.
-    spans : tuple of (int, int)
-        Half-open, ascending, each inside one recording.
+    Samples that are not `inside`, bool (n,), lose their group.
     """
     rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
     stops = np.cumsum([stop - start for start, stop in spans])
@@ -320,11 +303,6 @@ def coarsen(track: Track, factor: int) -> Track:
     Current, position and speed are first put through the moving average that the acceleration has
     gone through: next to a step of the acceleration, a speed that is rounded off less than the
     current is some per cent off, which looks like friction of another form.
-
-    Returns
-    -------
-    Track
-        Track at ``rate_hz / factor``.
     """
     if factor == 1 and track.kernel.size == 1:
         return track

@@ -45,17 +45,10 @@ class Curve:
 
 
 def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
-    """Share of its domain's curve that an effect's form holds.
+    """Share of its domain's curve that the form of an effect of the best chain holds.
 
-    Parameters
-    ----------
-    drop : float
-        What the effect takes off the held-out mean square error, in A^2.
-
-    Returns
-    -------
-    float
-        1 where no function of the domain explains more beside it.
+    It takes `drop` off the held-out mean square error, in A^2; 1 where no function of the domain
+    explains more beside it.
     """
     if term.effect.fast:
         # A line's forms are all that a line can have.

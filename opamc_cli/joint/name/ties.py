@@ -39,13 +39,7 @@ def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
 
 
 def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
-    """Say what to record to tell an effect from those that tie with it.
-
-    Returns
-    -------
-    str or None
-        None where nothing ties.
-    """
+    """Say what to record to tell an effect from those that tie with it; None where nothing ties."""
     if not ties:
         return None
     for members, advice in ADVICE:

@@ -88,15 +88,11 @@ def bridged(
 def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     """Let the angle of a motion that repeats repeat.
 
-    While the current is too small to be followed, the angle may slip by a multiple of pi. A
-    stretch of current has the angle that it had one cycle earlier; in the first cycle, the one
-    that follows from the median of all cycles' steps.
-
-    Returns
-    -------
-    PhaseAngle
-        As it was where there are fewer than three cycles, or where a cycle ends elsewhere than
-        it began by more than a tenth of its travel: that is no slip.
+    While the current is too small to be followed, the angle may slip by a multiple of pi. A stretch
+    of current has the angle that it had one cycle earlier; in the first cycle, the one that follows
+    from the median of all cycles' steps. The angle stays as it was where there are fewer than three
+    cycles, or where a cycle ends elsewhere than it began by more than a tenth of its travel: that
+    is no slip.
     """
     path = angle.angle_rad
     cycles = path.size // period
@@ -175,15 +171,7 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
 def lost(strong: Bools, rate_hz: float) -> Bools:
     """Tell where the current was too small, for too long, to carry the followed angle across.
 
-    Parameters
-    ----------
-    strong : bool array of shape (n,)
-        Samples with enough current to tell an angle.
-
-    Returns
-    -------
-    bool array of shape (n,)
-        False also in gaps of up to `LOST_S`: the filter bridges them.
+    Of strong samples, bool (n,); gaps of up to `LOST_S` are bridged by the filter.
     """
     result: Bools = np.ones(strong.size, dtype=bool)
     for start, stop in stretches(strong, rate_hz, LOST_S):
