@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import Energy, energy_of, rest_growth, shift_power
+from opamc_cli.joint.change.energy import Energy, energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Reading
@@ -32,9 +32,6 @@ SMALLEST_LINE_SHARE = 0.15
 SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
-
-VISIBLE = 0.5
-"""A shift of which the mean square shows less is hidden by what sessions differ by."""
 
 HARMLESS_SHARE = 0.5
 FAULT_SHARE = 0.2
@@ -149,12 +146,8 @@ def explain_change(
 
     energy = energy_of(units, population, slow_found=bool(slow))
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    powers = [shift_power(units, found.shift) for found in slow]
-    # Where healthy sessions' differences hide a change, its own power is what there is of it.
-    hidden = bool(powers) and energy.slow < VISIBLE * powers[-1]
-    moved = powers[-1] if hidden else energy.slow
-    whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
-    gains = np.diff(powers, prepend=0.0) if hidden else _gains(units, population, energy, slow)
+    whole = max(energy.slow + max(energy.fast, held), SMALLEST_POWER)
+    gains = _gains(units, population, energy, slow)
     causes = _slow_entries(units, gains / whole, slow, library)
     if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
