@@ -202,7 +202,7 @@ def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Gri
     stops = np.cumsum([counts[g] for g in groups])
     starts = np.concatenate([[0], stops[:-1]])
     slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
-    track = replace(track, open_samples=fit)
+    track = replace(track, open_samples=fit, kept={})
     return Grid(track, fit, member & np.isin(track.group, sealed), slices)
 
 

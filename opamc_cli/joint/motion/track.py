@@ -102,6 +102,8 @@ class Track:
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
+    kept: dict[Hashable, Floats] | None = None
+    """Regressors of static terms that stay the same whatever is fitted, while a search goes on."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
     None."""
@@ -159,8 +161,15 @@ class Track:
     def static_columns(self) -> Floats:
         """Regressors of the static terms, shape (m, k), on the full rate's samples."""
         source = self.full or self
-        blocks = [term.columns(source).T for term in self.static_terms]
+        blocks = [self._regressors(term, source).T for term in self.static_terms]
         return np.concatenate([np.zeros((0, source.size)), *blocks]).T
+
+    def _regressors(self, term: "Regressors", source: "Track") -> Floats:
+        if self.kept is None or not term.is_constant:
+            return term.columns(source)
+        if term.key not in self.kept:
+            self.kept[term.key] = term.columns(source)
+        return self.kept[term.key]
 
     @cached_property
     def static_sums(self) -> Floats:
