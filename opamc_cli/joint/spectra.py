@@ -110,18 +110,10 @@ def order_spectrum(
 def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
     """Orders that stand out of the noise with their power, strongest first.
 
-    Parameters
-    ----------
-    residual : array of shape (n,)
-        Zero where samples do not count.
-    count : int
-        Strongest peaks, and so many of those that stand out most of their surroundings.
-
-    Returns
-    -------
-    list of (float, float)
-        Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
-        and their power in units of white noise's, where they hold 2 % of the residual's power.
+    The `count` strongest peaks, and as many of those that stand out most of their surroundings:
+    orders refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart, and
+    their power in units of white noise's, where they hold 2 % of the residual's power. The
+    residual, (n,) at the full rate, is zero where samples do not count.
     """
     orders, power, _ = order_spectrum(track, residual, highest_folded(track))
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))

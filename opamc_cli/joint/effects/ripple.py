@@ -245,20 +245,10 @@ def order_ties(order: float, track: Track) -> list[str]:
 
 
 def read_order(order: float, track: Track, compared: bool = True) -> str:
-    """Say what a ripple order means.
+    """Read an order, per revolution of the track's machine angle, by the table of orders.
 
-    Parameters
-    ----------
-    order : float
-        Cycles per revolution of the track's machine angle.
-    compared : bool
-        Whether the line has grown between recordings. Many healthy gears have one of the gear's
-        lines: without a comparison nothing is to be inspected.
-
-    Returns
-    -------
-    str
-        Reading by the table of orders; "unknown periodic source" where none fits.
+    "unknown periodic source" where none fits. Many healthy gears have one of the gear's lines:
+    where it was not `compared` with an earlier recording nothing is to be inspected.
     """
     if track.angle_kind == "joint":
         return (

@@ -88,18 +88,11 @@ def _put_through(
 
 
 def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats, Floats]:
-    """Bilinear transform of a filter of second order.
+    """Bilinear transform of a filter of second order, given by its coefficients of s^2, s and 1.
 
-    Parameters
-    ----------
-    above, below : tuple of 3 floats
-        Coefficients of s^2, s and 1 in numerator and denominator.
-
-    Returns
-    -------
-    above, below : arrays of shape (3,)
-        Coefficients of 1, 1/z and 1/z^2; the denominator begins with 1. `scipy.signal.bilinear`
-        returns the same by way of polynomial objects, at a hundred times the cost.
+    Returns those of 1, 1/z and 1/z^2 above and below; the denominator begins with 1.
+    `scipy.signal.bilinear` returns the same by way of polynomial objects, at a hundred times the
+    cost.
     """
     k = 2 * rate_hz
 

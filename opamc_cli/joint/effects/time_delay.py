@@ -85,21 +85,11 @@ class TimeDelay(Effect):
 def late_means(
     sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int, wanted: Bools
 ) -> Floats:
-    """Means of blocks of columns that come later, the first and the last values held.
+    """Means of the wanted blocks of columns that come later, the first and the last values held.
 
-    Parameters
-    ----------
-    sums : array of shape (n + recordings, k)
-        Running sums of uniformly sampled columns, from zero in each recording: with them a delay
-        costs no more than there are blocks.
-    samples : float
-        Delay; between samples, what a straight line between them gives.
-    wanted : bool array of shape (n // factor per recording,)
-        Blocks that somebody looks at.
-
-    Returns
-    -------
-    array of shape (wanted blocks, k)
+    Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
+    no more than there are blocks; between samples it is what a straight line between them gives.
+    `wanted` is a bool array of shape (n // factor per recording,).
     """
     sizes = np.array([stop - start for start, stop in bounds])
     blocks = sizes // factor

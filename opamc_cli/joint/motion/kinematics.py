@@ -151,12 +151,8 @@ def motion_from_position(
 ) -> Motion:
     """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
 
-    Parameters
-    ----------
-    position_rad : array of shape (n,)
-        Logged position.
-    velocity_rad_s : array of shape (n,) or None
-        Logged speed: used where it agrees with the position and is the cleaner of the two.
+    A logged speed, (n,) beside the position, is used where it agrees with it and is the cleaner
+    one.
     """
     if smoothing is None:
         window = smoothing_window(position_rad, rate_hz, derivative=2)
@@ -203,18 +199,9 @@ def _smoothed(
 
 
 def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) -> float | None:
-    """How many times the rate of change of a logged position a logged speed is.
+    """How many times the rate of change of a logged position a logged speed is, both (n,).
 
-    Parameters
-    ----------
-    position_rad, velocity_rad_s : arrays of shape (n,)
-        Logged side by side.
-
-    Returns
-    -------
-    float or None
-        1 where the units agree; None where the two do not tell, or have nothing to do with one
-        another.
+    1 where the units agree; None where the two do not tell, or have nothing to do with one another.
     """
     length = max(int(RATIO_BLOCK_S * rate_hz), 1)
     edges = np.arange(0, position_rad.size, length)
@@ -239,16 +226,9 @@ def direction_of(motion: Motion) -> Floats:
 
 
 def moving_samples(motion: Motion, usable: Bools) -> Bools:
-    """Tell the samples in motion: fast enough, half a window from any reversal.
+    """Tell the samples in motion, (n,): fast enough, half a window from any reversal.
 
-    Parameters
-    ----------
-    usable : bool array of shape (n,)
-        Samples whose readings are finite.
-
-    Returns
-    -------
-    bool array of shape (n,)
+    Of those whose readings are finite, the `usable`.
     """
     speeds = np.abs(motion.velocity)
     direction = direction_of(motion)
@@ -277,20 +257,8 @@ def build_track(
 ) -> Track:
     """Put recordings of one joint on one grid, with smoothed motion and torque current.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        All at the same rate; each with a signed current, or three phases.
-
-    Returns
-    -------
-    Track
-        Groups are not set yet (-1 everywhere).
-
-    Raises
-    ------
-    ValueError
-        If a recording holds neither three phases nor a current with position or speed.
+    Groups are not set yet. All are at one rate, each with a signed current or three phases: a
+    ValueError is raised where one holds neither three phases nor a current with position or speed.
     """
     rate = recordings[0].rate_hz
     pieces = [_one(recording, joint, smoothing) for recording in recordings]

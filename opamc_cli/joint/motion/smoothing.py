@@ -66,18 +66,10 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
 
 
 def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | Ints = 0) -> Floats:
-    """Weights of a window's samples in a derivative of the cubic that fits them best.
+    """Weights of a window's samples in a derivative of the cubic that fits them best; (window,).
 
+    At a sample counted from the middle, or at k of them: then (k, window). As
     `scipy.signal.savgol_coeffs`, without the 0.7 s that package takes to load.
-
-    Parameters
-    ----------
-    at : int or array of shape (k,)
-        Sample at which it is asked for, from the middle.
-
-    Returns
-    -------
-    array of shape (window,) or (k, window)
     """
     half = window // 2
     places = np.arange(-half, half + 1) / half
@@ -154,20 +146,9 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:
-    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial).
+    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial), (n,).
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Uniformly sampled path, n >= window.
-    window : int
-        Odd number of samples, at least 5.
-    derivative : int
-        0 for the smoothed path itself.
-
-    Returns
-    -------
-    array of shape (n,)
+    Derivative 0 is the smoothed path itself. The window has an odd number of samples, 5 to n.
 
     References
     ----------

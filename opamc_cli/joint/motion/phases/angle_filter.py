@@ -25,18 +25,10 @@ def widest_bandwidth(rate_hz: float) -> float:
 
 
 def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: float) -> float:
-    """Tell the standard deviation of the acceleration that white noise of the angle leaves.
+    """Tell the acceleration, in rad/s^2, that white noise of the angle leaves.
 
-    Parameters
-    ----------
-    angle_noise_rad : float
-        Standard deviation per sample.
-
-    Returns
-    -------
-    float
-        In rad/s^2: the root of the noise's density times the integral of
-        ``(2 pi f)^4 / (1 + (f / b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
+    Its deviation: the root of the noise's density times the integral of ``(2 pi f)^4 / (1 + (f /
+    b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
     """
     return float(
         angle_noise_rad
@@ -46,19 +38,10 @@ def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: flo
 
 
 def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float) -> float:
-    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration.
+    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration, in Hz.
 
-    Parameters
-    ----------
-    angle_noise_rad : float
-        Standard deviation of the measured angle per sample.
-    acceleration : float
-        Standard deviation of the acceleration, rad/s^2.
-
-    Returns
-    -------
-    float
-        In Hz, at least 6, at most 30 and a twentieth of the rate.
+    Of standard deviations of the measured angle per sample and of the acceleration, in rad/s^2; at
+    least 6 Hz, at most 30 and a twentieth of the rate.
     """
     widest = widest_bandwidth(rate_hz)
     own = acceleration_noise(angle_noise_rad, rate_hz, widest)

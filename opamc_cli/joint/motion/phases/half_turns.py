@@ -38,24 +38,12 @@ def bridged(
 ) -> tuple[Floats, Floats]:
     """Follow an angle that is known modulo pi through long gaps of the current.
 
-    As whole waves are resolved in satellite positioning: first the angle may change by any amount
-    in every gap, and only speeds and accelerations of both sides tell how it goes on. Then each
-    change is set to the nearest multiple of pi. A filter that guesses before it has seen the
+    Angle and speed, (n,). As whole waves are resolved in satellite positioning: first the angle may
+    change by any amount in every gap, and only speeds and accelerations of both sides tell how it
+    goes on. Then each change is set to the nearest multiple of pi: the angle is steady within each
+    stretch of current, and on the same branch in all. A filter that guesses before it has seen the
     other side loses count four times as early. A long gap between two slow stretches is a rest.
-
-    Parameters
-    ----------
-    measured_rad : array of shape (n,)
-        Angle modulo pi.
-    strong : bool array of shape (n,)
-        Samples whose angle counts.
-    rough_rad_s, sure, spread, rate_hz, bandwidth_hz
-        As for `smoothed_angle`.
-
-    Returns
-    -------
-    angle, speed : arrays of shape (n,)
-        The angle is steady within each stretch of current, and on the same branch in all.
+    Arguments are those of `smoothed_angle`.
     """
     if not strong.any():
         return np.zeros(strong.size), np.zeros(strong.size)

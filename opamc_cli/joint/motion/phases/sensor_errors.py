@@ -41,24 +41,11 @@ def rounded(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
 def without_sensor_errors(
     vector: NDArray[np.complex128], angle_rad: Floats, fast: Bools
 ) -> NDArray[np.complex128]:
-    """Take zero errors and unequal gains of the sensors out of a current vector.
+    """Take zero errors and unequal gains of the sensors out of a current vector, (n,).
 
     Both show in the flux current, once and twice per electrical revolution; at a low speed the
-    followed angle would sway with them.
-
-    Parameters
-    ----------
-    vector : complex array of shape (n,)
-        Clarke vector.
-    angle_rad : array of shape (n,)
-        Followed angle of the torque axis, modulo pi.
-    fast : bool array of shape (n,)
-        Samples at which the carrier is faster than the follower.
-
-    Returns
-    -------
-    complex array of shape (n,)
-        The vector itself where too few samples are fast.
+    followed angle, modulo pi, would sway with them. At fast samples the carrier is faster than the
+    follower; where these are too few, the vector stays as it is.
     """
     if np.count_nonzero(fast) < FEWEST_FAST_SAMPLES:
         return vector
