@@ -75,6 +75,19 @@ def rest_growth(units: list[Unit], population: Population, shift: Shift | None) 
     return float(np.median(shares[True])) / max(float(np.median(shares[False])), 1e-300)
 
 
+def shift_power(units: list[Unit], shift: Shift) -> float:
+    """Mean square of a shift's own current in the target's units, A^2."""
+    return float(
+        np.mean(
+            [
+                np.mean((unit.stacked(shift.terms) @ shift.coefficients) ** 2)
+                for unit in units
+                if unit.after
+            ]
+        )
+    )
+
+
 def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> float:
     """Mean square that a ripple and its harmonics hold more in the target, A^2.
 

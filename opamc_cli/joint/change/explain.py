@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import Energy, energy_of, rest_growth
+from opamc_cli.joint.change.energy import Energy, energy_of, rest_growth, shift_power
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Reading
@@ -32,6 +32,11 @@ SMALLEST_LINE_SHARE = 0.15
 SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
+
+HIDDEN = frozenset({"coulomb", "viscous", "thermal_viscous"})
+VISIBLE = 0.5
+"""Friction differs most between sessions: a shift of it of which the mean square shows less than
+half is hidden by what they differ by. Where other effects were found too, it is they that show."""
 
 HARMLESS_SHARE = 0.5
 FAULT_SHARE = 0.2
@@ -146,8 +151,13 @@ def explain_change(
 
     energy = energy_of(units, population, slow_found=bool(slow))
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    whole = max(energy.slow + max(energy.fast, held), SMALLEST_POWER)
-    gains = _gains(units, population, energy, slow)
+    moved, gains = energy.slow, _gains(units, population, energy, slow)
+    powers = [shift_power(units, found.shift) for found in slow]
+    friction = powers and {found.effect for found in slow} <= HIDDEN
+    if friction and energy.slow < VISIBLE * powers[-1]:
+        # The mean square hardly shows the change: its own power is what there is of it.
+        moved, gains = powers[-1], np.diff(powers, prepend=0.0)
+    whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
     causes = _slow_entries(units, gains / whole, slow, library)
     if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)

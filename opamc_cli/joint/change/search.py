@@ -43,6 +43,9 @@ by a change of it."""
 
 LARGEST_P = 0.015
 PLANNED_P = 0.05
+HIDDEN_P = 0.001
+"""Below which dry or viscous friction counts as the first cause though the target lies no farther
+from the baseline's mean than its own sessions do: what those differ by may happen to hide it."""
 
 SMALLEST_GAIN = 0.03
 """What explains less of the slow change is not worth a maintainer's time."""
@@ -159,7 +162,11 @@ def _next(
     gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
     most = max(gains.values())
     if most < SMALLEST_GAIN * max(left - _usual(ready), 0.0) or most <= 0:
-        return None
+        # Friction differs most between sessions, and what they differ by may happen to hide it.
+        surest = min(sure, key=lambda name: sure[name][0])
+        if chosen or surest not in ("coulomb", "viscous") or sure[surest][0] > HIDDEN_P:
+            return None
+        gains, most = {surest: 0.0}, 0.0
     # Among those that explain the change equally well, the simplest is named.
     as_good = [name for name, gain in gains.items() if gain >= AS_GOOD * most]
     first = min(as_good, key=lambda name: (sure[name][1].width, _rank(name), sure[name][0]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from sessions import LIBRARY, TERMS, units_of
 
-from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of, rest_growth
+from opamc_cli.joint.change.energy import Energy, comb_energy, energy_of, rest_growth, shift_power
 from opamc_cli.joint.change.lines import strokes
 from opamc_cli.joint.change.slow import Shift
 from opamc_cli.joint.fit.model import Term
@@ -96,8 +96,19 @@ def test_a_shift_that_is_taken_away_leaves_nothing_slow():
     before = energy_of(units, population, True)
     assert before.total == pytest.approx(power, rel=0.05)
     assert energy_of(units, population, True, shift).total < 0.02 * power
+    assert shift_power(units, shift) == pytest.approx(power, rel=1e-2)
     assert rest_growth(units, population, None) > 2
     assert rest_growth(units, population, shift) == pytest.approx(1.0, abs=0.3)
+
+
+def test_a_shift_s_power_is_that_of_the_target_alone():
+    def one(after, values):
+        columns = np.array(values, dtype=float)[:, None]
+        return SimpleNamespace(after=after, stacked=lambda terms, fine=False: columns)
+
+    units = [one(False, [9, 9]), one(True, [1, 1]), one(True, [3, 3])]
+    shift = SimpleNamespace(terms=(), coefficients=np.array([2.0]))
+    assert shift_power(units, shift) == pytest.approx((4 + 36) / 2)
 
 
 def combed(units, order, size, noise=0.01, harmonic=1):
