@@ -74,6 +74,7 @@ studies: $(STAMP)  ## The studies behind the documentation's figures; takes hour
 	$(BIN)/python benchmarks/boundaries.py --write
 	$(BIN)/python benchmarks/decision.py
 	$(BIN)/python benchmarks/closed_loop.py
+	$(BIN)/python benchmarks/rounds.py --anywhere
 	$(BIN)/python benchmarks/departures.py
 	$(BIN)/python benchmarks/loop.py
 	$(BIN)/python benchmarks/panel.py

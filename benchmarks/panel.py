@@ -1,4 +1,4 @@
-"""The panel: measured joints and five kinds of simulated ones, the loop beside its plain rivals.
+"""The panel: measured joints and six kinds of simulated ones, the loop beside its plain rivals.
 
     python benchmarks/panel.py [--first-seed 50000] [--seeds 1] [--source measured,testbed]
         [--without-source NAME] [--contestants loop,plain,beam] [--sizes 0.6,1.5] [--effects none]
@@ -8,8 +8,9 @@
 
 A row is a recording and what was hidden in it; every contestant closes it in a child of its own.
 Each seals other parts of the motion, so both errors are given. Sources: measured, actuator,
-testbed, smooth (the tests' simulator), algebraic, two-mass, and messy, of whose joints nobody
-knows what they lack. Sizes, rates and strokes take turns over effects and seeds; five seeds hold
+testbed, smooth (the tests' simulator), algebraic, two-mass, arm (another joint moves beside), and
+messy, of whose joints nobody knows what they lack. Sizes, rates and strokes take turns over effects
+and seeds; five seeds hold
 every effect at every size. One seed has some 160 rows.
 `--compare` lays an earlier result of the same seeds beside this one as a further contestant.
 """
@@ -26,7 +27,7 @@ from typing import Any
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from panel import contestants, formulas, measured, messy, run, table, testbed, two_mass_cases
+from panel import arm, contestants, formulas, measured, messy, run, table, testbed, two_mass_cases
 from panel.case import SIZES, Case, Wanted
 
 SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
@@ -37,6 +38,7 @@ SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "algebraic": formulas.algebraic_cases,
     "two-mass": two_mass_cases.cases,
     "messy": messy.cases,
+    "arm": arm.cases,
 }
 MEASURED = ("measured", "actuator")
 

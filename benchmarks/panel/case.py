@@ -21,6 +21,8 @@ class Logged:
     position: Floats | None = None
     velocity: Floats | None = None
     temperature: Floats | None = None
+    others: dict[int, Floats] = field(default_factory=dict)
+    """Positions of the arm's other joints by axis."""
 
 
 @dataclass(frozen=True)

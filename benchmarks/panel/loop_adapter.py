@@ -51,6 +51,7 @@ def close(
             position_rad=r.position,
             velocity_rad_s=r.velocity,
             temperature_c=r.temperature,
+            others_rad=r.others,
         )
         for k, r in enumerate(recordings)
     ]

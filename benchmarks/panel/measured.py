@@ -48,6 +48,11 @@ def read(files: tuple[str, ...], joint: int) -> list[Logged]:
                 position=np.unwrap(table[f"Position{joint}"]),
                 velocity=table[f"Velocity{joint}"],
                 temperature=table[f"Temp{joint}"],
+                others={
+                    axis: np.unwrap(table[f"Position{axis}"])
+                    for axis in range(1, 8)
+                    if axis != joint
+                },
             )
         )
     return recordings

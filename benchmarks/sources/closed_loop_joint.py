@@ -144,7 +144,7 @@ def record(
     m = replace(m, dry=m.dry * dry, viscous=m.viscous * np.exp(STIFFER_K * colder_k))
     if fault is not None:
         m = faulty(m, fault, size)
-    cycle = _program(joint)
+    cycle = program(joint)
     wait = np.zeros(int(rng.uniform(0.2, 1.0) * LOOP_HZ))
     wanted = np.concatenate([wait, *[cycle] * joint.cycles])
     asked, motor, link = _driven(wanted, 1 / LOOP_HZ, **vars(m))
@@ -161,7 +161,7 @@ def _stepped(values: np.ndarray, step: float) -> np.ndarray:
     return np.round(values / step) * step
 
 
-def _program(joint: ClosedLoopJoint) -> np.ndarray:
+def program(joint: ClosedLoopJoint) -> np.ndarray:
     """Cycloids from place to place."""
     parts = [np.full(int(0.5 * LOOP_HZ), joint.places[0])]
     for start, stop in zip(joint.places[:-1], joint.places[1:], strict=True):

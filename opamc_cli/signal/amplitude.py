@@ -13,17 +13,17 @@ def log_amplitudes(current: NDArray[np.floating]) -> NDArray[np.float64]:
     Parameters
     ----------
     current : ndarray, shape (n,)
-        Samples of one motion, A; NaN is passed over.
+        Samples of one motion, A.
 
     Returns
     -------
     ndarray, shape (3,)
         Of its root mean square, that of the differences of successive samples, and its mean size;
-        empty for fewer than two known samples.
+        empty for fewer than two samples, or with one that is unknown: another part of the motion
+        has another size.
     """
     x = np.asarray(current, dtype=np.float64)
-    x = x[np.isfinite(x)]
-    if x.size < 2:
+    if x.size < 2 or not np.isfinite(x).all():
         return np.empty(0)
     sizes = [np.sqrt(np.mean(x**2)), np.sqrt(np.mean(np.diff(x) ** 2)), np.mean(np.abs(x))]
     return np.log(np.maximum(sizes, FLOOR_A))

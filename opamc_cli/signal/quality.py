@@ -3,6 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
+MOST_BRIDGED = 3
+"""Samples of a gap that is filled: a packet or two that a logger lost, less than any pattern
+spans."""
+
 
 def clipped_share(x: NDArray[np.floating]) -> float:
     """Share of the samples that sit at the channel's largest or smallest value, if it is clipped.
@@ -33,6 +37,31 @@ def clipped_share(x: NDArray[np.floating]) -> float:
         if n_extreme > 5 * np.count_nonzero(known == nearest):
             n_clipped += n_extreme
     return float(n_clipped / known.size)
+
+
+def bridged(x: NDArray[np.floating]) -> NDArray[np.floating]:
+    """Fill short gaps with a straight line between what is known.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one motion; NaN where unknown.
+
+    Returns
+    -------
+    array, shape (n,)
+        Gaps of more than `MOST_BRIDGED` samples, and those at an end, are left.
+    """
+    known = np.flatnonzero(np.isfinite(x))
+    if known.size in (0, x.size):
+        return x
+    place = np.arange(known[0], known[-1] + 1)
+    after = np.searchsorted(known, place)
+    gap = known[after] - known[np.maximum(after - 1, 0)] - 1
+    filled = x.copy()
+    short = place[(gap > 0) & (gap <= MOST_BRIDGED)]
+    filled[short] = np.interp(short, known, x[known])
+    return filled
 
 
 def is_constant(x: NDArray[np.floating]) -> bool:

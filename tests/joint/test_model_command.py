@@ -275,6 +275,33 @@ def test_a_users_effect_is_used_by_name(folder):
 
 
 @pytest.mark.long
+def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path, capsys):
+    t = np.arange(6000) / 250.0
+    q = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1)
+    beside = 0.7 * np.sin(1.9 * t + 2) + 0.3 * np.sin(3.7 * t)
+    current = 0.5 * np.sin(q) + 0.4 * np.sign(np.gradient(q)) + 0.8 * np.cos(q + beside)
+    current += 0.2 * np.gradient(np.gradient(q)) * 250**2
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_current": current * 0.1}
+    write_run(tmp_path / "run.parquet", 250.0, **columns, axis3_position=beside)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    (step,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]["steps"]
+    assert (step["effect"], step["parameters"]) == ("coupling", {"axis": 3.0})
+    write_run(tmp_path / "still.parquet", 250.0, **columns, axis3_position=np.zeros(t.size))
+    for run, lacking in (("run", []), ("still", ["coupling"])):
+        assert opamc(
+            "model", "evaluate", tmp_path / f"{run}.parquet", "--axis", 1,
+            "--model", tmp_path / "out" / "model.yaml", "--out", tmp_path / run,
+        ) == 0  # fmt: skip
+        said = json.loads((tmp_path / run / "evaluation.json").read_text())["axes"][0]
+        assert [one["effect"] for one in said["not_applied"]] == lacking
+        assert (said["rmse_a"] < 0.05) == (not lacking)
+    wrong = MODEL.replace("viscous]", "viscous, {effect: coupling, parameters: {axis: 7}}]")
+    capsys.readouterr()
+    assert close(tmp_path, "--axis", "1", model=wrong) == 2
+    assert "asks for the position of axis 7" in capsys.readouterr().err
+
+
 def test_workers_do_not_change_the_bytes(folder, capsys):
     made = simulate(4, ("offset",), 0.8, rate=250.0, cycles=6)
     n = min(made.current.size, pq.read_table(folder / "run.parquet").num_rows)
@@ -351,7 +378,7 @@ def test_an_unknown_effect_is_told_with_its_line(folder, capsys):
 def test_effects_are_listed_and_shown(capsys):
     assert opamc("model", "effects", "--json") == 0
     listed = {effect["name"]: effect for effect in json.loads(capsys.readouterr().out)["effects"]}
-    assert len(listed) == 23
+    assert len(listed) == 24
     assert all(effect["domain"] and effect["text"] for effect in listed.values())
     assert opamc("model", "effects", "stribeck") == 0
     shown = capsys.readouterr().out

@@ -15,5 +15,6 @@ def track_of(joint=None, **options):
         current_a=made.current,
         position_rad=made.position,
         temperature_c=made.temperature,
+        others_rad={2: made.position[::-1].copy()},
     )
     return made, build_track([recording], joint)

@@ -52,6 +52,16 @@ def clipped(columns):
         columns[f"axis2_{name}"] = np.clip(columns[f"axis2_{name}"], -2.5, 2.5)
 
 
+def incomplete(columns):
+    columns["axis2_b"][::10] = np.nan
+
+
+def held(columns):
+    for name in "abc":
+        whole = columns[f"axis2_{name}"]
+        columns[f"axis2_{name}"] = np.repeat(whole[::5], 5)[: whole.size]
+
+
 def other_program(columns):
     for name in "abc":
         columns[f"axis2_{name}"] = np.roll(columns[f"axis1_{name}"], int(0.1 * RATE_HZ))
@@ -66,6 +76,8 @@ REASONS = {
     frozen: "axis2_b keeps one value from",
     inverted: "do not add up to zero",
     clipped: "is clipped in",
+    incomplete: "axis2_b holds no number in 10% of the motion",
+    held: "in other steps, or each value several times?",
     other_program: "fit no motion of the baseline's cycle",
 }
 

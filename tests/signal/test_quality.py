@@ -5,7 +5,7 @@ import pytest
 from carriers import Move, record
 
 from opamc_cli.signal.motion.noise import noise_level
-from opamc_cli.signal.quality import clipped_share, is_constant
+from opamc_cli.signal.quality import bridged, clipped_share, is_constant
 from opamc_cli.signal.transform.analytic import clarke
 
 
@@ -15,6 +15,16 @@ def test_noise_is_told_from_a_recording_that_moves_and_stands(noise):
     # The Clarke vector takes sqrt(2/3) of each phase's noise.
     assert noise_level(clarke(*recording.phases)) == pytest.approx(noise * np.sqrt(2 / 3), rel=0.15)
     assert noise_level(recording.phases[0]) == pytest.approx(noise, rel=0.15)
+
+
+def test_short_gaps_are_filled_by_straight_lines_and_no_others():
+    x = np.arange(20.0)
+    x[[0, 3, 5, 6, 7, 10, 11, 12, 13, 19]] = np.nan
+    expected = np.arange(20.0)
+    expected[[0, 10, 11, 12, 13, 19]] = np.nan
+    assert bridged(x) == pytest.approx(expected, nan_ok=True)
+    assert np.isnan(x[3])  # the recording's own samples stay as they are
+    assert np.isnan(bridged(np.full(3, np.nan))).all()
 
 
 @pytest.mark.parametrize("n", range(6))

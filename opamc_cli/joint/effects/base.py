@@ -13,6 +13,7 @@ CHANNEL_REASONS = {
     "temperature": "no temperature channel",
     "revisits": "no place is passed at different times, so time cannot be told from place",
     "logged": "the motion comes from the phase currents themselves: log the position",
+    "others": "no other joint is logged to move beside",
     "electrical": "no phase currents, and no pole_pairs to tell the electrical angle",
 }
 

@@ -6,6 +6,7 @@ from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.asymmetric_friction import AsymmetricFriction
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.coulomb import Coulomb
+from opamc_cli.joint.effects.coupling import Coupling
 from opamc_cli.joint.effects.dead_time import DeadTime
 from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.gravity import Gravity
@@ -46,6 +47,7 @@ BUILT_IN: tuple[type[Effect], ...] = (
     PositionDrag,
     Hysteresis,
     Elasticity,
+    Coupling,
     Ripple,
     TimeDelay,
     SensorOffset,

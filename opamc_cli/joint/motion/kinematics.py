@@ -1,7 +1,7 @@
 """From recordings to a track: motion by local polynomials, torque current with its sign."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -35,6 +35,8 @@ LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""
 SLOWEST_SHARE = 0.02
 """Samples below this share of the top speed do not count: their direction is not certain."""
+LEAST_TRAVEL_RAD = 0.01
+"""Of another joint that moves beside: half a degree; what is less is held still."""
 
 
 LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
@@ -58,6 +60,8 @@ class Recording:
     """With `position_rad`, `velocity_rad_s`: joint side; (n,) or None."""
     started_s: float | None = None
     """Start of the run on a clock common to all runs."""
+    others_rad: Mapping[int, Floats] = field(default_factory=dict)
+    """Positions of the arm's other joints by axis, where they are logged; (n,) each."""
 
     @property
     def size(self) -> int:
@@ -69,8 +73,10 @@ class Recording:
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
-        logged = ((name, getattr(self, name)) for name in LOGGED)
-        return replace(self, **{name: one[span] for name, one in logged if one is not None})
+        logged = {name: getattr(self, name) for name in LOGGED}
+        parts = {name: one[span] for name, one in logged.items() if one is not None}
+        others = {axis: values[span] for axis, values in self.others_rad.items()}
+        return replace(self, **parts, others_rad=others)
 
 
 WINDOWS_S = (0.01, 0.02, 0.05, 0.12)
@@ -261,7 +267,8 @@ def build_track(
     ValueError is raised where one holds neither three phases nor a current with position or speed.
     """
     rate = recordings[0].rate_hz
-    pieces = [_one(recording, joint, smoothing) for recording in recordings]
+    beside = _moving_beside(recordings)
+    pieces = [_one(recording, joint, smoothing, beside) for recording in recordings]
     bounds = []
     offset = 0
     clock = 0.0
@@ -294,7 +301,20 @@ def build_track(
     )
 
 
-def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Track:
+def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
+    """Axes that every recording holds; none where none of them moves."""
+    common = set.intersection(*(set(recording.others_rad) for recording in recordings))
+
+    def moves(axis: int) -> bool:
+        travels = (np.ptp(filled(one.others_rad[axis])) for one in recordings)
+        return bool(max(travels) > LEAST_TRAVEL_RAD)
+
+    return tuple(sorted(common)) if any(moves(axis) for axis in common) else ()
+
+
+def _one(
+    recording: Recording, joint: Joint, smoothing: Smoothing | None, beside: tuple[int, ...]
+) -> Track:
     rate = recording.rate_hz
     ratio, poles = joint.gear_ratio, joint.pole_pairs
     channels: set[str] = set()
@@ -380,6 +400,17 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         temperature = None
     if temperature is not None:
         channels |= {"temperature"}
+    others = None
+    if beside and "logged" in channels:
+        channels |= {"others"}
+        paths = [recording.others_rad[axis] for axis in beside]
+        others = np.stack(
+            [
+                derivatives(filled(path), rate, motion.window, order)
+                for order in range(3)
+                for path in paths
+            ]
+        ).T
     n = motion.velocity.size
     moving = moving_samples(motion, usable)
     # Of vibration the window takes a little everywhere.
@@ -413,6 +444,8 @@ def _one(recording: Recording, joint: Joint, smoothing: Smoothing | None) -> Tra
         evenly_smooth=motion.evenly_smooth,
         quiet=motion.quiet,
         blur=motion.blur,
+        others=others,
+        other_axes=beside,
     )
 
 

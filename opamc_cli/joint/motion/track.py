@@ -35,6 +35,7 @@ SAMPLED = (
     "electrical_rad",
     "open_samples",
     "blur",
+    "others",
 )
 """Attributes of a track that have a value per sample, or are None."""
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
@@ -117,6 +118,11 @@ class Track:
     """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
+    others: Floats | None = None
+    """Positions, speeds and accelerations of the arm's other joints, as smooth as this one's, where
+    any of them moves; (n, 3m) or None."""
+    other_axes: tuple[int, ...] = ()
+    """Their axes; m of them."""
     full: "Track | None" = None
     """What an averaged track is the block means of: the same recordings at the full rate, with
     current, position, speed and direction as smooth as the acceleration."""

@@ -11,7 +11,7 @@ PLACE = frozenset(
     {"offset", "asymmetric_friction", "spring", "gravity", "position_drag", "hysteresis"}
 )
 WARMTH = frozenset({"thermal_viscous", "warmup", "viscous"})
-CHANGE = frozenset({"inertia", "elasticity", "time_delay", "payload_change"})
+CHANGE = frozenset({"inertia", "elasticity", "coupling", "time_delay", "payload_change"})
 ELECTRIC = frozenset({"ripple", "sensor_offset", "sensor_gain", "dead_time"})
 LINE = frozenset({"ripple", "mains_hum", "elasticity"})
 

@@ -19,6 +19,7 @@ from opamc_cli.signal.identification import (
     SegmentFeatures,
     find_reference,
     identify,
+    identify_anywhere,
 )
 from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.kept import KeptResults, remembered
@@ -34,6 +35,9 @@ MIN_CORRELATION = 0.5
 
 REPEATS = 0.75
 """Share of a recording's motions that a cycle has to find again to be one: noise may hide some."""
+
+MOST_HELD = 16
+"""Recordings that a cycle without repetition is looked for in."""
 
 SAME_DURATION = 0.1
 """Relative difference of the durations of motions at the edges of recordings that begin and end
@@ -263,7 +267,7 @@ def _own_references(
         axis: _executions([part for part in parts if part.axis == axis], rule)
         for axis in {part.axis for part in parts}
     }
-    best: dict[int, tuple[int, _Reference]] = {}
+    best: dict[int, tuple[tuple[int, int], _Reference]] = {}
     for part in parts:
         if reference_run not in (None, part.source.name):
             continue
@@ -282,13 +286,23 @@ def _own_references(
         repeats = count > 1 and np.mean(found >= 0) >= REPEATS
         if edges and not repeats and config.segments_per_cycle is None:
             start, stop, cycle, count = 0, len(features), features, 1
-        if part.axis not in best or count > best[part.axis][0]:
+        worth = count, 0
+        if count < 2 and not edges:
+            # where no recording shows that a cycle comes again, others have to
+            others = [p for p in parts if p.axis == part.axis][:MOST_HELD]
+            worth = count, sum(_holds(other, cycle, rule) for other in others)
+        if part.axis not in best or worth > best[part.axis][0]:
             spans = tuple(_span(part.rows, i) for i in usable[start:stop].tolist())
             best[part.axis] = (
-                count,
+                worth,
                 _Reference(part.source, cycle, spans, cycle.f_max_hz, edges),
             )
     return {axis: reference for axis, (_, reference) in best.items()}
+
+
+def _holds(part: _Axis, cycle: SegmentFeatures, rule: MatchRule) -> bool:
+    own = part.features.take(_whole(part))
+    return bool((identify_anywhere(cycle, own, rule).cycle > UNIDENTIFIED).any())
 
 
 def _executions(parts: Sequence[_Axis], rule: MatchRule) -> bool:
@@ -366,7 +380,7 @@ def _identify_part(job: _Job) -> pa.Table:
     whole = np.arange(n) if reference is not None and reference.edges else _whole(part)
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
-        found = identify(reference.features, own, rule)
+        found = identify_anywhere(reference.features, own, rule)
         if job.judged and found.cycle.max() == UNIDENTIFIED:
             found = identify(reference.features, own, rule.by_motion())
         cycle[whole], motion[whole] = found.cycle, found.motion

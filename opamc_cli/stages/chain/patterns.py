@@ -16,6 +16,7 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
+from opamc_cli.signal.quality import bridged
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
@@ -195,8 +196,9 @@ def _analyse(job: _Job) -> dict[str, pa.Table]:
         patterns += _pattern_rows(row, np.abs(current), fs_hz, config)
         # cut short, a segment's parts would not be those of the others
         if whole:
+            course = bridged(current)
             for witness in WITNESSES:
-                kept[witness.FILE_NAME] += witness.rows(row, current, fs_hz, config)
+                kept[witness.FILE_NAME] += witness.rows(row, course, fs_hz, config)
     patterns.sort(key=lambda row: (row["segment"], row["order"]))
     return {
         files.PATTERNS: pa.Table.from_pylist(patterns, schema=PATTERNS),

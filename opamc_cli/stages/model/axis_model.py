@@ -1,7 +1,7 @@
 """A declared model laid on one axis's recordings."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
-from opamc_cli.stages.recordings.axis_recording import gaps, read_recording
+from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.storage.runs import Run
 
 
@@ -123,7 +123,9 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str,
     NotEnoughDataError
         If a run is too short.
     """
-    recordings = [read_recording(run, axis) for run in runs]
+    recordings = [
+        replace(read_recording(run, axis), others_rad=positions_beside(run, axis)) for run in runs
+    ]
     units = {run.info.current_unit for run in runs}
     if len(units) > 1:
         msg = f"{runs[0].path}: some runs hold currents (A), others torques (Nm); give one kind"

@@ -64,7 +64,9 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         if name in channels.columns and not (three and name == "current")
     }
     samples = run.read([*named.values(), *(channels.phases if three else ())], start, stop)
-    arrays = {key: np.asarray(samples[name], dtype=np.float64) for key, name in named.items()}
+    arrays: dict[str, Any] = {
+        key: np.asarray(samples[name], dtype=np.float64) for key, name in named.items()
+    }
     phases = None
     if three:
         phases = np.stack(
@@ -81,6 +83,19 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         **arrays,
     )
     return replace(recording, current_a=_with_sign(recording))
+
+
+def positions_beside(run: Run, axis: int) -> dict[int, Array]:
+    """Read the logged positions of a run's other axes; those that mostly lack a number are none."""
+    logged = {other: run.channels(other).position for other in run.axes if other != axis}
+    names = {other: name for other, name in logged.items() if name is not None}
+    samples = run.read(list(names.values()))
+    found = {other: np.asarray(samples[name], dtype=np.float64) for other, name in names.items()}
+    return {
+        other: values
+        for other, values in found.items()
+        if np.mean(~np.isfinite(values)) <= MOST_MISSING
+    }
 
 
 def gaps(run: Run, recording: Recording) -> list[str]:

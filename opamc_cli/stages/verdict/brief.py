@@ -15,6 +15,9 @@ MOST_EVIDENCE = 2
 FEW_SESSIONS = 4
 """Fewer say little of how much healthy ones differ."""
 
+SMOOTHER = 0.5
+"""Of the baseline's fluctuations: a run-in or a warmer gear takes some per cent, a filter most."""
+
 COMMON = 1.5
 """Times as far as usual that the siblings have moved, to be worth a word."""
 
@@ -33,14 +36,19 @@ def brief(
     if judgement.state not in ("changed", "fault"):
         return None
     return {
-        "inspect": _inspect(cause),
+        "inspect": _inspect(cause, judgement, bundle),
         "evidence": _evidence(judgement, bundle, unit),
         "against": _against(judgement, cause),
     }
 
 
-def _inspect(cause: Mapping[str, Any] | None) -> str:
+def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bundle) -> str:
     if cause is None:
+        if _smoother(judgement, bundle):
+            return (
+                "Check the filters of drive and log before the gear: the current's fluctuations "
+                "have become smaller, which wear does not do."
+            )
         return (
             "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
         )
@@ -48,6 +56,16 @@ def _inspect(cause: Mapping[str, Any] | None) -> str:
     if lies_outside(cause):
         return f"Check before the gear: {meaning}."
     return f"Inspect the joint for {meaning}."
+
+
+def _smoother(judgement: Judgement, bundle: Bundle) -> bool:
+    """Whether what speaks loudest is that the fluctuations are a fraction of what they were."""
+    known = {name: p for name, p in judgement.witnesses.items() if math.isfinite(p)}
+    loudest = bundle.witnesses.get(min(known, key=known.__getitem__, default=""))
+    if not isinstance(loudest, SpectrumEvidence):
+        return False
+    band = clearest_change(loudest.cells, loudest.n_baseline)
+    return band is not None and band.size_ratio < SMOOTHER
 
 
 def _evidence(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
@@ -17,6 +18,7 @@ from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
+from opamc_cli.storage.runs import Run
 from opamc_cli.storage.sources import RunSource
 
 MAX_RUNS = 8
@@ -26,6 +28,10 @@ much better from more."""
 BESIDE_S = 1.0
 """Rest that is read before the first and after the last motion of the axis: of a program that moves
 one axis after the other most of a recording lies outside."""
+
+LEFT_ITS_PLACE = 0.02
+"""Of the way that an axis goes in a recording: a place is left where the position is farther away.
+Above what a held joint trembles by; the rest beside holds how a motion begins."""
 
 LEAST_HZ = 100.0
 """Slower logs are interpolated: the change of a joint is sought on a grid of this rate."""
@@ -55,7 +61,8 @@ def explain(
     config
         Gear ratio and pole pairs, effects of the user's own, and how much is looked at.
     moving
-        Samples between which the axis moves (half-open), by run: nothing else is looked at.
+        Samples between which the axis moves (half-open), by run: nothing else is looked at. Where
+        the position is logged it says so itself, of strokes too that no pattern was taken from.
     kept
         Where the motion of the baseline's recordings may lie.
 
@@ -117,14 +124,28 @@ def _recordings(
         # seconds are those of a log of this rate: a slower one costs no more for being longer
         rate_hz = max(source.info.sampling_rate_hz, LEAST_HZ)
         beside, most = round(BESIDE_S * rate_hz), round(seconds / len(sources) * rate_hz)
-        first, last = moving.get(source.name, (0, source.n_samples))
-        start, stop = max(first - beside, 0), min(last + beside, first + most)
         try:
             with source.open() as run:
+                first, last = _moves(run, axis) or moving.get(source.name, (0, source.n_samples))
+                start, stop = max(first - beside, 0), min(last + beside, first + most)
                 found.append(interpolated(read_recording(run, axis, start, stop), LEAST_HZ))
         except OpamcError:
             continue  # the run served the chain but not a model, which needs motion beside current
     return found
+
+
+def _moves(run: Run, axis: int) -> tuple[int, int] | None:
+    """Return between which samples the position of an axis changes; None where it is not logged."""
+    column = run.channels(axis).columns.get("position")
+    if column is None:
+        return None
+    position = np.asarray(run.read([column])[column], dtype=np.float64)
+    known = position[np.isfinite(position)]
+    if not known.size or not np.ptp(known):
+        return None
+    near = LEFT_ITS_PLACE * np.ptp(known)
+    first = int(np.argmax(abs(position - known[0]) > near))
+    return first, position.size - int(np.argmax(abs(position - known[-1])[::-1] > near))
 
 
 def _entry(change: Change) -> dict[str, Any] | None:

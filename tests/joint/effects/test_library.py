@@ -30,6 +30,7 @@ VOCABULARY = [
     "position_drag",
     "hysteresis",
     "elasticity",
+    "coupling",
     "ripple",
     "time_delay",
     "sensor_offset",

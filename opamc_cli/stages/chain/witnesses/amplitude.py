@@ -26,7 +26,7 @@ def rows(
     fs_hz: float,
     config: PatternsConfig,
 ) -> list[dict[str, Any]]:
-    """Return the log amplitudes of a segment; none if it has fewer than two known samples."""
+    """Return the log amplitudes of a segment; none if one of its samples is unknown."""
     del fs_hz, config
     amplitudes = log_amplitudes(current)
     if not amplitudes.size:

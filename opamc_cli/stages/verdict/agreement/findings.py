@@ -36,6 +36,14 @@ REVERSING = 0.1
 CLIPPED_SHARE = 0.01
 """Of the samples, beyond the baseline's: from here the clipped crests are patterns of their own."""
 
+MISSING_SHARE = 0.05
+"""Of the samples: from here every fourth pattern of five samples touches one that is no number."""
+
+FINE, COARSER = 0.5, 3.0
+"""A current changes with nearly each sample where its steps are finer than its noise. One that
+changes in less than a third as many as another is logged in coarser steps, or each value several
+times; no fault takes a joint's noise away."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -59,6 +67,7 @@ class Reference:
     clipped: Mapping[int, float]
     leaning: Mapping[int, float]
     reversing: Mapping[int, float]
+    changing: Mapping[int, float]
 
 
 def reference_of(baseline: Sequence[Measured]) -> Reference:
@@ -81,6 +90,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([_most_clipped(own)[1] for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
     )
 
 
@@ -208,6 +218,25 @@ def _other_sign(own: Measured, reference: Reference) -> str | None:
     return None
 
 
+def _incomplete(own: Measured, _: Reference) -> str | None:
+    name, share = max(own.missing.items(), default=("", 0.0), key=lambda entry: entry[1])
+    if share <= MISSING_SHARE:
+        return None
+    return f"{name} holds no number in {share:.0%} of the motion; check the log"
+
+
+def _other_steps(own: Measured, reference: Reference) -> str | None:
+    usual = reference.changing[own.axis]
+    if max(own.changing, usual) < FINE or own.changing * usual == 0:
+        return None
+    if max(own.changing / usual, usual / own.changing) < COARSER:
+        return None
+    return (
+        f"the current of axis {own.axis} changes in {own.changing:.0%} of its samples, the "
+        f"baseline's in {usual:.0%}: is it logged in other steps, or each value several times?"
+    )
+
+
 RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_signal,
     _frozen,
@@ -215,10 +244,12 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _unbalanced,
     _other_sign,
     _clipped,
+    _incomplete,
+    _other_steps,
 )
 """In the order in which they are asked."""
 
-RULES_AT_REST = (_other_signal, _frozen, _unbalanced)
+RULES_AT_REST = (_other_signal, _frozen, _unbalanced, _incomplete)
 """Of an axis in which no motion was found, since its current may be why."""
 
 

@@ -47,6 +47,10 @@ class Measured:
     """Root mean square of the sum of three phases over that of the phases; None without three."""
     clipped: Mapping[str, float]
     """Share of clipped samples by column."""
+    missing: Mapping[str, float]
+    """Share of samples that are no numbers, by column of a current."""
+    changing: float
+    """Share of a current's samples that differ from the one before; of the coarsest column."""
     frozen: tuple[str, float] | None
     """Column that keeps one value while another swings, and from when on in seconds, or None."""
     leaning: float | None = None
@@ -124,6 +128,13 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         "clipped": {
             name: clipped_share(np.concatenate([look[name] for look in looks])) for name in currents
         },
+        "missing": {
+            name: float(np.mean(~np.isfinite(np.concatenate([look[name] for look in looks]))))
+            for name in currents
+        },
+        "changing": min(
+            (_changing([look[name] for look in looks]) for name in currents), default=1.0
+        ),
         "frozen": _frozen(
             run, currents, motion, looks, [start for start, _ in stretches] if spans else []
         ),
@@ -207,6 +218,11 @@ def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, i
     return [
         (int(edges[i]), int(edges[i + 1])) for i in np.flatnonzero(np.diff(edges) >= least).tolist()
     ]
+
+
+def _changing(parts: Sequence[Floats]) -> float:
+    steps = np.concatenate([np.diff(part[np.isfinite(part)]) for part in parts])
+    return float(np.mean(steps != 0)) if steps.size else 1.0
 
 
 def _swing(values: npt.NDArray[np.floating]) -> float:

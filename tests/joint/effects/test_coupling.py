@@ -1,0 +1,122 @@
+"""What another joint of the arm asks of this one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from closing import fit_declared
+
+from opamc_cli.errors import ConfigError
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.motion.kinematics import Recording, build_track
+from opamc_cli.joint.motion.track import Joint
+
+RATE = 250.0
+DECLARED = ("inertia", "gravity", "offset", "coulomb", "viscous")
+
+
+def waves(seed, seconds=30.0):
+    """Position, speed and acceleration that never repeat."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(int(seconds * RATE)) / RATE
+    parts = [
+        (w, p, a / w)
+        for w, p, a in zip(
+            rng.uniform(0.5, 4.0, 6),
+            rng.uniform(0, 6, 6),
+            rng.uniform(0.2, 0.5, 6),
+            strict=True,
+        )
+    ]
+    return (
+        sum(s * np.sin(w * t + p) for w, p, s in parts),
+        sum(s * w * np.cos(w * t + p) for w, p, s in parts),
+        -sum(s * w**2 * np.sin(w * t + p) for w, p, s in parts),
+    )
+
+
+def shoulder(first, second):
+    """Torque on a planar shoulder, in the textbook's words (Spong et al., 2006, (7.87))."""
+    (q1, v1, a1), (q2, v2, a2) = first, second
+    h = -0.4 * np.sin(q2)
+    return (
+        (0.8 + 2 * 0.4 * np.cos(q2)) * a1
+        + (0.3 + 0.4 * np.cos(q2)) * a2
+        + h * v2 * v1
+        + h * (v1 + v2) * v2
+        + 2.0 * np.cos(q1)
+        + 1.1 * np.cos(q1 + q2)
+    )
+
+
+def recording(current, place, others):
+    return Recording("run", RATE, current, position_rad=place, others_rad=others)
+
+
+def test_the_textbook_s_elbow_is_held_by_the_columns():
+    first, second = waves(1), waves(2)
+    track = build_track([recording(first[0], first[0], {3: second[0]})], Joint())
+    inner = slice(50, -50)
+    columns = built_in_library()["coupling"].columns(track, {"axis": 3.0})[inner]
+    own = np.stack([track.acceleration, np.sin(first[0]), np.cos(first[0])], axis=1)[inner]
+    design = np.concatenate([own, columns], axis=1)
+    torque = shoulder(first, second)[inner]
+    rest = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
+    assert np.std(rest) < 1e-3 * np.std(torque)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
+    first, second, third = waves(1), waves(2), waves(3)
+    seen = -second[0] if mirrored else second[0]
+    noise = 0.05 * np.random.default_rng(4).normal(size=first[0].size)
+    current = shoulder(first, second) + 0.3 * np.sign(first[1]) + noise
+    others = {2: seen + 0.7, 3: third[0]}
+    laid = recording(current, first[0], others)
+    loop = close_loop(fit_declared([laid], base=DECLARED), built_in_library())
+    (step,) = loop.steps
+    assert (step.term.effect.name, step.term.parameters) == ("coupling", {"axis": 2.0})
+    assert "motion of axis 2:" in step.interpretation
+    assert step.term.effect.harmless
+    assert loop.rmse_after_a < 1.1 * 0.05 < 0.2 * loop.rmse_before_a
+
+
+def test_a_joint_that_moves_beside_and_asks_nothing_is_not_named():
+    first, second = waves(5), waves(6)
+    noise = 0.05 * np.random.default_rng(7).normal(size=first[0].size)
+    current = 0.3 * first[2] + np.sin(first[0]) + 0.3 * np.sign(first[1]) + noise
+    laid = recording(current, first[0], {2: second[0]})
+    loop = close_loop(fit_declared([laid], base=DECLARED), built_in_library())
+    assert (loop.steps, loop.verdict) == ((), "nothing-missing")
+
+
+@pytest.mark.parametrize("others", [{}, {2: np.full(7500, 0.3)}, {2: 1e-4 * waves(6)[0]}])
+def test_joints_that_hold_still_cost_nothing_and_cannot_be_asked(others):
+    first = waves(5)
+    track = build_track([recording(first[2], first[0], others)], Joint())
+    assert (track.others, track.other_axes) == (None, ())
+    assert "no other joint" in built_in_library()["coupling"].untestable(track)
+
+
+def test_of_joints_beside_only_those_that_move_are_guessed():
+    first = waves(5)
+    others = {2: np.full(7500, 0.3), 4: waves(6)[0]}
+    runs = [recording(first[2], first[0], others), recording(first[2], first[0], {4: others[4]})]
+    effect = built_in_library()["coupling"]
+    track = build_track(runs[:1], Joint())
+    assert track.other_axes == (2, 4)
+    assert effect.guesses(track, first[0]) == [{"axis": 4.0}]
+    assert build_track(runs, Joint()).other_axes == (4,)
+    with pytest.raises(ConfigError, match=r"axis 3, and those .* are 2, 4"):
+        effect.columns(track, {"axis": 3.0})
+    part = replace(runs[0]).cut(slice(100, 300))
+    np.testing.assert_array_equal(part.others_rad[4], others[4][100:300])
+
+
+def test_what_another_joint_asks_is_not_called_closed_where_no_effect_holds_it():
+    first, second = waves(1), waves(2)
+    noise = 0.05 * np.random.default_rng(4).normal(size=first[0].size)
+    laid = recording(shoulder(first, second) + noise, first[0], {2: second[0]})
+    lacking = built_in_library(("coupling",))
+    assert close_loop(fit_declared([laid], base=DECLARED), lacking).verdict != "closed"

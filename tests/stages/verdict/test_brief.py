@@ -1,0 +1,30 @@
+"""What a maintainer is told first."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from opamc_cli.decision.judge import Bundle
+from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
+from opamc_cli.stages.verdict.brief import brief
+
+
+@pytest.mark.parametrize(
+    ("size", "loudest", "first"),
+    [(0.3, "spectrum", "filters"), (0.7, "spectrum", "gear"), (3.0, "spectrum", "gear"),
+     (0.3, "patterns", "gear")],
+)  # fmt: skip
+def test_a_current_that_became_smooth_is_no_worn_gear(size, loudest, first):
+    rng = np.random.default_rng(0)
+    sessions = 0.02 * rng.normal(size=(6, 8))
+    sessions[5] += 2 * np.log(size)  # log powers
+    cell = SpectrumCell(0, sessions, np.ones(6), np.full(8, 1e-3), 2, 4, 3.0)
+    bundle = Bundle([], {"spectrum": SpectrumEvidence([cell], 5)})
+    p_values = {"patterns": 0.01, "spectrum": 0.01} | {loudest: 1e-5}
+    judged = SimpleNamespace(
+        state="fault", witnesses=p_values, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, bundle, None)["inspect"]
+    assert f"{first}" in told.split(":")[0]
+    assert ("filters" in told) == (first == "filters")
