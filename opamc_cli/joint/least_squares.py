@@ -16,19 +16,10 @@ as long, ten minutes twice, since every filter of a drive's answer is told from 
 
 
 def solve(gram: Floats, moment: Floats) -> Floats:
-    """Minimum-norm least squares of scaled normal equations.
+    """Minimum-norm least squares of scaled normal equations; (k,), or (groups, k) of stacked ones.
 
-    Parameters
-    ----------
-    gram : array of shape (k, k) or (groups, k, k)
-        Products of regressors.
-    moment : array of shape (k,) or (groups, k)
-        Regressors times the signal.
-
-    Returns
-    -------
-    array of shape (k,) or (groups, k)
-        Coefficients; directions below 1e-7 of the largest get none.
+    Of products of regressors, (k, k), and these times the signal, (k,); directions below 1e-7 of
+    the largest get no coefficient.
     """
     if moment.shape[-1] == 0:
         return moment
@@ -52,20 +43,10 @@ def inverse(gram: Floats) -> Floats:
 
 
 def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, ascending, and eigenvectors of symmetric matrices.
+    """Eigenvalues, ascending, and eigenvectors, in columns, of symmetric matrices (..., k, k).
 
     LAPACK's divide and conquer, which is numpy's and the fastest, gives up on a rare matrix that
     has nothing wrong with it; plain QR iteration then takes its place.
-
-    Parameters
-    ----------
-    symmetric : array of shape (..., k, k)
-        Finite.
-
-    Returns
-    -------
-    values, vectors : arrays of shape (..., k) and (..., k, k)
-        Vectors are columns.
     """
     try:
         values, vectors = np.linalg.eigh(symmetric)

@@ -116,23 +116,10 @@ class Loop:
 def close_loop(
     before: Fit, library: Library, seed: int = 0, without_rules: Collection[str] = ()
 ) -> Loop:
-    """Find, name and add what the declared model lacks.
+    """Find, name and add what the declared model, fitted to the open groups, lacks.
 
-    Parameters
-    ----------
-    before : Fit
-        The declared model, fitted to the open groups; the sealed ones are looked at once, at the
-        end.
-    library : dict of str to Effect
-        Effects that may be added.
-    seed : int
-        Of the decoys.
-    without_rules : collection of str
-        Rules of `opamc_cli.joint.name.rules` to switch off, for the ablation.
-
-    Returns
-    -------
-    Loop
+    The sealed ones are looked at once, at the end. For the ablation rules of
+    `opamc_cli.joint.name.rules` can be switched off.
     """
     start = chain_of(before, 0)
     dataset = before.dataset

@@ -25,18 +25,7 @@ LEAST_LINE = 0.02
 
 
 def highest_order(track: Track) -> float:
-    """Highest order that is not folded at the median speed.
-
-    Parameters
-    ----------
-    track : Track
-        Track at the full rate.
-
-    Returns
-    -------
-    float
-        Cycles per revolution of the machine angle.
-    """
+    """Highest order per turn of the machine angle that is not folded at the median speed."""
     step = np.abs(np.gradient(track.machine_angle_rad))[track.moving]
     typical = float(np.median(step)) if step.size else 0.0
     return NYQUIST_SHARE * np.pi / typical if typical > 0 else 0.0
@@ -66,8 +55,6 @@ def order_spectrum(
 
     Parameters
     ----------
-    track : Track
-        Track at the full rate.
     residual : array of shape (n,)
         Zero where samples do not count.
     top : float, optional
@@ -123,20 +110,10 @@ def order_spectrum(
 def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
     """Orders that stand out of the noise with their power, strongest first.
 
-    Parameters
-    ----------
-    track : Track
-        Track at the full rate.
-    residual : array of shape (n,)
-        Zero where samples do not count.
-    count : int
-        Strongest peaks, and so many of those that stand out most of their surroundings.
-
-    Returns
-    -------
-    list of (float, float)
-        Orders, refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart;
-        and their power in units of white noise's, where they hold 2 % of the residual's power.
+    The `count` strongest peaks, and as many of those that stand out most of their surroundings:
+    orders refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart, and
+    their power in units of white noise's, where they hold 2 % of the residual's power. The
+    residual, (n,) at the full rate, is zero where samples do not count.
     """
     orders, power, _ = order_spectrum(track, residual, highest_folded(track))
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
@@ -184,18 +161,8 @@ def vertex(orders: Floats, power: Floats, best: int) -> float:
 def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floats]]]:
     """Signals in which a line of constant frequency stands still.
 
-    Parameters
-    ----------
-    track : Track
-        With the phases' electrical angle, where they were logged.
-    residual : array of shape (n,)
-        Of a fit.
-
-    Returns
-    -------
-    list of (bool, list of array)
-        The residual itself (False); and, from phases, the residual turned back into their frame
-        (True): what a phase picks up turns against the field in the torque current.
+    The residual itself (False); and, from phases, the residual turned back into their frame (True):
+    what a phase picks up turns against the field in the torque current.
     """
     views = [(False, [residual])]
     if "phases" in track.channels and track.electrical_rad is not None:
@@ -212,19 +179,10 @@ def line_power(track: Track, signals: list[Floats]) -> tuple[Floats, Floats]:
 
 
 def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
-    """Power of a residual over frequency, oversampled twice.
+    """Frequencies in Hz, and a residual's power over them in units of white noise's.
 
-    Parameters
-    ----------
-    track : Track
-        Gives the rate, and the time that passes between its recordings or pieces.
-    residual : array of shape (n,)
-        Zero where samples do not count.
-
-    Returns
-    -------
-    frequencies_hz, power : arrays
-        Power in units of white noise's.
+    Oversampled twice; the residual, shape (n,), is zero where samples do not count. The track gives
+    the rate, and the time that passes between its recordings or pieces.
     """
     residual = _on_the_clock(track, residual)
     length = next_fast_len(2 * residual.size, real=True)

@@ -38,7 +38,8 @@ def effects(
     """List the effects that a joint's model may hold, or show one with its equation."""
     from opamc_cli.commands.terminal.fitted import FittedTable
     from opamc_cli.config.joint_model import load_joint_model
-    from opamc_cli.joint.effects.library import built_in_library, effect_named, load_user_effects
+    from opamc_cli.joint.effects.library import built_in_library, effect_named
+    from opamc_cli.stages.model.loaded_effects import load_user_effects
 
     library = built_in_library()
     for file in load_joint_model(model).library if model else ():

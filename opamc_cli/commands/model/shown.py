@@ -39,8 +39,6 @@ def headline(result: Mapping[str, Any]) -> str:
 
 
 def _headline(result: Mapping[str, Any]) -> str:
-    from opamc_cli.stages.report.wording import unexplained
-
     # a file that another version wrote may lack fields
     axis, unit, steps = result["axis"], result.get("unit", "A"), result.get("steps", ())
     before, after = (
@@ -63,6 +61,8 @@ def _headline(result: Mapping[str, Any]) -> str:
     if words:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
     if result.get("verdict") == "nothing-missing":
+        from opamc_cli.stages.report.wording import unexplained
+
         noise = result.get("noise_a")
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
         if unexplained(result):

@@ -39,17 +39,8 @@ def energy_of(
 ) -> Energy:
     """Change of the mean square residual, after a shift is taken from the target if one is given.
 
-    Parameters
-    ----------
-    units : list of Unit
-        Of both sides.
-    population : Population
-        The baseline's.
-    slow_found : bool
-        Whether the coefficients lie outside the baseline's; if not, their difference is that of
-        healthy sessions and counts as nothing.
-    shift : Shift, optional
-        Effects that are taken from the target's current.
+    Without `slow_found` the coefficients do not lie outside the baseline's: their difference is
+    that of healthy sessions and counts as nothing.
     """
     after = np.array([unit.after for unit in units])
     moved = np.zeros(len(units))
@@ -102,15 +93,6 @@ def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> f
 
     Every stroke has its own amplitudes and phases, which follow its course; what such a comb
     takes from the baseline's noise and kinematic error is taken off.
-
-    Parameters
-    ----------
-    units : list of Unit
-        Of both sides.
-    plain : list of arrays
-        Residuals of every unit's own fit on its fine track.
-    fundamental : float
-        Order of the machine angle.
     """
     held: dict[bool, list[float]] = {False: [], True: []}
     for unit, residual in zip(units, plain, strict=True):

@@ -33,8 +33,10 @@ SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
 
+HIDDEN = frozenset({"coulomb", "viscous", "thermal_viscous"})
 VISIBLE = 0.5
-"""A shift of which the mean square shows less is hidden by what sessions differ by."""
+"""Friction differs most between sessions: a shift of it of which the mean square shows less than
+half is hidden by what they differ by. Where other effects were found too, it is they that show."""
 
 HARMLESS_SHARE = 0.5
 FAULT_SHARE = 0.2
@@ -120,16 +122,10 @@ def explain_change(
     baseline, target : list of Recording
         Recordings of one joint at one rate, each with a signed current and its motion, or three
         phases.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
     library : Library, optional
         Effects that may be causes; the built-in ones by default.
     follow : callable
         How the baseline's recordings are followed: `units.follow`, or what remembers its results.
-
-    Returns
-    -------
-    Change
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS
@@ -155,12 +151,13 @@ def explain_change(
 
     energy = energy_of(units, population, slow_found=bool(slow))
     # A line stands out of the spectrum before it stands out of the whole mean square.
+    moved, gains = energy.slow, _gains(units, population, energy, slow)
     powers = [shift_power(units, found.shift) for found in slow]
-    # Where healthy sessions' differences hide a change, its own power is what there is of it.
-    hidden = bool(powers) and energy.slow < VISIBLE * powers[-1]
-    moved = powers[-1] if hidden else energy.slow
+    friction = powers and {found.effect for found in slow} <= HIDDEN
+    if friction and energy.slow < VISIBLE * powers[-1]:
+        # The mean square hardly shows the change: its own power is what there is of it.
+        moved, gains = powers[-1], np.diff(powers, prepend=0.0)
     whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
-    gains = np.diff(powers, prepend=0.0) if hidden else _gains(units, population, energy, slow)
     causes = _slow_entries(units, gains / whole, slow, library)
     if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)

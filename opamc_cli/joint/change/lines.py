@@ -64,14 +64,7 @@ class Line:
 def fast_residuals(units: list[Unit], terms: tuple[Term, ...], shift: Shift | None) -> list[Floats]:
     """Residuals of every unit's own fit on the full grid; zero where samples do not count.
 
-    Parameters
-    ----------
-    units : list of Unit
-        Of both sides.
-    terms : tuple of Term
-        The joint's model.
-    shift : Shift or None
-        Slow effects that are taken from the target's current first.
+    Slow effects, the `shift`, are taken from the target's current first.
     """
     residuals = []
     for unit in units:
@@ -166,15 +159,8 @@ def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
     """Lines of the target that lie outside what the baseline's units differ by, largest first.
 
-    Parameters
-    ----------
-    spectra : OrderSpectra
-        Of both sides.
-    between : float
-        Variance of the logarithm of a line's power that is added to what the units show, where
-        these are cycles of one session.
-    most : int
-        Number of lines at most.
+    Where the units are cycles of one session, `between` is the variance of the logarithm of a
+    line's power that is added to what they show.
     """
     orders = spectra.orders
     if orders.size < 2 * NEIGHBOURHOOD:

@@ -42,15 +42,7 @@ def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Fl
 
 
 def moderated_covariance(sample: Floats, prior: Floats) -> Floats:
-    """Covariance of a small sample, drawn towards a prior one.
-
-    Parameters
-    ----------
-    sample : array of shape (n, k)
-        Rows are units; n may be 1.
-    prior : array of shape (k, k)
-        What is expected.
-    """
+    """Covariance of a small sample, shape (n, k) with n from 1 on, drawn towards a prior one."""
     n = sample.shape[0]
     centred = sample - sample.mean(axis=0)
     found: Floats = (centred.T @ centred + PRIOR_WEIGHT * prior) / (n - 1 + PRIOR_WEIGHT)
@@ -58,16 +50,9 @@ def moderated_covariance(sample: Floats, prior: Floats) -> Floats:
 
 
 def shift_p(shift: Floats, covariance: Floats, units: int) -> float:
-    """Probability of a shift of means as large as this, in several directions at once.
+    """Probability of a shift of means, shape (k,), as large as this in several directions at once.
 
-    Parameters
-    ----------
-    shift : array of shape (k,)
-        Difference of the means.
-    covariance : array of shape (k, k)
-        Of the shift.
-    units : int
-        Baseline units behind the covariance.
+    The shift's covariance has been told by so many of the baseline's `units`.
     """
     size = shift.size
     square = float(shift @ np.linalg.pinv(covariance, hermitian=True) @ shift)

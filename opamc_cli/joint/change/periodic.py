@@ -3,12 +3,7 @@
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.change.energy import comb_energy
-from opamc_cli.joint.change.lines import (
-    Line,
-    clocked,
-    grown_lines,
-    order_spectra,
-)
+from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra
 from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
 from opamc_cli.joint.change.units import Unit
 from opamc_cli.joint.motion.track import Floats
@@ -32,22 +27,7 @@ class Periodic:
 def find_periodic(
     units: list[Unit], residuals: list[Floats], between: float = 0.0
 ) -> Periodic | None:
-    """Read the lines that grew.
-
-    Parameters
-    ----------
-    units : list of Unit
-        Of both sides.
-    residuals : list of arrays
-        Of every unit's own fit on its fine track.
-    between : float
-        See `grown_lines`.
-
-    Returns
-    -------
-    Periodic or None
-        None where no line grew, or one that keeps its frequency and is not the mains'.
-    """
+    """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
     spectra = order_spectra(units, residuals)
     lines = [] if spectra is None else grown_lines(spectra, between)
     if spectra is None or not lines:

@@ -65,17 +65,7 @@ class Reading:
 
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:
-    """Read the lines that grew.
-
-    Parameters
-    ----------
-    lines : list of Line
-        Strongest first.
-    track : Track
-        Gives the kind of angle and the joint's constants.
-    resolution : float
-        Smallest difference of orders that a stroke can tell apart.
-    """
+    """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
     if not lines:
         return None
     electrical = _other(lines[0], track, resolution)
@@ -91,15 +81,7 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | 
 
 
 def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
-    """Read a line that keeps its frequency whatever the speed; None where nobody knows its source.
-
-    Parameters
-    ----------
-    line : Line
-        Its order is a frequency in Hz.
-    resolution_hz : float
-        Smallest difference of frequencies that a stroke can tell apart.
-    """
+    """Read a line whose order is a frequency in Hz; None where nobody knows its source."""
     multiples = [mains * k for mains in MAINS_HZ for k in range(1, MAINS_HARMONICS + 1)]
     mains = min(multiples, key=lambda frequency: abs(frequency - line.order))
     if abs(line.order - mains) > resolution_hz:

@@ -44,11 +44,8 @@ by a change of it."""
 LARGEST_P = 0.015
 PLANNED_P = 0.05
 HIDDEN_P = 0.001
-"""Below which a shift counts even where the target lies no farther from the baseline's mean than
-its own sessions do: what those differ by may happen to hide it. Where nothing else has been found
-only dry or viscous friction does: another effect is then what a ripple or a tooth leaves in the
-slow current. Without that these were three of six wrong faults in 168 pairs of
-`benchmarks/cause.py`."""
+"""Below which dry or viscous friction counts as the first cause though the target lies no farther
+from the baseline's mean than its own sessions do: what those differ by may happen to hide it."""
 
 SMALLEST_GAIN = 0.03
 """What explains less of the slow change is not worth a maintainer's time."""
@@ -164,13 +161,12 @@ def _next(
     left = _left(ready, before)
     gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
     most = max(gains.values())
-    if most < SMALLEST_GAIN * _changed(ready) or most <= 0:
-        # What healthy sessions differ by may happen to hide it.
+    if most < SMALLEST_GAIN * max(left - _usual(ready), 0.0) or most <= 0:
+        # Friction differs most between sessions, and what they differ by may happen to hide it.
         surest = min(sure, key=lambda name: sure[name][0])
-        if sure[surest][0] > HIDDEN_P or not (chosen or surest in ("coulomb", "viscous")):
+        if chosen or surest not in ("coulomb", "viscous") or sure[surest][0] > HIDDEN_P:
             return None
-        gains = {surest: 0.0}
-        most = 0.0
+        gains, most = {surest: 0.0}, 0.0
     # Among those that explain the change equally well, the simplest is named.
     as_good = [name for name, gain in gains.items() if gain >= AS_GOOD * most]
     first = min(as_good, key=lambda name: (sure[name][1].width, _rank(name), sure[name][0]))
@@ -330,10 +326,9 @@ def _left(ready: list[Prepared], shift: Shift | None) -> float:
     return float(np.mean(found))
 
 
-def _changed(ready: list[Prepared]) -> float:
-    """Compute how much more of it there is than in the baseline."""
-    usual = float(np.mean([np.mean(one.residual**2) for one in ready if not one.unit.after]))
-    return max(_left(ready, None) - usual, 0.0)
+def _usual(ready: list[Prepared]) -> float:
+    """Compute the baseline's mean square beyond its mean model."""
+    return float(np.mean([np.mean(one.residual**2) for one in ready if not one.unit.after]))
 
 
 def _rank(name: str) -> int:

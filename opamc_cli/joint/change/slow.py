@@ -85,8 +85,7 @@ def learn(units: list[Unit], terms: tuple[Term, ...], between: float = 0.0) -> P
     centre = np.median(sample, axis=0)
     own = [
         np.full(
-            units[0].columns(term).shape[1],
-            0.0 if term.effect.carries_load else FRICTION_SPREAD,
+            units[0].columns(term).shape[1], 0.0 if term.effect.carries_load else FRICTION_SPREAD
         )
         for term in terms
     ]
@@ -118,24 +117,7 @@ def prepared(units: list[Unit], population: Population) -> list[Prepared]:
 def shifts(
     units: list[Prepared], population: Population, chosen: tuple[Term, ...], candidates: list[Term]
 ) -> list[Shift]:
-    """Compare target and baseline for every candidate beside the chosen terms.
-
-    Parameters
-    ----------
-    units : list of Prepared
-        Of both sides.
-    population : Population
-        From `learn`.
-    chosen : tuple of Term
-        What was found before.
-    candidates : list of Term
-        What may be added.
-
-    Returns
-    -------
-    list of Shift
-        Least probable first.
-    """
+    """Compare both sides for every candidate beside the chosen terms; least likely first."""
     trials = []
     for candidate in candidates:
         terms = (*chosen, candidate)

@@ -11,14 +11,7 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.track import (
-    Bools,
-    Floats,
-    Joint,
-    Track,
-    block_mean,
-    coarsen,
-)
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 FEWEST_SAMPLES = 10
@@ -85,25 +78,9 @@ def follow(recording: Recording, joint: Joint) -> Tracked | None:
 def read_side(
     recordings: list[Recording], joint: Joint, after: bool, cycles: bool, follow: Follow = follow
 ) -> list[Unit]:
-    """Turn the recordings of one side into units.
+    """Turn the recordings of one side into units, but for those that hardly move.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        Of one joint.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-    after : bool
-        True for the target.
-    cycles : bool
-        Whether cycles (or blocks) are the units, and not recordings.
-    follow : callable
-        `follow`, or what remembers its results.
-
-    Returns
-    -------
-    list of Unit
-        Recordings in which the joint hardly moves are left out.
+    Units are cycles (or blocks) where `cycles` asks for it, else recordings.
     """
     units = []
     for recording in recordings:
@@ -152,22 +129,9 @@ def usable_terms(units: list[Unit], effects: list[Effect]) -> tuple[Term, ...]:
 def own_fit(
     unit: Unit, terms: tuple[Term, ...], fine: bool = False, current: Floats | None = None
 ) -> tuple[Floats, Floats]:
-    """Least squares of the terms on one unit alone.
+    """Coefficients and residual of least squares of the terms on one unit's samples alone.
 
-    Parameters
-    ----------
-    unit : Unit
-        Whose samples are fitted.
-    terms : tuple of Term
-        The joint's model.
-    fine : bool
-        On the recording's own grid.
-    current : array, optional
-        Another current on the unit's samples.
-
-    Returns
-    -------
-    coefficients, residual : arrays
+    Another `current` may be given on the same samples.
     """
     columns = unit.stacked(terms, fine)
     values = unit.current_a(fine) if current is None else current
@@ -187,17 +151,6 @@ def followed(
 
     Phases alone lose the side of the torque axis where there is no current for a while. Where
     motion was logged, nothing is lost.
-
-    Parameters
-    ----------
-    before, after : list of Unit
-        Baseline and target.
-    terms : tuple of Term
-        The joint's model.
-
-    Returns
-    -------
-    before, after : list of Unit
     """
     if not before or "logged" in before[0].fine.channels:
         return before, after

@@ -90,12 +90,7 @@ class Effect:
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Non-linear parameters to start from; one empty guess where there are none.
 
-        Parameters
-        ----------
-        track : Track
-            The recording at the rate at which the effect is evaluated.
-        residual : array of shape (n,)
-            Zero where samples do not count.
+        The residual, shape (n,), is zero where samples do not count.
         """
         return [{}]
 

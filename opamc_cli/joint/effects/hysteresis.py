@@ -46,19 +46,10 @@ class Hysteresis(Effect):
 
 
 def dahl_state(position_rad: Floats, length_rad: float) -> Floats:
-    """Solve Dahl's equation ``dz/dq = (1 - z sgn(dq)) / length`` along a path.
+    """Solve Dahl's equation ``dz/dq = (1 - z sgn(dq)) / length`` along a path, (n,).
 
-    Parameters
-    ----------
-    position_rad : array of shape (n,)
-        Path, in any order of directions.
-    length_rad : float
-        Travel over which the state settles, above 0.
-
-    Returns
-    -------
-    array of shape (n,)
-        State between -1 and 1, starting at 0; exact for a path that is monotone between samples.
+    The state lies between -1 and 1 and starts at 0; exact for a path that is monotone between
+    samples.
     """
     steps = np.diff(position_rad, prepend=position_rad[:1])
     direction = np.sign(steps)

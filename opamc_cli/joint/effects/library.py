@@ -1,11 +1,8 @@
-"""The library: every effect by its name, and a user's own beside them."""
+"""The library: every effect by its name."""
 
-import importlib.util
-import inspect
 from difflib import get_close_matches
-from pathlib import Path
 
-from opamc_cli.errors import ConfigError, Interrupted
+from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.asymmetric_friction import AsymmetricFriction
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.coulomb import Coulomb
@@ -29,7 +26,6 @@ from opamc_cli.joint.effects.stribeck import Stribeck
 from opamc_cli.joint.effects.sublinear_friction import SublinearFriction
 from opamc_cli.joint.effects.thermal_viscous import ThermalViscous
 from opamc_cli.joint.effects.time_delay import TimeDelay
-from opamc_cli.joint.effects.user import checked
 from opamc_cli.joint.effects.viscous import Viscous
 from opamc_cli.joint.effects.warmup import Warmup
 
@@ -77,64 +73,15 @@ class UnknownEffectError(ConfigError):
 
 
 def built_in_library(without: tuple[str, ...] = ()) -> Library:
-    """Every effect that comes with the package.
-
-    Parameters
-    ----------
-    without : tuple of str
-        Names to leave out.
-    """
+    """Every effect that comes with the package."""
     return {effect.name: effect() for effect in BUILT_IN if effect.name not in without}
 
 
 def effect_named(library: Library, name: str) -> Effect:
-    """Look an effect up.
-
-    Raises
-    ------
-    ConfigError
-        If the library has no such effect; names the nearest one.
-    """
+    """Look an effect up; a ConfigError names the nearest one where the library has no such."""
     if name in library:
         return library[name]
     near = get_close_matches(name, library, n=1)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(library)}"
     msg = f"Unknown effect {name!r} in the model; {hint}"
     raise UnknownEffectError(name, msg)
-
-
-def load_user_effects(path: Path) -> list[Effect]:
-    """Effects that a user's Python file defines.
-
-    Parameters
-    ----------
-    path : Path
-        A file with at least one subclass of `Effect`.
-
-    Raises
-    ------
-    ConfigError
-        If the file is missing, does not run, or defines no effect with a name and a domain.
-    """
-    spec = importlib.util.spec_from_file_location(f"opamc_user_{path.stem}", path)
-    if spec is None or spec.loader is None or not path.is_file():
-        msg = f"Effect file {path} cannot be read; name a Python file"
-        raise ConfigError(msg)
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-        found = [
-            member()
-            for _, member in inspect.getmembers(module, inspect.isclass)
-            if issubclass(member, Effect) and member.__module__ == module.__name__ and member.name
-        ]
-        named = [isinstance(e.name, str) and isinstance(e.domain, str) and e.domain for e in found]
-    except Interrupted:
-        raise
-    except (Exception, SystemExit) as error:  # of a user's own code
-        msg = f"Effect file {path} does not run: {type(error).__name__}: {error}"
-        raise ConfigError(msg) from error
-    if not found or not all(named):
-        msg = f"Effect file {path} defines no class of Effect with a name and a domain"
-        raise ConfigError(msg)
-    return [checked(effect, path) for effect in found]

@@ -3,11 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Floats, Track
-
-MOST_ROWS = 10_000
-"""Samples by which the inertia's part of the load is told: the load has no noise."""
 
 
 class LoadFriction(Effect):
@@ -39,21 +35,8 @@ class LoadFriction(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the magnitude of the fitted load current that passes the gear."""
-        return stack(track.direction * np.abs(_passing(track, parameters)))
-
-
-def _passing(track: Track, parameters: Parameters) -> Floats:
-    share = parameters.get("inertia_share", 1.0)
-    return track.load_a if share == 1 else track.load_a - (1 - share) * _inertial(track)
-
-
-def _inertial(track: Track) -> Floats:
-    """Part of the fitted load that follows the acceleration."""
-    rows = np.flatnonzero(track.moving)
-    rows = rows[:: max(rows.size // MOST_ROWS, 1)]
-    place = track.position_rad[rows]
-    shapes = (track.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
-    columns = stack(*shapes)
-    share = solve(columns.T @ columns, columns.T @ track.load_a[rows])
-    inertial: Floats = share[0] * track.acceleration
-    return inertial
+        load = track.load_a
+        beyond = 1 - parameters.get("inertia_share", 1.0)
+        if beyond:
+            load = load - beyond * track.load_inertia * track.acceleration
+        return stack(track.direction * np.abs(load))

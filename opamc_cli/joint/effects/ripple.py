@@ -99,13 +99,13 @@ class Ripple(Effect):
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Likewise: of a hundred columns nothing is written that nobody looks at."""
-        angle = parameters["order"] * track.machine_angle_rad
-        turning = [np.cos(angle), np.sin(angle)]
-        waves = [wave[rows] for wave in turning]
+        answering = _answering(track, parameters)
+        at = track.machine_angle_rad if answering else track.machine_angle_rad[rows]
+        turning = [np.cos(parameters["order"] * at), np.sin(parameters["order"] * at)]
+        waves = [wave[rows] for wave in turning] if answering else turning
         scale = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
         following = _following_model(waves, track.model_a[rows], parameters)
-        answering = _answering(track, parameters)
         turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
         plain = 2 + len(swelling)
         last = plain + 4 * len(answering)
@@ -229,19 +229,9 @@ def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
 
 
 def order_ties(order: float, track: Track) -> list[str]:
-    """Return the known lines that lie within the order resolution of another one.
+    """Names of the known lines within the order resolution of an order beside the nearest of them.
 
-    Parameters
-    ----------
-    order : float
-        As found, per revolution of the track's machine angle.
-    track : Track
-        Tells constants of the joint and the resolution.
-
-    Returns
-    -------
-    list of str
-        Names of those beside the nearest; empty where orders have no meaning.
+    None where orders, as found per revolution of the track's machine angle, have no meaning.
     """
     ratio = track.joint.gear_ratio
     if track.angle_kind != "motor" or not ratio:
@@ -255,22 +245,10 @@ def order_ties(order: float, track: Track) -> list[str]:
 
 
 def read_order(order: float, track: Track, compared: bool = True) -> str:
-    """Say what a ripple order means.
+    """Read an order, per revolution of the track's machine angle, by the table of orders.
 
-    Parameters
-    ----------
-    order : float
-        Cycles per revolution of the track's machine angle.
-    track : Track
-        Gives the kind of angle, gear ratio, pole pairs and angular resolution.
-    compared : bool
-        Whether the line has grown between recordings. Many healthy gears have one of the gear's
-        lines: without a comparison nothing is to be inspected.
-
-    Returns
-    -------
-    str
-        Reading by the table of orders; "unknown periodic source" where none fits.
+    "unknown periodic source" where none fits. Many healthy gears have one of the gear's lines:
+    where it was not `compared` with an earlier recording nothing is to be inspected.
     """
     if track.angle_kind == "joint":
         return (

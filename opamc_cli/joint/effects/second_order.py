@@ -27,10 +27,6 @@ def answers(
         As if each recording's first value had lasted for ever: no ringing from the start.
     rad_per_s, damping : float
         Undamped angular frequency, below pi times the rate, and damping ratio.
-    rate_hz : float
-        Sampling rate.
-    bounds : tuple of (int, int)
-        Half-open recordings.
     rows : int array of shape (m,), optional
         Samples that somebody looks at; else all n of them.
     out : array of shape (2 k, m), optional
@@ -52,50 +48,51 @@ def answers(
         places[rows] = np.arange(rows.size)
     count = size if rows is None else rows.size
     found = np.empty((2 * len(signals), count)) if out is None else out
-    for signal, low, band in zip(signals, found, found[len(signals) :], strict=False):
-        _put_through(signal, np.array(bounds), poles, zeros[0], 2 * rate_hz / w, places, low, band)
+    edges, last = np.array(bounds), len(signals) - 1
+    for i in range(0, len(signals), 2):
+        # Two at a time take as long as one, of which every sample waits for the one before.
+        j = min(i + 1, last)
+        out_of_both = (found[i], found[j], found[len(signals) + i], found[len(signals) + j])
+        both = (signals[i], signals[j])
+        _put_through(both, edges, poles, zeros[0], 2 * rate_hz / w, places, out_of_both)
     return found
 
 
 @njit(cache=True)
 def _put_through(
-    signal: Floats,
+    signals: tuple[Floats, Floats],
     bounds: Ints,
     poles: Floats,
     gain: float,
     steeper: float,
     places: Ints,
-    low: Floats,
-    band: Floats,
+    out: tuple[Floats, Floats, Floats, Floats],
 ) -> None:
+    one, other = signals
+    low, low_of_other, band, band_of_other = out
+    p1, p2 = poles[1], poles[2]
     for start, stop in bounds:
-        last = before = gain * signal[start] / (1.0 + poles[1] + poles[2])
+        a = b = gain * one[start] / (1.0 + p1 + p2)
+        c = d = gain * other[start] / (1.0 + p1 + p2)
         for n in range(start, stop):
-            # Both have these poles; their zeros are (1 + 1/z)^2 and 1 - 1/z^2.
-            poled = gain * signal[n] - poles[1] * last - poles[2] * before
+            # All have these poles; their zeros are (1 + 1/z)^2 and 1 - 1/z^2.
+            poled = gain * one[n] - p1 * a - p2 * b
+            poled_other = gain * other[n] - p1 * c - p2 * d
             place = places[n]
             if place >= 0:
-                low[place] = poled + 2.0 * last + before
-                band[place] = steeper * (poled - before)
-            before = last
-            last = poled
+                low[place] = poled + 2.0 * a + b
+                low_of_other[place] = poled_other + 2.0 * c + d
+                band[place] = steeper * (poled - b)
+                band_of_other[place] = steeper * (poled_other - d)
+            a, b, c, d = poled, a, poled_other, c
 
 
 def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats, Floats]:
-    """Bilinear transform of a filter of second order.
+    """Bilinear transform of a filter of second order, given by its coefficients of s^2, s and 1.
 
-    Parameters
-    ----------
-    above, below : tuple of 3 floats
-        Coefficients of s^2, s and 1 in numerator and denominator.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    above, below : arrays of shape (3,)
-        Coefficients of 1, 1/z and 1/z^2; the denominator begins with 1. `scipy.signal.bilinear`
-        returns the same by way of polynomial objects, at a hundred times the cost.
+    Returns those of 1, 1/z and 1/z^2 above and below; the denominator begins with 1.
+    `scipy.signal.bilinear` returns the same by way of polynomial objects, at a hundred times the
+    cost.
     """
     k = 2 * rate_hz
 

@@ -83,31 +83,13 @@ class TimeDelay(Effect):
 
 
 def late_means(
-    sums: Floats,
-    bounds: tuple[tuple[int, int], ...],
-    samples: float,
-    factor: int,
-    wanted: Bools,
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int, wanted: Bools
 ) -> Floats:
-    """Means of blocks of columns that come later, the first and the last values held.
+    """Means of the wanted blocks of columns that come later, the first and the last values held.
 
-    Parameters
-    ----------
-    sums : array of shape (n + recordings, k)
-        Running sums of uniformly sampled columns, from zero in each recording: with them a delay
-        costs no more than there are blocks.
-    bounds : tuple of (int, int)
-        Half-open recordings among the n samples.
-    samples : float
-        Delay; between samples, what a straight line between them gives.
-    factor : int
-        Samples per block.
-    wanted : bool array of shape (n // factor per recording,)
-        Blocks that somebody looks at.
-
-    Returns
-    -------
-    array of shape (wanted blocks, k)
+    Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
+    no more than there are blocks; between samples it is what a straight line between them gives.
+    `wanted` is a bool array of shape (n // factor per recording,).
     """
     sizes = np.array([stop - start for start, stop in bounds])
     blocks = sizes // factor
@@ -135,15 +117,7 @@ def late_means(
 
 
 def lagging(columns: Floats, samples: float) -> Floats:
-    """Put columns through a filter of first order, from rest at their first values.
-
-    Parameters
-    ----------
-    columns : array of shape (n, k)
-        Uniformly sampled.
-    samples : float
-        Time constant.
-    """
+    """Put columns, (n, k), through a filter of first order, from rest at their first values."""
     smooth: Floats = _lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T
     return smooth
 

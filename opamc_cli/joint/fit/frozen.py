@@ -52,13 +52,8 @@ def why_not_applied(term: Term, track: Track) -> str | None:
 def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Floats]) -> Applied:
     """Apply terms with known coefficients; where some follow the model, until that settles.
 
-    Parameters
-    ----------
-    track : Track
-        Other recordings, at the full rate, with the reference that the terms were fitted with.
-    terms : sequence of Term
-    coefficients : sequence of arrays
-        One for each term.
+    The track holds other recordings, at the full rate, with the reference that the terms were
+    fitted with.
     """
     judged = track.moving & track.clear
     judged = judged if judged.any() else track.moving

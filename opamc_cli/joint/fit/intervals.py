@@ -30,15 +30,6 @@ class Certainty:
 def certainty(fit: Fit) -> Certainty:
     """Compute standard errors that allow for any correlation inside a unit, and collinear terms.
 
-    Parameters
-    ----------
-    fit : Fit
-        A joint fit with at least one term.
-
-    Returns
-    -------
-    Certainty
-
     References
     ----------
     Liang and Zeger, Biometrika 73, 1986 (the cluster sandwich), with the factor units/(units-1).

@@ -123,8 +123,8 @@ class Dataset:
     def parts(self) -> tuple[Parts, Parts]:
         """Open samples of the fine and of the coarse grid, in parts."""
         if "parts" not in self.cache.shared:
-            fine = parts_of(self.fine, self.fine.track.clear)
-            coarse = parts_of(self.coarse, self.coarse.track.clear)
+            fine = parts_of(self.fine.rows, self.fine.track.clear)
+            coarse = parts_of(self.coarse.rows, self.coarse.track.clear)
             self.cache.shared["parts"] = (fine, coarse)
         found: tuple[Parts, Parts] = self.cache.shared["parts"]
         return found
@@ -163,19 +163,7 @@ class Dataset:
 
 
 def dataset_of(track: Track, grouping: Grouping) -> Dataset:
-    """Arrange a track for the loop.
-
-    Parameters
-    ----------
-    track : Track
-        At the full rate.
-    grouping : Grouping
-        Groups, and which are sealed.
-
-    Returns
-    -------
-    Dataset
-    """
+    """Arrange a track for the loop."""
     track = replace(track, group=grouping.group)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
@@ -214,7 +202,7 @@ def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Gri
     stops = np.cumsum([counts[g] for g in groups])
     starts = np.concatenate([[0], stops[:-1]])
     slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
-    track = replace(track, open_samples=fit)
+    track = replace(track, open_samples=fit, kept={})
     return Grid(track, fit, member & np.isin(track.group, sealed), slices)
 
 
@@ -247,8 +235,7 @@ class Fit:
                 fast += dataset.columns(term, True) @ values[:, None]
         fast = averaged_blocks(fast, track.bounds, track.kernel, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        sums = dataset.sums_of([*slow, fast], False)
-        return sums.given([sums.moment.shape[1] - 1], np.ones(1)), slow, fast[:, 0]
+        return dataset.sums_of([*slow, fast], False).less_last(), slow, fast[:, 0]
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -306,17 +293,20 @@ class Fit:
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     """Fit all terms jointly; where some scale with the load or the model, until that settles.
 
-    Parameters
-    ----------
-    dataset : Dataset
-        Recordings.
-    terms : tuple of Term
-        Model.
-
-    Returns
-    -------
-    Fit
+    The same terms have the same fit, whatever was fitted before.
     """
+    load, model, coefficients, residual, sums = dataset.cache.fitted(
+        tuple(term.key for term in terms), lambda: _settled(dataset, terms)
+    )
+    fitted = dataset.with_model(load, model, static_terms(terms))
+    return Fit(terms, coefficients, fitted, residual, sums)
+
+
+Found = tuple[Floats, Floats, tuple[Floats, ...], Floats, Sums]
+"""A fit's load, model, coefficients, residual and sums: what does not hold its dataset."""
+
+
+def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
     track = dataset.fine.track
     dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
@@ -330,7 +320,8 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
         if not circular or settled:
             break
         dataset, before = _with_newton_load(fitted), error
-    return fitted
+    track = fitted.dataset.fine.track
+    return track.load_a, track.model_a, fitted.coefficients, fitted.residual_a, fitted.sums
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:
@@ -398,17 +389,7 @@ def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
 def currents(
     terms: Sequence[Term], blocks: Iterable[Floats], coefficients: Sequence[Floats], size: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Add up the current of all terms, of the static ones, and of those that carry the load.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-    blocks : iterable of arrays of shape (size, k)
-        Their regressors.
-    coefficients : sequence of arrays of shape (k,)
-    size : int
-        Samples.
-    """
+    """Add up the current of all terms, of the static ones, and of those that carry the load."""
     total, model, load = np.zeros(size), np.zeros(size), np.zeros(size)
     for term, block, values in zip(terms, blocks, coefficients, strict=True):
         part = block @ values

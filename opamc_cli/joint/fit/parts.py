@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -59,11 +58,7 @@ class Parts:
         """Stretch of time that each part lies in: half a unit, or as long as it moves both ways.
 
         Where a half is one stroke friction is an offset, and no drift. A single stroke has halves.
-
-        Parameters
-        ----------
-        direction : array of shape (n,)
-            Sign of the speed on the grid.
+        The direction is the sign of the speed on the grid, shape (n,).
         """
         halves = self.halves
         starts = [start for start, _ in self.slices]
@@ -114,26 +109,12 @@ class Parts:
         return sums
 
 
-class Grouped(Protocol):
-    """A grid that knows its open groups."""
+def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
+    """Cut groups of samples, given by their places, into units, and units into parts.
 
-    @property
-    def rows(self) -> list[Ints]:
-        """Places of each open group's samples."""
-        ...
-
-
-def parts_of(grid: Grouped, clear: Bools) -> Parts:
-    """Cut a grid's open samples into units, and units into parts.
-
-    Parameters
-    ----------
-    grid : Grid
-        Its `fit` samples are fitted.
-    clear : bool array of shape (n,)
-        Those that are judged.
+    What is `clear`, a bool array of shape (n,), is judged.
     """
-    groups = [rows for rows in grid.rows if rows.size]
+    groups = [rows for rows in groups if rows.size]
     cuts = -(-FEWEST_UNITS // max(len(groups), 1))
     units = [piece for rows in groups for piece in np.array_split(rows, cuts) if piece.size]
     rows: list[Ints] = []
@@ -161,23 +142,11 @@ class Sums:
     power: Floats
     parts: Parts
 
-    def beside(self, cross: Floats, own: Floats, moment: Floats) -> "Sums":
-        """Append regressors, given their products with the others, themselves and the current."""
-        top = np.concatenate([self.gram, cross], axis=2)
-        bottom = np.concatenate([np.swapaxes(cross, 1, 2), own], axis=2)
-        gram = np.concatenate([top, bottom], axis=1)
-        return Sums(gram, np.concatenate([self.moment, moment], axis=1), self.power, self.parts)
-
     def without_drift(self, stretches: Ints) -> "Sums":
-        """Allow the current another offset in each stretch of time.
+        """Allow the current another offset in each stretch, (p,) as `Parts.stretches` tells.
 
         The last regressor has to be ones; the parts of what is returned are the stretches, without
         rows.
-
-        Parameters
-        ----------
-        stretches : int array of shape (p,)
-            Stretch of each part, as `Parts.stretches` tells.
         """
         count = int(stretches.max()) + 1
         gram, moment, power = (
@@ -201,33 +170,12 @@ class Sums:
             parts,
         )
 
-    def columns(self, kept: Sequence[int]) -> "Sums":
-        """Keep some of the regressors."""
-        index = np.asarray(kept, dtype=np.int64)
-        gram = self.gram[:, index[:, None], index]
-        return Sums(gram, self.moment[:, index], self.power, self.parts)
-
-    def given(self, known: Sequence[int], coefficients: Floats) -> "Sums":
-        """Take regressors with known coefficients out of the current.
-
-        Parameters
-        ----------
-        known : sequence of int
-            Places of the regressors.
-        coefficients : array of shape (len(known),)
-        """
-        if not len(known):
-            return self
-        left = [i for i in range(self.moment.shape[1]) if i not in set(known)]
-        among = self.gram[:, :, known]
-        power = (
-            self.power
-            - 2 * self.moment[:, known] @ coefficients
-            + np.einsum("i,pij,j->p", coefficients, among[:, known], coefficients)
-        )
-        moment = self.moment - among @ coefficients
-        rest = self.columns(left)
-        return Sums(rest.gram, moment[:, left], power, self.parts)
+    def less_last(self) -> "Sums":
+        """Take the last regressor, as large as it is, out of the current."""
+        among = self.gram[:, :, -1]
+        power = self.power - 2 * self.moment[:, -1] + among[:, -1]
+        moment = (self.moment - among)[:, :-1]
+        return Sums(self.gram[:, :-1, :-1], moment, power, self.parts)
 
     @cached_property
     def inverses(self) -> Floats:

@@ -2,15 +2,19 @@
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
+Result = TypeVar("Result")
+
 MOST_BYTES = 120e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
+MOST_FITS = 16
+"""A search fits a quarter of its models twice, mostly soon after."""
 
 
 class RegressorCache:
@@ -21,6 +25,7 @@ class RegressorCache:
 
     def __init__(self) -> None:
         self.shared: dict[str, Any] = {}
+        self._fits: OrderedDict[Hashable, Any] = OrderedDict()
         self._columns: OrderedDict[Hashable, Floats] = OrderedDict()
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
@@ -28,9 +33,19 @@ class RegressorCache:
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
         self.shared.clear()
+        self._fits.clear()
         self._columns.clear()
         self._taken.clear()
         self._products.clear()
+
+    def fitted(self, key: Hashable, fit: Callable[[], Result]) -> Result:
+        """Return what a fit found, computed where it is not at hand."""
+        found: Result = self._fits[key] if key in self._fits else fit()
+        self._fits[key] = found
+        self._fits.move_to_end(key)
+        if len(self._fits) > MOST_FITS:
+            self._fits.popitem(last=False)
+        return found
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
@@ -41,18 +56,9 @@ class RegressorCache:
         return found
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
-        """Sum products over parts.
+        """Sum products of regressors, term by term (n, k), over parts.
 
-        Parameters
-        ----------
-        blocks : sequence of arrays of shape (n, k)
-            Regressors, term by term.
-        current : array of shape (n,)
-            The same in every call for one grid.
-        parts : Parts
-            Likewise.
-        fine : bool
-            Which grid.
+        Of one grid, current, shape (n,), and parts are the same in every call.
         """
         self._forget_strangers(blocks)
         target = current[:, None] if "target" + str(fine) not in self.shared else None

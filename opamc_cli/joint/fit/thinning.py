@@ -26,22 +26,10 @@ Pieces = list[tuple[int, int]]
 def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
     """Let a sample of some groups stand for all of them in a long recording.
 
-    Parameters
-    ----------
-    track : Track
-        With its groups.
-    grouping : Grouping
-        Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks
-        the first and the last part is taken, so that whatever changes at some time is seen on
-        its own side of a sealed neighbour.
-    groups : sequence of int
-        The open ones, or the sealed ones, in time order.
-
-    Returns
-    -------
-    list of (int, int)
-        Half-open pieces with some 50 000 moving samples times these groups' share; more
-        where whole cycles are long.
+    Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks the
+    first and the last part is taken, so that whatever changes at some time is seen on its own side
+    of a sealed neighbour. The half-open pieces hold some 50 000 moving samples times these groups'
+    share, more where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
     share = MOST_SAMPLES / max(int(np.count_nonzero(member)), 1)
@@ -63,19 +51,9 @@ def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
 
 
 def cut(track: Track, pieces: Pieces) -> Track:
-    """Cut pieces out of a track, each with what comes before and after it.
+    """Cut half-open pieces, ascending, out of a track, each with what comes before and after it.
 
-    Parameters
-    ----------
-    track : Track
-        With its groups.
-    pieces : list of (int, int)
-        Half-open, ascending, not overlapping.
-
-    Returns
-    -------
-    Track
-        Outside the pieces its samples belong to no group.
+    Outside the pieces samples belong to no group.
     """
     inside: Bools = np.zeros(track.size, dtype=bool)
     spans: Pieces = []

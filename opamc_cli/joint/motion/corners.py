@@ -23,25 +23,10 @@ def clear_of_corners(
     """Tell the samples whose acceleration is as true as the current's noise can show.
 
     What the window takes from the acceleration is about what it would take a second time (Tukey's
-    twicing). How much current that is, is fitted to the current less its own moving average, which
-    holds what the window takes, and noise.
-
-    Parameters
-    ----------
-    acceleration : array of shape (n,)
-        Smoothed acceleration of one recording.
-    current_a : array of shape (n,)
-        Torque current.
-    moving : bool array of shape (n,)
-        Samples in motion.
-    kernel : array of odd length
-        Moving average that the acceleration has gone through.
-    noise : float
-        Standard deviation of the noise in what the window takes a second time; 0 if unknown.
-
-    Returns
-    -------
-    bool array of shape (n,)
+    twicing), with `noise` of that standard deviation in it. How much current that is, is fitted to
+    the current less its own moving average, which holds what the window takes, and noise. All are
+    (n,), of one recording, but for the kernel: the moving average, of odd length, that the
+    acceleration has gone through.
     """
     everywhere = ((0, acceleration.size),)
     clear = np.ones(acceleration.size, dtype=bool)

@@ -36,21 +36,11 @@ class Grouping:
 
 
 def cycle_length(path: Floats, rate_hz: float) -> int | None:
-    """Shortest lag at which a path repeats itself.
+    """Shortest lag, in samples, at which the speed (or position) of a recording repeats itself.
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Speed (or position) of one recording.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    int or None
-        Samples per cycle; None where the path does not repeat. A lag counts if the mean square
-        of ``path[t + lag] - path[t]`` is below 2 % of twice the variance and at least half of
-        the recording overlaps with itself, or 60 % of a cycle.
+    None where it does not. A lag counts if the mean square of ``path[t + lag] - path[t]`` is below
+    2 % of twice the variance and at least half of the recording overlaps with itself, or 60 % of a
+    cycle.
     """
     factor = max(int(rate_hz // 50), 1)
     usable = path.size // factor * factor
@@ -103,26 +93,11 @@ def group_samples(
 ) -> Grouping | None:
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
-    Parameters
-    ----------
-    moving : bool array of shape (n,)
-        Samples that count.
-    bounds : tuple of (int, int)
-        Half-open recordings.
-    period : int or None
-        Samples per cycle, if the motion repeats.
-    rate_hz : float
-        Sampling rate.
-    run_names : tuple of str
-        One name per recording.
-
-    Returns
-    -------
-    Grouping or None
-        None where too little moves to seal anything off. With cycles, the last 27 % of them are
-        sealed (of each recording that holds four or more, else of all); a motion that does not
-        repeat is cut into blocks of equal moving time, of which a quarter is sealed, since the
-        end of a single stroke would be a place that the fit has never seen.
+    Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
+    little moves to seal anything off. With cycles, the last 27 % of them are sealed (of each
+    recording that holds four or more, else of all); a motion that does not repeat is cut into
+    blocks of equal moving time, of which a quarter is sealed, since the end of a single stroke
+    would be a place that the fit has never seen.
     """
     group = np.full(moving.size, -1, dtype=np.int64)
     pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
@@ -170,10 +145,7 @@ def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
     return sealed
 
 
-def _blocks(
-    moving: Bools,
-    run_names: tuple[str, ...],
-) -> Grouping | None:
+def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:
     indices = np.flatnonzero(moving)
     if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None

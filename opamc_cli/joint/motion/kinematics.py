@@ -39,6 +39,9 @@ LEAST_TRAVEL_RAD = 0.01
 """Of another joint that moves beside: half a degree; what is less is held still."""
 
 
+LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
+
+
 @dataclass(frozen=True)
 class Recording:
     """One joint's samples of one run, as they were logged."""
@@ -70,19 +73,10 @@ class Recording:
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
-
-        def part(values: Floats | None) -> Floats | None:
-            return None if values is None else values[span]
-
-        return replace(
-            self,
-            current_a=part(self.current_a),
-            phases_a=part(self.phases_a),
-            position_rad=part(self.position_rad),
-            velocity_rad_s=part(self.velocity_rad_s),
-            temperature_c=part(self.temperature_c),
-            others_rad={axis: values[span] for axis, values in self.others_rad.items()},
-        )
+        logged = {name: getattr(self, name) for name in LOGGED}
+        parts = {name: one[span] for name, one in logged.items() if one is not None}
+        others = {axis: values[span] for axis, values in self.others_rad.items()}
+        return replace(self, **parts, others_rad=others)
 
 
 WINDOWS_S = (0.01, 0.02, 0.05, 0.12)
@@ -163,20 +157,8 @@ def motion_from_position(
 ) -> Motion:
     """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
 
-    Parameters
-    ----------
-    position_rad : array of shape (n,)
-        Logged position.
-    velocity_rad_s : array of shape (n,) or None
-        Logged speed: used where it agrees with the position and is the cleaner of the two.
-    rate_hz : float
-        Sampling rate.
-    smoothing : Smoothing, optional
-        Another window.
-
-    Returns
-    -------
-    Motion
+    A logged speed, (n,) beside the position, is used where it agrees with it and is the cleaner
+    one.
     """
     if smoothing is None:
         window = smoothing_window(position_rad, rate_hz, derivative=2)
@@ -223,20 +205,9 @@ def _smoothed(
 
 
 def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) -> float | None:
-    """How many times the rate of change of a logged position a logged speed is.
+    """How many times the rate of change of a logged position a logged speed is, both (n,).
 
-    Parameters
-    ----------
-    position_rad, velocity_rad_s : arrays of shape (n,)
-        Logged side by side.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    float or None
-        1 where the units agree; None where the two do not tell, or have nothing to do with one
-        another.
+    1 where the units agree; None where the two do not tell, or have nothing to do with one another.
     """
     length = max(int(RATIO_BLOCK_S * rate_hz), 1)
     edges = np.arange(0, position_rad.size, length)
@@ -261,18 +232,9 @@ def direction_of(motion: Motion) -> Floats:
 
 
 def moving_samples(motion: Motion, usable: Bools) -> Bools:
-    """Tell the samples in motion: fast enough, half a window from any reversal.
+    """Tell the samples in motion, (n,): fast enough, half a window from any reversal.
 
-    Parameters
-    ----------
-    motion : Motion
-        Smoothed motion.
-    usable : bool array of shape (n,)
-        Samples whose readings are finite.
-
-    Returns
-    -------
-    bool array of shape (n,)
+    Of those whose readings are finite, the `usable`.
     """
     speeds = np.abs(motion.velocity)
     direction = direction_of(motion)
@@ -301,24 +263,8 @@ def build_track(
 ) -> Track:
     """Put recordings of one joint on one grid, with smoothed motion and torque current.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        All at the same rate; each with a signed current, or three phases.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-    smoothing : Smoothing, optional
-        Another window than the noise of each path asks for.
-
-    Returns
-    -------
-    Track
-        Groups are not set yet (-1 everywhere).
-
-    Raises
-    ------
-    ValueError
-        If a recording holds neither three phases nor a current with position or speed.
+    Groups are not set yet. All are at one rate, each with a signed current or three phases: a
+    ValueError is raised where one holds neither three phases nor a current with position or speed.
     """
     rate = recordings[0].rate_hz
     beside = _moving_beside(recordings)

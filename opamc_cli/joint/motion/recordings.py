@@ -16,22 +16,7 @@ ENOUGH_SAMPLES = 200_000
 
 
 def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
-    """Lay recordings on one grid and split them into groups.
-
-    Parameters
-    ----------
-    recordings : list of Recording
-        In time order, all at one rate.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-
-    Returns
-    -------
-    track : Track
-        With the cycle's length, if the motion repeats.
-    grouping : Grouping or None
-        None where too little moves to seal anything off.
-    """
+    """Lay recordings on one grid, in groups; None where too little moves to seal any off."""
     track = build_track(recordings, joint)
     lengths = [
         cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
@@ -47,17 +32,7 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
 def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:
     """Enough of long recordings to choose by how they are differentiated, from the first motion on.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        In time order.
-    track : Track
-        All of them.
-
-    Returns
-    -------
-    list of Recording
-        Whole ones, evenly picked, and the beginning of one that is too long by itself.
+    Whole ones, evenly picked, and the beginning of one that is too long by itself.
     """
     count = min(max(len(recordings) * ENOUGH_SAMPLES // track.size, 1), len(recordings))
     picks = np.linspace(0, len(recordings) - 1, count).round().astype(int)

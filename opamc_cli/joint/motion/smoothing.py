@@ -24,17 +24,9 @@ ROUNDING = 1e-12
 def measurement_noise(path: Floats) -> float:
     """Estimate the standard deviation of what is not smooth in a path, from its fourth differences.
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Uniformly sampled path, n > 4.
-
-    Returns
-    -------
-    float
-        Robust estimate in the path's unit (median absolute difference; the sum of squares of
-        the fourth difference's weights 1, -4, 6, -4, 1 is 70). Where a path in steps of an
-        encoder hardly changes from sample to sample, most differences are none: they do not count.
+    In the path's unit, by the median absolute difference; the sum of squares of the fourth
+    difference's weights 1, -4, 6, -4, 1 is 70. Where a path in steps of an encoder hardly changes
+    from sample to sample, most differences are none: they do not count.
     """
     rounding = ROUNDING * float(np.max(np.abs(path)))
     differences = np.abs(np.diff(path, 4))
@@ -57,19 +49,8 @@ def _in_steps(path: Floats, rounding: float) -> bool:
 def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     """Shortest odd window whose derivative noise is small against the derivative itself.
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Position (derivative 2) or speed (derivative 1).
-    rate_hz : float
-        Sampling rate.
-    derivative : int
-        Derivative that must come out clean.
-
-    Returns
-    -------
-    int
-        Odd number of samples, 5 or more, at most 0.2 s or 15 samples.
+    Of a position (derivative 2) or a speed (1), shape (n,): 5 samples or more, at most 0.2 s or 15
+    samples.
     """
     longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
     longest = min(longest, (path.size - 1) | 1)
@@ -85,24 +66,10 @@ def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
 
 
 def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | Ints = 0) -> Floats:
-    """Weights of a window's samples in a derivative of the cubic that fits them best.
+    """Weights of a window's samples in a derivative of the cubic that fits them best; (window,).
 
+    At a sample counted from the middle, or at k of them: then (k, window). As
     `scipy.signal.savgol_coeffs`, without the 0.7 s that package takes to load.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        Order of the derivative.
-    at : int or array of shape (k,)
-        Sample at which it is asked for, from the middle.
-
-    Returns
-    -------
-    array of shape (window,) or (k, window)
     """
     half = window // 2
     places = np.arange(-half, half + 1) / half
@@ -114,37 +81,15 @@ def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | I
 
 
 def noise_gain(rate_hz: float, window: int, derivative: int) -> float:
-    """Compute the standard deviation of a derivative of white noise of unit deviation.
-
-    Parameters
-    ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        Order of the derivative.
-    """
+    """Compute the standard deviation of a derivative of white noise of unit deviation."""
     return float(np.linalg.norm(polynomial_weights(rate_hz, window, derivative)))
 
 
 def averaging_kernel(window: int, derivative: int) -> Floats:
-    """Weights of the moving average that a local polynomial's derivative is a derivative of.
+    """Weights, of sum 1, of the average that a local polynomial's derivative is a derivative of.
 
     The second derivative of a Savitzky-Golay filter is the plain second difference of the path
     averaged with these weights; what is fitted to that derivative has to be averaged alike.
-
-    Parameters
-    ----------
-    window : int
-        Odd number of samples.
-    derivative : int
-        1 or 2.
-
-    Returns
-    -------
-    array of shape (window,)
-        Sum 1.
     """
     weights = polynomial_weights(1.0, window, derivative)
     for _ in range(derivative):
@@ -156,24 +101,10 @@ def averaging_kernel(window: int, derivative: int) -> Floats:
 
 
 def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats | None:
-    """Compare the derivative with those of a third and of three times the window.
+    """Compare the derivative with those of a third and of three times the window; (n, 2).
 
-    Where the motion is less smooth than the window, as at a step of the acceleration, the
-    current holds what the derivative lacks; these two span the lack.
-
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Position or speed.
-    rate_hz : float
-        Sampling rate.
-    window, derivative : int
-        Of the local polynomial.
-
-    Returns
-    -------
-    array of shape (n, 2) or None
-        None where the window is the shortest there is.
+    Where the motion is less smooth than the window, as at a step of the acceleration, the current
+    holds what the derivative lacks; these two span the lack. None where the window is the shortest.
     """
     if window <= SHORTEST_WINDOW:
         return None
@@ -188,19 +119,7 @@ def blurred(path: Floats, rate_hz: float, window: int, derivative: int) -> Float
 def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     """Compute the standard deviation of what a window takes from a derivative a second time.
 
-    Parameters
-    ----------
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples.
-    derivative : int
-        1 or 2.
-
-    Returns
-    -------
-    float
-        For a path that is white noise of unit deviation.
+    For a path that is white noise of unit deviation.
     """
     kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
@@ -212,23 +131,8 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
     """Count the samples per block over which a derivative's noise averages to almost nothing.
 
     A regressor with noise invites every effect that is a smoother version of it. Blocks are long
-    enough when the noise that is left is below 0.25 % of the derivative.
-
-    Parameters
-    ----------
-    noise : float
-        Standard deviation of the path's white noise.
-    scale : float
-        Standard deviation of the derivative.
-    rate_hz : float
-        Sampling rate.
-    window, derivative : int
-        Of the local polynomial.
-
-    Returns
-    -------
-    int
-        At least 1, at most 0.2 s.
+    enough when the noise that is left, of white noise in the path, is below 0.25 % of the
+    derivative's standard deviation, the `scale`; at most 0.2 s.
     """
     kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
     longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
@@ -242,22 +146,9 @@ def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivat
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:
-    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial).
+    """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial), (n,).
 
-    Parameters
-    ----------
-    path : array of shape (n,)
-        Uniformly sampled path, n >= window.
-    rate_hz : float
-        Sampling rate.
-    window : int
-        Odd number of samples, at least 5.
-    derivative : int
-        0 for the smoothed path itself.
-
-    Returns
-    -------
-    array of shape (n,)
+    Derivative 0 is the smoothed path itself. The window has an odd number of samples, 5 to n.
 
     References
     ----------
@@ -273,18 +164,10 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
 
 
 def unstepped(values: Floats) -> Floats:
-    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature.
+    """Bridge the steps of a slow channel that is logged coarsely, such as a temperature; (n,).
 
-    Parameters
-    ----------
-    values : array of shape (n,)
-        Uniformly sampled.
-
-    Returns
-    -------
-    array of shape (n,)
-        Straight lines through the middles of the steps, the first and the last value held; the
-        values themselves where more than a tenth of them are steps.
+    By straight lines through the middles of the steps, the first and the last value held; the
+    values themselves where more than a tenth of them are steps.
     """
     steps = np.flatnonzero(np.diff(values)) + 1
     if not steps.size or steps.size > values.size / 10:

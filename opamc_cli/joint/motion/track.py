@@ -10,6 +10,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from opamc_cli.joint.least_squares import solve
+
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
@@ -38,6 +40,10 @@ SAMPLED = (
 """Attributes of a track that have a value per sample, or are None."""
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """Those of which a block has something else than the mean, or nothing."""
+
+
+ROWS_OF_THE_LOAD = 10_000
+"""Samples by which the inertia's part of the load is told: the load has no noise."""
 
 
 @dataclass(frozen=True)
@@ -97,6 +103,8 @@ class Track:
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
+    kept: dict[Hashable, Floats] | None = None
+    """Regressors of static terms that stay the same whatever is fitted, while a search goes on."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
     None."""
@@ -146,11 +154,28 @@ class Track:
         )
 
     @cached_property
+    def load_inertia(self) -> float:
+        """Current of the fitted load that follows the acceleration, in A by rad/s²."""
+        rows = np.flatnonzero(self.moving)
+        rows = rows[:: max(rows.size // ROWS_OF_THE_LOAD, 1)]
+        place = self.position_rad[rows]
+        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
+        columns = np.stack(shapes, axis=0).T
+        return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
+
+    @cached_property
     def static_columns(self) -> Floats:
         """Regressors of the static terms, shape (m, k), on the full rate's samples."""
         source = self.full or self
-        blocks = [term.columns(source).T for term in self.static_terms]
+        blocks = [self._regressors(term, source).T for term in self.static_terms]
         return np.concatenate([np.zeros((0, source.size)), *blocks]).T
+
+    def _regressors(self, term: "Regressors", source: "Track") -> Floats:
+        if self.kept is None or not term.is_constant:
+            return term.columns(source)
+        if term.key not in self.kept:
+            self.kept[term.key] = term.columns(source)
+        return self.kept[term.key]
 
     @cached_property
     def static_sums(self) -> Floats:
@@ -222,15 +247,6 @@ class Regressors(Protocol):
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
     """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
 
-    Parameters
-    ----------
-    values : array of shape (n,) or (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
-    factor : int
-        Samples per block, at least 1.
-
     Returns
     -------
     array of shape (n // factor per recording,) or with m columns
@@ -249,17 +265,7 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
 
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
-    """Put signals through a moving average inside each recording; ends keep their last value.
-
-    Parameters
-    ----------
-    values : array of shape (n,) or (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
-    kernel : array of odd length
-        Weights.
-    """
+    """Put signals through a moving average inside each recording; ends keep their last value."""
     if kernel.size == 1:
         return values
     half = kernel.size // 2
@@ -279,19 +285,7 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
 def averaged_blocks(
     values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats, factor: int
 ) -> Floats:
-    """Average blocks of what went through a moving average; one sum of products a block.
-
-    Parameters
-    ----------
-    values : array of shape (n, m)
-        Samples on the grid of a track.
-    bounds : tuple of (int, int)
-        Half-open recordings.
-    kernel : array of odd length
-        Weights of the moving average.
-    factor : int
-        Samples per block, at least 1.
-    """
+    """Average blocks of what went through a moving average; one sum of products a block."""
     weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
     half = kernel.size // 2
     parts = []
@@ -303,16 +297,9 @@ def averaged_blocks(
 
 
 def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:
-    """Cut spans out of a track; each becomes a recording of its own.
+    """Cut spans out of a track, each inside one recording; each becomes a recording of its own.
 
-    Parameters
-    ----------
-    track : Track
-        Any track.
-    inside : bool array of shape (n,)
-        Samples that keep their group; all others get none.
-    spans : tuple of (int, int)
-        Half-open, ascending, each inside one recording.
+    Samples that are not `inside`, bool (n,), lose their group.
     """
     rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
     stops = np.cumsum([stop - start for start, stop in spans])
@@ -331,18 +318,6 @@ def coarsen(track: Track, factor: int) -> Track:
     Current, position and speed are first put through the moving average that the acceleration has
     gone through: next to a step of the acceleration, a speed that is rounded off less than the
     current is some per cent off, which looks like friction of another form.
-
-    Parameters
-    ----------
-    track : Track
-        Track at the full rate.
-    factor : int
-        Samples per block.
-
-    Returns
-    -------
-    Track
-        Track at ``rate_hz / factor``.
     """
     if factor == 1 and track.kernel.size == 1:
         return track

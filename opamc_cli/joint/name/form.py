@@ -45,23 +45,10 @@ class Curve:
 
 
 def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
-    """Share of its domain's curve that an effect's form holds.
+    """Share of its domain's curve that the form of an effect of the best chain holds.
 
-    Parameters
-    ----------
-    best : Chain
-        With the effect.
-    drop : float
-        What the effect takes off the held-out mean square error, in A^2.
-    term : Term
-        The effect.
-    unnamed : Pool
-        Functions that have no name.
-
-    Returns
-    -------
-    float
-        1 where no function of the domain explains more beside it.
+    It takes `drop` off the held-out mean square error, in A^2; 1 where no function of the domain
+    explains more beside it.
     """
     if term.effect.fast:
         # A line's forms are all that a line can have.
@@ -80,15 +67,7 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
 
 
 def curve_of(fit: Fit, place: int) -> Curve:
-    """Draw an effect and the residual over the effect's covariate.
-
-    Parameters
-    ----------
-    fit : Fit
-        Final model.
-    place : int
-        Of the term in the fit.
-    """
+    """Draw an effect and the residual over the effect's covariate."""
     dataset = fit.dataset
     grid = dataset.sharp
     term, values = fit.terms[place], fit.coefficients[place]

@@ -18,17 +18,7 @@ LOGARITHMIC = 5.0
 
 
 def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
-    """Refine the searched parameters of a candidate beside a chain.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Of the chain.
-    term : Term
-        A guess.
-    beside : Beside
-        The chain on the grid on which the candidate is searched.
-    """
+    """Refine the searched parameters of a candidate beside a chain."""
     track = dataset.grid_of(beside.fine).track
     limits = {k: v for k, v in term.effect.limits(track).items() if k in term.parameters}
     if not limits:

@@ -34,19 +34,7 @@ class Named:
 def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]:
     """Drop what is not worth its price, take the name off what a function without one does better.
 
-    Parameters
-    ----------
-    best : Chain
-        From the beam.
-    pool, unnamed : Pool
-        Effects, and functions that have no name.
-
-    Returns
-    -------
-    Chain
-        Changed a few times at most.
-    list of Named
-        Its named effects with their ties.
+    The chain is changed a few times at most; its named effects come with their ties.
     """
     for _ in range(MOST_ROUNDS):
         changes = (_asked_again(best, place, pool, unnamed) for place in range(best.added))

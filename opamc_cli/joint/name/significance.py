@@ -28,19 +28,7 @@ def p_value(t_value: float, n_parts: int) -> float:
 def decoy_gain(chain: Chain, term: Term, seed: int) -> float:
     """Largest held-out gain of an effect on a chain's residual with random signs of its units.
 
-    Parameters
-    ----------
-    chain : Chain
-        Without the effect.
-    term : Term
-        The effect with its parameters.
-    seed : int
-        Of the signs.
-
-    Returns
-    -------
-    float
-        Share of the residual's sum of squares; mostly below 0.
+    Share of the residual's sum of squares; mostly below 0.
     """
     dataset = chain.fit.dataset
     fine, _ = dataset.parts

@@ -29,17 +29,7 @@ ADVICE = (
 
 
 def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
-    """Return the effects that in the place of one leave no surely larger held-out error.
-
-    Parameters
-    ----------
-    best : Chain
-        With the effect.
-    name : str
-        The effect's.
-    others : sequence of Trial
-        The chain with others in its place.
-    """
+    """Return the effects that in the place of one leave no surely larger held-out error."""
     found = []
     for other in others:
         difference, error = paired(best.deviation, other.chain.deviation)
@@ -49,20 +39,7 @@ def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
 
 
 def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
-    """Say what to record to tell an effect from those that tie with it.
-
-    Parameters
-    ----------
-    name : str
-        Effect that was added.
-    ties : tuple of str
-        Effects that explain the data as well.
-
-    Returns
-    -------
-    str or None
-        None where nothing ties.
-    """
+    """Say what to record to tell an effect from those that tie with it; None where nothing ties."""
     if not ties:
         return None
     for members, advice in ADVICE:

@@ -13,6 +13,7 @@ from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, OpamcError
 from opamc_cli.stages.model.axis_model import declared_effects, library_of
 from opamc_cli.stages.model.users_effects import users_effects_named
+from opamc_cli.stages.processes.freed_memory import keep_freed_memory
 from opamc_cli.stages.processes.parallel import Watch, map_items
 from opamc_cli.stages.recordings.axis_recording import axes_of
 from opamc_cli.storage.runs import Run
@@ -85,6 +86,7 @@ def on_each_axis(
 
 
 def _on_axis(work: OnAxis[Result], model: JointModelConfig, paths: Runs, axis: int) -> Result:
+    keep_freed_memory()
     # A worker has one thread: with more, the sums of products here would differ in the last digit.
     with ExitStack() as stack, threadpool_limits(1), users_effects_named():
         runs = [stack.enter_context(Run(path, name)) for name, path in paths]

@@ -8,12 +8,7 @@ import numpy as np
 from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.effects.library import (
-    Library,
-    built_in_library,
-    effect_named,
-    load_user_effects,
-)
+from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.explain.declared import Declared, best_fit
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
@@ -21,6 +16,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.model.declared_terms import declared_term
+from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.storage.runs import Run
 

@@ -10,11 +10,12 @@ import pyarrow as pa
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Cause, Change, explain_change
-from opamc_cli.joint.effects.library import Library, built_in_library, load_user_effects
+from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.model.kept_tracks import following
+from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.storage.runs import Run

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from simulator import simulate
 
+from opamc_cli.joint.change import explain
+from opamc_cli.joint.change.energy import Energy
 from opamc_cli.joint.change.explain import explain_change
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -83,6 +85,15 @@ def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
     cause = change_of("friction", seed, wander=0.3).causes[0]
     assert "viscous" in (cause.effect, *cause.ties)
     assert change_of("nothing", seed, wander=0.3).causes == ()
+
+
+@pytest.mark.parametrize(("kind", "share"), [("friction", 1.0), ("payload", 0.0)])
+def test_friction_that_the_mean_square_does_not_show_is_measured_by_its_own(
+    monkeypatch, kind, share
+):
+    monkeypatch.setattr(explain, "energy_of", lambda *given, **named: Energy(0.0, 0.0))
+    causes = change_of(kind).causes
+    assert sum(cause.share for cause in causes) == pytest.approx(share, abs=0.05)
 
 
 def test_a_current_that_is_always_zero_has_no_cause():

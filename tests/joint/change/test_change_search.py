@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sessions import COEFFICIENTS, LIBRARY, TERMS, units_of
 
+from opamc_cli.joint.change import search
 from opamc_cli.joint.change.search import find_slow_causes
 from opamc_cli.joint.change.slow import learn
 
@@ -138,6 +139,15 @@ def test_cold_grease_that_stiffens_dry_friction_a_little_is_one_cause():
 def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
     """Beside what sessions differ by it was sublinear, dry and quadratic friction."""
     assert causes_of(lambda q, v, a, t: 0.1 * np.cos(50 * q + 1)) == []
+
+
+def test_only_friction_is_a_first_cause_that_the_mean_square_does_not_show(monkeypatch):
+    monkeypatch.setattr(search, "_left", lambda ready, shift: 1.0)
+    assert [cause.effect for cause in causes_of(heavy)] == ["coulomb"]
+    assert causes_of(payload, library=only("payload_change")) == []
+    assert causes_of(stiff, library=only("spring")) == []
+    monkeypatch.setattr(search, "HIDDEN_P", 0.0)
+    assert causes_of(heavy) == []
 
 
 def test_two_causes_are_fitted_together():

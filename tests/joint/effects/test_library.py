@@ -9,8 +9,8 @@ from opamc_cli.joint.effects.library import (
     UnknownEffectError,
     built_in_library,
     effect_named,
-    load_user_effects,
 )
+from opamc_cli.stages.model.loaded_effects import load_user_effects
 
 VOCABULARY = [
     "inertia",

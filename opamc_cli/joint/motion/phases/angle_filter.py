@@ -25,20 +25,10 @@ def widest_bandwidth(rate_hz: float) -> float:
 
 
 def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: float) -> float:
-    """Tell the standard deviation of the acceleration that white noise of the angle leaves.
+    """Tell the acceleration, in rad/s^2, that white noise of the angle leaves.
 
-    Parameters
-    ----------
-    angle_noise_rad : float
-        Standard deviation per sample.
-    rate_hz, bandwidth_hz : float
-        Sampling rate and the smoother's bandwidth.
-
-    Returns
-    -------
-    float
-        In rad/s^2: the root of the noise's density times the integral of
-        ``(2 pi f)^4 / (1 + (f / b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
+    Its deviation: the root of the noise's density times the integral of ``(2 pi f)^4 / (1 + (f /
+    b)^6)^2``, which is ``(2 pi)^4 b^5 B(5/6, 7/6) / 6``.
     """
     return float(
         angle_noise_rad
@@ -48,21 +38,10 @@ def acceleration_noise(angle_noise_rad: float, rate_hz: float, bandwidth_hz: flo
 
 
 def clean_bandwidth(angle_noise_rad: float, acceleration: float, rate_hz: float) -> float:
-    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration.
+    """Widest bandwidth at which the acceleration's noise is 1.5 % of the acceleration, in Hz.
 
-    Parameters
-    ----------
-    angle_noise_rad : float
-        Standard deviation of the measured angle per sample.
-    acceleration : float
-        Standard deviation of the acceleration, rad/s^2.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    float
-        In Hz, at least 6, at most 30 and a twentieth of the rate.
+    Of standard deviations of the measured angle per sample and of the acceleration, in rad/s^2; at
+    least 6 Hz, at most 30 and a twentieth of the rate.
     """
     widest = widest_bandwidth(rate_hz)
     own = acceleration_noise(angle_noise_rad, rate_hz, widest)
@@ -76,11 +55,6 @@ def smoothing_kernel(rate_hz: float, bandwidth_hz: float) -> Floats:
     """Weights by which the smoother averages a steady recording, odd length, sum 1.
 
     With ``b`` the bandwidth, the smoother's gain at frequency f is ``1 / (1 + (f / b)^6)``.
-
-    Parameters
-    ----------
-    rate_hz, bandwidth_hz : float
-        Sampling rate and bandwidth.
     """
     half = int(1.5 * rate_hz / bandwidth_hz)
     length = 16 * half
@@ -141,40 +115,21 @@ def smoothed_angle(
     walk = variance * step * (2 * np.pi * bandwidth_hz) ** 6
     first = np.flatnonzero(sure)
     start = float(rough_rad_s[first[0]]) if first.size and first[0] < rate_hz / 10 else 0.0
+    ease = np.ones(angle_rad.size) if spread is None else spread
+    jumps = np.zeros(angle_rad.size, dtype=bool) if free is None else free
+    rough_variance = (ROUGH_NOISE_RAD * rate_hz / 15) ** 2
     angle, speed, acceleration = _smooth(
-        angle_rad,
-        strong,
-        rough_rad_s,
-        sure,
-        step,
-        variance,
-        (ROUGH_NOISE_RAD * rate_hz / 15) ** 2,
-        walk,
-        start,
-        (2 * np.pi * bandwidth_hz) ** 2,
-        np.ones(angle_rad.size) if spread is None else spread,
-        np.zeros(angle_rad.size, dtype=bool) if free is None else free,
-        turn_rad,
-    )
+        angle_rad, strong, rough_rad_s, sure, step, variance, rough_variance, walk, start,
+        (2 * np.pi * bandwidth_hz) ** 2, ease, jumps, turn_rad,
+    )  # fmt: skip
     return angle, speed, acceleration
 
 
 @njit(cache=True, nogil=True)  # type: ignore[misc,unused-ignore]
 def _smooth(  # type: ignore[no-untyped-def]
-    measured,
-    strong,
-    rough,
-    sure,
-    step,
-    variance,
-    rough_variance,
-    walk,
-    start,
-    spread,
-    ease,
-    free,
+    measured, strong, rough, sure, step, variance, rough_variance, walk, start, spread, ease, free,
     turn,
-):
+):  # fmt: skip
     # Scalars throughout: three states are too few for matrix calls, which cost 20 times as much.
     n = measured.size
     x = np.empty((n, 3))

@@ -71,10 +71,7 @@ class _Followed:
 
 
 def _followed(
-    vector: NDArray[np.complex128],
-    start: NDArray[np.complex128],
-    rate_hz: float,
-    bandwidth: float,
+    vector: NDArray[np.complex128], start: NDArray[np.complex128], rate_hz: float, bandwidth: float
 ) -> _Followed:
     """Follow a vector; its noise is that of the one before anything small was taken out of it."""
     length = np.abs(start)
@@ -100,17 +97,8 @@ def _followed(
 def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     """Follow the current vector's angle, modulo pi, through zeros and reversals of the current.
 
-    Parameters
-    ----------
-    phases_a : array of shape (n, 3)
-        Finite phase currents, n > 16; the electrical frequency below a quarter of the rate.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    PhaseAngle
-        Smoothed by `smoothed_angle`.
+    Phase currents, (n, 3), are finite and more than 16; the electrical frequency lies below a
+    quarter of the rate.
     """
     bandwidth = widest_bandwidth(rate_hz)
     vector = current_vector(phases_a)
@@ -176,27 +164,10 @@ def _turning(vector: NDArray[np.complex128], rate_hz: float) -> tuple[Floats, Fl
 def averaged_angle(
     vector: NDArray[np.complex128], angle_rad: Floats, noise: float, floor: float, rate_hz: float
 ) -> tuple[Bools, Floats]:
-    """Measure the angle of weak currents over several samples, along the followed angle.
+    """Measure the angle of weak currents over several samples, along the followed angle, modulo pi.
 
-    Parameters
-    ----------
-    vector : complex array of shape (n,)
-        Clarke vector.
-    angle_rad : array of shape (n,)
-        Followed angle, modulo pi.
-    noise : float
-        Standard deviation of each of the vector's components.
-    floor : float
-        Length below which a vector never counts.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    strong : bool array of shape (n,)
-        Samples that, alone or averaged, tell an angle.
-    measured : array of shape (n,)
-        Angle modulo pi.
+    Returns which samples tell an angle, alone or averaged, and that angle modulo pi, both (n,). The
+    noise is that of each of the vector's components; below the floor no vector counts.
     """
     length = np.abs(vector)
     alone = length > max(STRONG * noise, floor)

@@ -38,24 +38,12 @@ def bridged(
 ) -> tuple[Floats, Floats]:
     """Follow an angle that is known modulo pi through long gaps of the current.
 
-    As whole waves are resolved in satellite positioning: first the angle may change by any amount
-    in every gap, and only speeds and accelerations of both sides tell how it goes on. Then each
-    change is set to the nearest multiple of pi. A filter that guesses before it has seen the
+    Angle and speed, (n,). As whole waves are resolved in satellite positioning: first the angle may
+    change by any amount in every gap, and only speeds and accelerations of both sides tell how it
+    goes on. Then each change is set to the nearest multiple of pi: the angle is steady within each
+    stretch of current, and on the same branch in all. A filter that guesses before it has seen the
     other side loses count four times as early. A long gap between two slow stretches is a rest.
-
-    Parameters
-    ----------
-    measured_rad : array of shape (n,)
-        Angle modulo pi.
-    strong : bool array of shape (n,)
-        Samples whose angle counts.
-    rough_rad_s, sure, spread, rate_hz, bandwidth_hz
-        As for `smoothed_angle`.
-
-    Returns
-    -------
-    angle, speed : arrays of shape (n,)
-        The angle is steady within each stretch of current, and on the same branch in all.
+    Arguments are those of `smoothed_angle`.
     """
     if not strong.any():
         return np.zeros(strong.size), np.zeros(strong.size)
@@ -88,24 +76,11 @@ def bridged(
 def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     """Let the angle of a motion that repeats repeat.
 
-    While the current is too small to be followed, the angle may slip by a multiple of pi. A
-    stretch of current has the angle that it had one cycle earlier; in the first cycle, the one
-    that follows from the median of all cycles' steps.
-
-    Parameters
-    ----------
-    angle : PhaseAngle
-        As followed.
-    period : int
-        Samples per cycle.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    PhaseAngle
-        As it was where there are fewer than three cycles, or where a cycle ends elsewhere than
-        it began by more than a tenth of its travel: that is no slip.
+    While the current is too small to be followed, the angle may slip by a multiple of pi. A stretch
+    of current has the angle that it had one cycle earlier; in the first cycle, the one that follows
+    from the median of all cycles' steps. The angle stays as it was where there are fewer than three
+    cycles, or where a cycle ends elsewhere than it began by more than a tenth of its travel: that
+    is no slip.
     """
     path = angle.angle_rad
     cycles = path.size // period
@@ -184,17 +159,7 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
 def lost(strong: Bools, rate_hz: float) -> Bools:
     """Tell where the current was too small, for too long, to carry the followed angle across.
 
-    Parameters
-    ----------
-    strong : bool array of shape (n,)
-        Samples with enough current to tell an angle.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    bool array of shape (n,)
-        False also in gaps of up to `LOST_S`: the filter bridges them.
+    Of strong samples, bool (n,); gaps of up to `LOST_S` are bridged by the filter.
     """
     result: Bools = np.ones(strong.size, dtype=bool)
     for start, stop in stretches(strong, rate_hz, LOST_S):

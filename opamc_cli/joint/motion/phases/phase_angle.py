@@ -54,8 +54,6 @@ class PhaseAngle:
             Joint angle and speed.
         ratio : float or None
             Electrical radians per joint radian, if known.
-        rate_hz : float
-            Sampling rate.
 
         Returns
         -------
@@ -97,14 +95,8 @@ def _slope(angle: Floats, position: Floats, speed: Floats, rough: float) -> floa
     """Electrical radians per joint radian at which the angle, modulo pi, follows the position.
 
     Where the torque passes zero within a stroke the followed angle slips by half turns; a straight
-    line through it would be wrong by more than a turn at the ends of the travel.
-
-    Parameters
-    ----------
-    angle, position, speed : arrays of shape (n,)
-        Samples with enough current.
-    rough : float
-        Known to a few per cent.
+    line through it would be wrong by more than a turn at the ends of the travel. Of samples with
+    enough current, (n,); `rough` is known to a few per cent.
     """
     travel = float(np.ptp(position))
     largest = float(np.max(np.abs(speed), initial=0.0))

@@ -13,17 +13,7 @@ ROUNDS_TO_CIRCLE = 8
 
 
 def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
-    """Clarke vector, amplitude-invariant.
-
-    Parameters
-    ----------
-    phases_a : array of shape (n, 3)
-        Phase currents a, b, c.
-
-    Returns
-    -------
-    complex array of shape (n,)
-    """
+    """Clarke vector, amplitude-invariant, of phase currents of shape (n, 3)."""
     turn = np.exp(2j * np.pi / 3)
     vector: NDArray[np.complex128] = (
         2 / 3 * (phases_a[:, 0] + turn * phases_a[:, 1] + np.conj(turn) * phases_a[:, 2])
@@ -34,17 +24,9 @@ def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
 def rounded(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Make a circle about zero of the ellipse that zero errors and unequal gains have made of one.
 
-    No angle is needed: a vector that turns often has no mean, and no mean square, where its samples
-    count by the squares of their steps, so that rests do not.
-
-    Parameters
-    ----------
-    vector : complex array of shape (n,)
-        Clarke vector; of one that turns less than some ten times the result means nothing.
-
-    Returns
-    -------
-    complex array of shape (n,)
+    No angle is needed: a Clarke vector that turns often has no mean, and no mean square, where its
+    samples count by the squares of their steps, so that rests do not. Of one that turns less than
+    some ten times the result means nothing.
     """
     for _ in range(ROUNDS_TO_CIRCLE):
         steps = np.abs(np.diff(vector, append=vector[-1:])) ** 2
@@ -59,24 +41,11 @@ def rounded(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
 def without_sensor_errors(
     vector: NDArray[np.complex128], angle_rad: Floats, fast: Bools
 ) -> NDArray[np.complex128]:
-    """Take zero errors and unequal gains of the sensors out of a current vector.
+    """Take zero errors and unequal gains of the sensors out of a current vector, (n,).
 
     Both show in the flux current, once and twice per electrical revolution; at a low speed the
-    followed angle would sway with them.
-
-    Parameters
-    ----------
-    vector : complex array of shape (n,)
-        Clarke vector.
-    angle_rad : array of shape (n,)
-        Followed angle of the torque axis, modulo pi.
-    fast : bool array of shape (n,)
-        Samples at which the carrier is faster than the follower.
-
-    Returns
-    -------
-    complex array of shape (n,)
-        The vector itself where too few samples are fast.
+    followed angle, modulo pi, would sway with them. At fast samples the carrier is faster than the
+    follower; where these are too few, the vector stays as it is.
     """
     if np.count_nonzero(fast) < FEWEST_FAST_SAMPLES:
         return vector

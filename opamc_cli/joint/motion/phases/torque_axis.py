@@ -21,28 +21,17 @@ SLOWEST_SHARE = 0.05
 def torque_current(
     phases_a: Floats, electrical_rad: Floats, velocity: Floats, position_rad: Floats
 ) -> Floats:
-    """Take the current along the electrical angle.
+    """Take the current of phases, (n, 3), along the electrical angle of the torque axis.
 
-    Parameters
-    ----------
-    phases_a : array of shape (n, 3)
-        Phase currents.
-    electrical_rad : array of shape (n,)
-        Electrical angle of the torque axis.
-    velocity, position_rad : array of shape (n,)
-        Of the motion, in any unit. The sign is taken so that friction resists: of the torque, what
-        depends on the direction and the speed, beside a smooth function of the position, does
-        work. The whole torque need not, where gravity is large and the path is not closed.
-
-    Returns
-    -------
-    array of shape (n,)
+    The sign is taken so that friction resists: of the torque, what depends on the direction and the
+    speed, beside a smooth function of the position, does work. The whole torque need not, where
+    gravity is large and the path is not closed. Speed and position may be in any unit.
     """
     torque: Floats = (current_vector(phases_a) * np.exp(-1j * electrical_rad)).real
     speeds = np.abs(velocity)
     moving = speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
     columns = np.concatenate([_frictions(velocity), _powers(position_rad)], axis=1)[moving]
-    friction = _frictions(velocity)[moving] @ _fitted(columns, torque[moving])[:2]
+    friction = columns[:, :2] @ solve(columns.T @ columns, columns.T @ torque[moving])[:2]
     return torque if float(np.dot(friction, velocity[moving])) >= 0 else -torque
 
 
@@ -58,36 +47,15 @@ def _powers(position: Floats) -> Floats:
     return np.stack([place**k for k in range(4)], axis=1)
 
 
-def _fitted(columns: Floats, values: Floats) -> Floats:
-    """Least squares, whatever the columns' units are."""
-    scale = np.sqrt(np.mean(columns**2, axis=0)) if columns.size else np.ones(columns.shape[1])
-    scaled = columns / (scale + 1e-300)
-    return solve(scaled.T @ scaled, scaled.T @ values) / (scale + 1e-300)
-
-
 def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
-    """Find on which side of the torque axis every stretch of current lies.
+    """Find on which side of the torque axis every stretch of current lies: +1 or -1, (n,).
 
-    Between stretches, where the current is too small to be followed, the angle may slip by pi.
-    The sides are those that fit best to dry and lubricant friction, inertia and a smooth function
-    of the position: starting from the sides on which the current does work, and from those as
+    Between stretches, where the current is too small to be followed, the angle may slip by pi. The
+    sides are those that fit best to dry and lubricant friction, inertia and a smooth function of
+    the position: starting from the sides on which the current does work, and from those as
     followed, one stretch after the other is turned where that lowers the squared error. At rest
     zero errors of the sensors can turn the angle of a small current: then one stroke after the
     other is turned where that lowers it further.
-
-    Parameters
-    ----------
-    torque_a : array of shape (n,)
-        Current along the followed angle.
-    angle : PhaseAngle
-        The followed angle.
-    rate_hz : float
-        Sampling rate.
-
-    Returns
-    -------
-    array of shape (n,)
-        +1 or -1.
     """
     pieces = stretches(angle.strong, rate_hz)
     if not pieces:

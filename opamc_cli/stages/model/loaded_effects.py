@@ -1,5 +1,6 @@
-"""Effects from a user's file: what they give is checked before the loop works with it."""
+"""Effects from a user's file: what they give is checked before anything works with it."""
 
+import importlib.util
 import inspect
 from collections.abc import Callable
 from functools import wraps
@@ -9,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, Interrupted
 from opamc_cli.joint.effects.base import Effect
 
 
@@ -65,15 +66,40 @@ CHECKS: dict[str, Callable[[Any, Any], str | None]] = {
 TEXTS = ("needs", "searches", "forms")
 
 
-def checked(effect: Effect, path: Path) -> Effect:
-    """Have every answer of a user's effect checked, and say where the method is that gave it.
+def load_user_effects(path: Path) -> list[Effect]:
+    """Effects that a user's Python file defines.
 
-    Parameters
-    ----------
-    effect : Effect
-        Of a user's file.
-    path : Path
-        The file.
+    Raises
+    ------
+    ConfigError
+        If the file is missing, does not run, or defines no effect with a name and a domain.
+    """
+    spec = importlib.util.spec_from_file_location(f"opamc_user_{path.stem}", path)
+    if spec is None or spec.loader is None or not path.is_file():
+        msg = f"Effect file {path} cannot be read; name a Python file"
+        raise ConfigError(msg)
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+        found = [
+            member()
+            for _, member in inspect.getmembers(module, inspect.isclass)
+            if issubclass(member, Effect) and member.__module__ == module.__name__ and member.name
+        ]
+        named = [isinstance(e.name, str) and isinstance(e.domain, str) and e.domain for e in found]
+    except Interrupted:
+        raise
+    except (Exception, SystemExit) as error:  # of a user's own code
+        msg = f"Effect file {path} does not run: {type(error).__name__}: {error}"
+        raise ConfigError(msg) from error
+    if not found or not all(named):
+        msg = f"Effect file {path} defines no class of Effect with a name and a domain"
+        raise ConfigError(msg)
+    return [_all_checked(effect, path) for effect in found]
+
+
+def _all_checked(effect: Effect, path: Path) -> Effect:
+    """Have every answer of a user's effect checked, and say where the method is that gave it.
 
     Raises
     ------
