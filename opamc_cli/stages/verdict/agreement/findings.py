@@ -41,8 +41,8 @@ MISSING_SHARE = 0.05
 
 FINE, COARSER = 0.5, 3.0
 """A current changes with nearly each sample where its steps are finer than its noise. One that
-changes in less than a third as many as another is logged in coarser steps, or each value several
-times; no fault takes a joint's noise away."""
+then changes in less than a third as many is logged in coarser steps, or each value several times:
+no fault takes a joint's noise away. One that changes in more may knock."""
 
 
 @dataclass(frozen=True)
@@ -225,11 +225,9 @@ def _incomplete(own: Measured, _: Reference) -> str | None:
     return f"{name} holds no number in {share:.0%} of the motion; check the log"
 
 
-def _other_steps(own: Measured, reference: Reference) -> str | None:
+def _coarser(own: Measured, reference: Reference) -> str | None:
     usual = reference.changing[own.axis]
-    if max(own.changing, usual) < FINE or own.changing * usual == 0:
-        return None
-    if max(own.changing / usual, usual / own.changing) < COARSER:
+    if usual < FINE or own.changing > usual / COARSER:
         return None
     return (
         f"the current of axis {own.axis} changes in {own.changing:.0%} of its samples, the "
@@ -245,7 +243,7 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_sign,
     _clipped,
     _incomplete,
-    _other_steps,
+    _coarser,
 )
 """In the order in which they are asked."""
 
