@@ -14,7 +14,7 @@ def keep_freed_memory() -> None:
 
     Arrays of a megabyte come and go by the thousand while a loop is closed; given back to the
     system each time, their pages are faulted in and zeroed anew: 0.5 of 9.6 s of two minutes of an
-    axis at 2048 Hz, which `benchmarks/commands.py` measures. The peak is the same within 20 MB.
+    axis at 2048 Hz, which `benchmarks/commands.py` measures. The peak is 50 to 130 MB higher.
     """
     with suppress(AttributeError, OSError, TypeError):
         mallopt = ctypes.CDLL(None).mallopt

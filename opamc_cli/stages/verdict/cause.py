@@ -126,7 +126,10 @@ def _recordings(
         beside, most = round(BESIDE_S * rate_hz), round(seconds / len(sources) * rate_hz)
         try:
             with source.open() as run:
-                first, last = _moves(run, axis) or moving.get(source.name, (0, source.n_samples))
+                known = [_moves(run, axis), moving.get(source.name)]
+                # both: a lost sample of the position may look like all of its way
+                spans = [span for span in known if span] or [(0, source.n_samples)]
+                first, last = min(start for start, _ in spans), max(stop for _, stop in spans)
                 start, stop = max(first - beside, 0), min(last + beside, first + most)
                 found.append(interpolated(read_recording(run, axis, start, stop), LEAST_HZ))
         except OpamcError:
@@ -135,7 +138,7 @@ def _recordings(
 
 
 def _moves(run: Run, axis: int) -> tuple[int, int] | None:
-    """Return between which samples the position of an axis changes; None where it is not logged."""
+    """Return between which samples the position of an axis changes; None if unknown."""
     column = run.channels(axis).columns.get("position")
     if column is None:
         return None

@@ -114,6 +114,18 @@ def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
     assert found[0] == found[1]
 
 
+def test_a_spike_of_the_position_hides_no_motion(tmp_path):
+    sources = pushed(tmp_path, 0.0, rest=300)
+    for source in sources:
+        with Run(source.path, source.name) as run:
+            columns = run.read(["axis1_current", "axis1_position"])
+        columns["axis1_position"] = columns["axis1_position"].copy()
+        columns["axis1_position"][1000] = 1e6
+        save_run(source.path, source.info, columns)
+    found = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)))
+    assert [recording.size for recording in found] == [2600] * 3
+
+
 def test_motions_of_an_axis_are_where_patterns_were_taken():
     motions = [(1200, 2300), (100, 1100)] * 2
     starts, stops = zip(*motions, strict=True)
