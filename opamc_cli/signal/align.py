@@ -9,6 +9,9 @@ from scipy import fft
 MIN_OVERLAP = 0.5
 """Least share of the shorter segment that must overlap at a lag for the lag to count."""
 
+ROUNDING = 1e-12
+"""It must not decide between lags that are equally good."""
+
 
 @dataclass(frozen=True)
 class Alignment:
@@ -18,18 +21,21 @@ class Alignment:
     """Samples by which the segment's content comes later than the reference's, counted from the
     starts of both: ``segment[i + lag]`` corresponds to ``reference[i]``."""
     correlation: float
-    """Pearson correlation of the overlapping parts at this lag, -1..1."""
+    """Pearson correlation of the overlapping parts at this lag, 0..1."""
 
 
 def align(
     reference: npt.NDArray[np.floating], segment: npt.NDArray[np.floating], max_lag: int
 ) -> Alignment:
-    """Find the lag of the largest cross-correlation with the reference segment.
+    """Find the lag at which the reference segment explains the most.
 
-    Equation (4-1) sums over the overlap alone, so that a larger overlap wins by its size; here
-    each lag has the Pearson correlation of the overlapping parts, and a lag with too little overlap
-    does not count. Segments may differ in length. Equal correlations: the smallest lag
-    in modulus wins, then the negative one. A constant or NaN-bearing segment has lag 0 and
+    Equation (4-1) sums over the overlap alone, so that a larger overlap wins by its size, and a
+    segment's height with it. Here each lag has the Pearson correlation r of the overlapping parts,
+    and that of the largest -n log(1 - r^2) wins, n samples overlapping: the log likelihood that
+    they gain by each other. By r alone half of a smooth motion may fit another part of it better
+    than noise or friction let the whole fit itself. A lag with too little overlap or a negative
+    correlation does not count. Segments may differ in length. Equal gains: the smallest lag in
+    modulus wins, then the negative one. A constant or NaN-bearing segment has lag 0 and
     correlation 0.
 
     Parameters
@@ -77,13 +83,14 @@ def align(
     # a part that is constant but for rounding has no correlation
     varies = (spread_x > 1e-9 * (x @ x)) & (spread_y > 1e-9 * (y @ y))
     norm = np.sqrt(np.where(varies, spread_x * spread_y, 1.0))
-    correlation = np.where(varies, (product - sum_x * sum_y / overlap) / norm, -np.inf)
-    if not np.isfinite(correlation.max(initial=-np.inf)):
+    correlation = np.where(varies, (product - sum_x * sum_y / overlap) / norm, 0.0)
+    correlation = np.clip(np.nan_to_num(correlation), 0.0, 1.0)
+    gain = -overlap * np.log(np.maximum(1 - correlation**2, ROUNDING))
+    if not gain.any():
         return Alignment(0, 0.0)
-    # rounding must not decide between lags that are equally good
-    best = np.flatnonzero(correlation >= correlation.max() - 1e-12)
+    best = np.flatnonzero(gain >= gain.max() * (1 - ROUNDING))
     winner = best[np.argmin(np.abs(lags[best]))]
-    return Alignment(int(lags[winner]), float(np.clip(correlation[winner], -1.0, 1.0)))
+    return Alignment(int(lags[winner]), float(correlation[winner]))
 
 
 def _between(

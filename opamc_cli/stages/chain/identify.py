@@ -24,7 +24,7 @@ from opamc_cli.signal.identification import (
 from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_envelope
+from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
@@ -424,16 +424,16 @@ def _lags(
     axis = part.axis
     with part.source.open() as run, reference.source.open() as reference_run:
         max_lag = round(job.config.max_lag_s * run.sampling_rate_hz)
-        envelopes = [
-            read_envelope(reference_run, axis, start, stop, wanted)
+        courses = [
+            read_course(reference_run, axis, start, stop, wanted)
             for start, stop in reference.spans
         ]
         for i, (m, span) in enumerate(zip(motion.tolist(), spans, strict=True)):
             own = part.source == reference.source and span == reference.spans[m]
             if m == UNIDENTIFIED or own:
                 continue
-            segment = read_envelope(run, axis, *span, wanted)
-            found = align(envelopes[m], segment, max_lag)
+            segment = read_course(run, axis, *span, wanted)
+            found = align(courses[m], segment, max_lag)
             if found.correlation >= MIN_CORRELATION:
                 lags[i] = found.lag
     return lags
