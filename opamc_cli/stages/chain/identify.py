@@ -1,6 +1,6 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
+from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
@@ -420,20 +421,31 @@ def _lags(
     part, reference = job.part, job.reference
     assert reference is not None
     lags = np.zeros(len(spans), dtype=np.int64)
-    wanted = job.envelope
-    axis = part.axis
     with part.source.open() as run, reference.source.open() as reference_run:
         max_lag = round(job.config.max_lag_s * run.sampling_rate_hz)
-        courses = [
-            read_course(reference_run, axis, start, stop, wanted)
-            for start, stop in reference.spans
-        ]
+        read = _reader(job, reference_run, run)
+        courses = [read(reference_run, *span) for span in reference.spans]
         for i, (m, span) in enumerate(zip(motion.tolist(), spans, strict=True)):
             own = part.source == reference.source and span == reference.spans[m]
             if m == UNIDENTIFIED or own:
                 continue
-            segment = read_course(run, axis, *span, wanted)
-            found = align(courses[m], segment, max_lag)
+            found = align(courses[m], read(run, *span), max_lag)
             if found.correlation >= MIN_CORRELATION:
                 lags[i] = found.lag
     return lags
+
+
+def _reader(job: _Job, *runs: Run) -> Callable[[Run, int, int], npt.NDArray[np.floating]]:
+    """Say what segments are synchronised by.
+
+    Where the joint's motion told the segments it does: friction and play move the course of a
+    current in time, by more the further a night is from the others.
+    """
+    axis = job.part.axis
+    if "reported" in job.part.rows["signal"].unique().to_pylist():
+        for kind in ("position", "velocity"):
+            columns = {getattr(run.channels(axis), kind) for run in runs}
+            if len(columns) == 1 and None not in columns:
+                [column] = columns
+                return lambda run, start, stop: run.read([column], start, stop)[column]
+    return lambda run, start, stop: read_course(run, axis, start, stop, job.envelope)
