@@ -35,7 +35,7 @@ from opamc_cli.stages.nightly import run as stage
 from opamc_cli.storage.history import DERIVED, History
 
 STAND_IN = "night_stand_in:stand_in"
-OURS = (".work", ".kept", ".copies", ".opamc.lock")
+OURS = (".opamc-work", ".kept", ".copies", ".opamc.lock", ".opamc.cell")
 SECONDS = 300.0
 VERDICT_HASH = re.compile(rb'(<td>verdict.json</td><td>[^<]*</td><td class="hash">)[0-9a-f]{64}')
 

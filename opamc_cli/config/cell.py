@@ -6,7 +6,7 @@ from datetime import date
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import ConfigDict, Field, model_validator
+from pydantic import ConfigDict, Field, field_validator, model_validator
 
 from opamc_cli.config.files import read_yaml, validate
 from opamc_cli.config.models import Config, Positive, Section
@@ -99,6 +99,20 @@ class CellConfig(Section):
     alarm: AlarmConfig = AlarmConfig()
     keep: KeepConfig = KeepConfig()
     limits: LimitsConfig = LimitsConfig()
+
+    @field_validator("robots", mode="before")
+    @classmethod
+    def _are_named(cls, robots: Any) -> Any:
+        if robots == "auto":
+            return robots
+        if not isinstance(robots, Mapping) or not robots:
+            msg = "write auto, or every robot as a key: {r1: {}, r2: {axes: [1, 2]}}"
+            raise ValueError(msg)
+        for name in robots:
+            if not isinstance(name, str):
+                msg = f"the name {shown(name)} is read as a number; put it in quotes"
+                raise ValueError(msg)
+        return robots
 
     @model_validator(mode="after")
     def _names_the_robot(self) -> Self:

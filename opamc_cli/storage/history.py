@@ -7,6 +7,7 @@ the clock, but the times at which a user acknowledged or declared something.
 """
 
 import json
+import os
 import re
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -247,6 +248,19 @@ WORDS = {
 NIGHT = re.compile(r"\d{4}-\d\d-\d\d|")
 
 
+def _writable(path: Path) -> bool:
+    return all(os.access(one, os.W_OK) for one in (path, path.parent))
+
+
+def _to_read(path: Path) -> str:
+    """Return the address of a history that may only be read, such as a colleague's.
+
+    Where nobody has it open there is no log beside it, and what does not change needs none.
+    """
+    logged = path.with_name(f"{path.name}-wal").exists()
+    return f"{path.absolute().as_uri()}?{'mode=ro' if logged else 'immutable=1'}"
+
+
 class History:
     """An open history.
 
@@ -273,18 +287,27 @@ class History:
         if not read_only:
             ensure_directory(path.parent)
         with self._errors():
-            # WAL needs to write beside the file even to read it; a reader locks nobody out
-            self._db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
-            self._db.execute("PRAGMA journal_mode = WAL")
-            self._db.execute("PRAGMA synchronous = FULL")
-            self._prepare()
+            if read_only and not _writable(path):
+                self._db = sqlite3.connect(_to_read(path), uri=True, isolation_level=None)
+            else:
+                # WAL needs to write beside the file even to read it; a reader locks nobody out
+                self._db = sqlite3.connect(path, timeout=BUSY_S, isolation_level=None)
+                self._db.execute("PRAGMA journal_mode = WAL")
+                self._db.execute("PRAGMA synchronous = FULL")
+            self._prepare(read_only)
 
-    def _prepare(self) -> None:
+    def _prepare(self, read_only: bool) -> None:
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
+        if version == 0 and read_only:
+            msg = f"{self.path}: holds no history of opamc; `opamc nightly` writes one"
+            raise InputError(msg)
         if version == 0:
             with self.transaction():
                 # another process may have been first
                 if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:
+                    if _layout(self._db):
+                        msg = f"{self.path}: is a database of something else; move it away"
+                        raise InputError(msg)
                     for statement in SCHEMA.split(";"):
                         self._db.execute(statement)
                     self._db.execute(f"PRAGMA user_version = {SCHEMA_VERSION}")

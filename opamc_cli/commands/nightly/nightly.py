@@ -1,7 +1,7 @@
 """`opamc nightly`: every night of a cell of robots that is new, and what has changed."""
 
 from collections.abc import Callable
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 RUN = "run"
 DEFAULT_CELL = Path("cell.yaml")
+OUT = "`out` in the cell's file"
+AHEAD_DAYS = 31
+"""Days beyond the last night and today in which a new baseline may be announced."""
 
 
 class _RunByDefault(TyperGroup):
@@ -45,8 +48,6 @@ def as_night(text: str | None) -> str | None:
     """Check that a night is a date."""
     if text is None:
         return None
-    from datetime import date
-
     try:
         return date.fromisoformat(text).isoformat()
     except ValueError:
@@ -84,7 +85,8 @@ def run(
     with one_thread_each():
         from opamc_cli.stages.nightly import run as stage
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.morning import silent, tell
+    from opamc_cli.stages.nightly.claim import claim
+    from opamc_cli.stages.nightly.morning import ahead, silent, tell
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.schemas import files
@@ -93,7 +95,11 @@ def run(
     output = Output(as_json, quiet)
     loaded = load_cell(cell)
     wanted = stage.Wanted(as_night(night), as_night(since), tuple(robot) if robot else None)
-    with output_lock(loaded.out), stage.open_history(loaded) as history:
+    if wanted.night and wanted.since and wanted.night < wanted.since:
+        msg = f"--night {wanted.night} is before --since {wanted.since}; give one of them"
+        raise UsageError(msg)
+    with output_lock(loaded.out, OUT), stage.open_history(loaded) as history:
+        claim(loaded, cell)
         if dry_run:
             _print_plan(output, stage.plan(loaded, str(cell), history, wanted))
             return
@@ -104,7 +110,8 @@ def run(
         summary = outcome.summary.only(outcome.robots)
         untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
         if wanted == stage.Wanted():
-            untold += history.untold([*silent(history, datetime.now(UTC).date())])
+            today = datetime.now(UTC).date()
+            untold += history.untold([*silent(history, today), *ahead(history, today)])
         morning = tell(summary, untold, outcome, loaded.out)
         if outcome.ended:
             output.failure(outcome.ended)
@@ -159,6 +166,8 @@ def acknowledge(
     """Silence the alarm that stands on a joint, until it is over."""
     from opamc_cli.storage.history import Declared
 
+    why = _reason(why)
+
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
         standing = [
             alarm
@@ -191,12 +200,17 @@ def rebaseline(
 
     night = as_night(begin)
     assert night is not None
+    why = _reason(why)
 
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
         known = {name for name, _ in history.nights()}
         known |= set() if loaded.robots == "auto" else set(loaded.robots)
         if robot not in known:
             msg = f"{robot} is none of the cell's robots; it has {', '.join(sorted(known)[:8])}"
+            raise UsageError(msg)
+        last = max([_now()[:10], *(of for _, of in history.nights())])
+        if date.fromisoformat(night) > date.fromisoformat(last) + timedelta(AHEAD_DAYS):
+            msg = f"--from {night}: lies more than a month ahead; check the year"
             raise UsageError(msg)
         text = f"new baseline from {night} on: {why}"
         return Declared(_now(), robot, None, "rebaselined", night, why), text
@@ -219,11 +233,22 @@ def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:
         history.declare(declared, text)
         history.tell(one for one in history.events(untold=True) if one.kind == declared.kind)
         try:
-            with output_lock(loaded.out):
+            with output_lock(loaded.out, OUT):
                 settle_cell(loaded, str(path), history, ())
         except LockedError:
             output.note("the pages follow when the run that is under way ends")
     output.result({"robot": declared.robot, "text": text}, f"{declared.robot} {text}")
+
+
+def _reason(why: str) -> str:
+    """Return a reason as one line that every terminal can show."""
+    from opamc_cli.commands.terminal.tables import printable
+
+    told = printable(" ".join(why.split()))
+    if not told:
+        msg = "--why is blank; say what was found or done"
+        raise UsageError(msg)
+    return told
 
 
 def _now() -> str:

@@ -248,7 +248,7 @@ def _failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterat
     for failing, part in groupby(nights, key=lambda row: bool(row.why)):
         streak = list(part)
         if failing:
-            since = "" if len(streak) == 1 else f" (the {len(streak)}th night in a row)"
+            since = "" if len(streak) == 1 else f" ({len(streak)} nights in a row)"
             text = f"{streak[-1].night}{since}: {streak[-1].why}"
             for night in _said([{"night": row.night} for row in streak], remind_after):
                 yield Event(night, robot, None, "failed", text)

@@ -12,7 +12,7 @@ from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
 from opamc_cli.storage.schemas import files
 
-OVER = {"silent": 0, "failed": 1, "not-judged": 2, "missing": 3, "cleared": 4}
+OVER = {"silent": 0, "ahead": 0, "failed": 1, "not-judged": 2, "missing": 3, "cleared": 4}
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
@@ -37,6 +37,17 @@ def silent(history: History, today: date) -> Iterator[Event]:
     last = max((night for _, night in history.nights()), default="")
     if last and date.fromisoformat(last) < today - timedelta(SILENT_DAYS):
         yield Event(last, "the cell:", None, "silent", f"no recording of any robot since {last}")
+
+
+def ahead(history: History, today: date) -> Iterator[Event]:
+    """Say of robots whose last night is still to come: it hides that they have no new one."""
+    last: dict[str, str] = {}
+    for robot, night in history.nights():
+        last[robot] = max(night, last.get(robot, ""))
+    for robot, night in sorted(last.items()):
+        if date.fromisoformat(night) > today + timedelta(1):
+            text = f"{night} lies in the future; check the clocks of the logger and of this machine"
+            yield Event(night, robot, None, "ahead", text)
 
 
 def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: Path) -> Morning:

@@ -43,7 +43,7 @@ from opamc_cli.storage.history import (
 from opamc_cli.storage.logs import copy_name
 from opamc_cli.storage.schemas import files
 
-WORK, KEPT, COPIES = ".work", ".kept", ".copies"
+WORK, KEPT, COPIES = ".opamc-work", ".kept", ".copies"
 """Folders below `out` that nobody needs to look into."""
 
 
@@ -237,7 +237,8 @@ def _look_for_absent(
 ) -> None:
     """Say where there is nothing of what was asked for: it may be mistyped, or out of reach."""
     if not any(recordings.by_robot.values()):
-        names = "" if wanted.robots is None else f" of {some(wanted.robots)}"
+        named = wanted.robots or (None if cell.robots == "auto" else tuple(cell.robots))
+        names = "" if named is None else f" of {some(named)}"
         outcome.absent.append(
             f"{cell.runs}: no file{names} fits this pattern any more; is its folder there?"
         )
@@ -313,7 +314,7 @@ def _record_unjudged(
         [*(one.facts.error for one in night.broken), *(one.missing for one in night.comparisons)]
     ).strip("; ")
     status = "baseline" if night.in_baseline else "failed"
-    remove_folder(cell.out / night.robot / night.night)
+    remove_folder(cell.out / night.robot / night.night, of=files.OF_NIGHT)
     row = NightRow(night.robot, night.night, night.key, status, 0, why, as_notes(night.notes))
     history.record_night(row)
     _note(outcome, row)
@@ -333,14 +334,14 @@ def _record(
         if answer.kind == "refused":
             # not the recordings' fault: the disk is full, or a folder cannot be written
             raise UsageError(answer.text)
-        remove_folder(cell.out / night.robot / night.night)
+        remove_folder(cell.out / night.robot / night.night, of=files.OF_NIGHT)
         row = NightRow(*place, "broken", attempts + 1, answer.text)
         history.record_night(row)
         _note(outcome, row)
         return
     why = [one.facts.error for one in night.broken]
     why += [sentence for result in answer for sentence in result.failures]
-    judged = [result for result in answer if result.files]
+    judged = [result for result in answer if result.files and result.axes]
     notes = [*night.notes, *(note for result in answer for note in result.notes)]
     folder = Path(night.robot) / night.night
     if judged:
@@ -349,9 +350,9 @@ def _record(
             # the worst program's at the top, where scripts look
             below = "" if index == 0 else f"{_safe(result.program)}/"
             contents |= {below + name: content for name, content in result.files.items()}
-        replace_folder(cell.out / folder, contents)
+        replace_folder(cell.out / folder, contents, of=files.OF_NIGHT)
     else:  # what an earlier start found must not pass for this night
-        remove_folder(cell.out / folder)
+        remove_folder(cell.out / folder, of=files.OF_NIGHT)
     status = "failed" if not judged else "partial" if why else "done"
     row = NightRow(*place, status, 0, "; ".join(why), as_notes(notes))
     verdicts, measures = [], []

@@ -11,6 +11,7 @@ from opamc_cli.stages.nightly.publish.page import write_page
 from opamc_cli.stages.nightly.summary import Summary, summarise
 from opamc_cli.storage.files.folders import remove_folder
 from opamc_cli.storage.history import Event, History, NightRow
+from opamc_cli.storage.schemas import files
 
 
 def settle_cell(
@@ -56,6 +57,8 @@ def settle_cell(
         history.replace_missing(_missing(by_robot, set(robots)))
     _prune(cell, history)
     summary = summarise(history, robots)
+    if cell.robots != "auto":  # what left the cell is no concern of its page
+        summary = summary.only(tuple(cell.robots))
     write_page(cell, history, summary)
     write_metrics(cell, summary)
     return summary
@@ -88,6 +91,6 @@ def _prune(cell: CellConfig, history: History) -> None:
     for robot, nights in kept.items():
         old = nights[: -cell.keep.reports]
         for night in old:
-            remove_folder(cell.out / robot / night)
+            remove_folder(cell.out / robot / night, of=files.OF_NIGHT)
         if old:  # only then: a start that was killed finds them again
             history.forget_reports(robot, old)

@@ -11,7 +11,7 @@ from pathlib import Path
 from opamc_cli.errors import UsageError
 
 
-def ensure_directory(folder: Path) -> Path:
+def ensure_directory(folder: Path, chosen_by: str = "--out") -> Path:
     """Make an output folder with its parents.
 
     Raises
@@ -23,7 +23,9 @@ def ensure_directory(folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = error.strerror or str(error)
-        msg = f"{folder}: cannot make this output folder ({reason}); choose another with --out"
+        msg = (
+            f"{folder}: cannot make this output folder ({reason}); choose another with {chosen_by}"
+        )
         raise UsageError(msg) from error
     return folder
 

@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from pathlib import Path
 
@@ -10,16 +10,28 @@ from opamc_cli.errors import UsageError
 from opamc_cli.storage.files.atomic import ensure_directory
 
 
-def replace_folder(folder: Path, files: Mapping[str, bytes]) -> None:
+def replace_folder(
+    folder: Path, files: Mapping[str, bytes], *, of: Collection[str] | None = None
+) -> None:
     """Put a folder with these files, by their paths in it, in the place of one that may be there.
 
     Between two renames there is none: whoever finds none takes the work for not done.
 
+    Parameters
+    ----------
+    folder
+        Where.
+    files
+        Their content.
+    of
+        Names of the files that a folder of results has; None: any. Another one is somebody else's.
+
     Raises
     ------
     UsageError
-        If it cannot be written; what was there is then as it was, or gone.
+        If it cannot be written, or is somebody else's; what was there is then as it was, or gone.
     """
+    _require_own(folder, of)
     ensure_directory(folder.parent)
     staged = folder.parent / f".{folder.name}.part"
     old = folder.parent / f".{folder.name}.old"
@@ -51,14 +63,22 @@ def replace_folder(folder: Path, files: Mapping[str, bytes]) -> None:
         raise UsageError(msg) from error
 
 
-def remove_folder(folder: Path) -> None:
+def remove_folder(folder: Path, *, of: Collection[str] | None = None) -> None:
     """Remove a folder of results and what a killed process left beside it.
+
+    Parameters
+    ----------
+    folder
+        Which.
+    of
+        Names of the files that a folder of results has; None: any. Another one is somebody else's.
 
     Raises
     ------
     UsageError
-        If it cannot be removed.
+        If it cannot be removed, or is somebody else's.
     """
+    _require_own(folder, of)
     try:
         for place in (
             folder,
@@ -70,6 +90,16 @@ def remove_folder(folder: Path) -> None:
     except OSError as error:
         msg = f"{folder}: cannot be removed ({error.strerror or error}); check permissions"
         raise UsageError(msg) from error
+
+
+def _require_own(folder: Path, of: Collection[str] | None) -> None:
+    """Refuse to take away what no result is, such as the logs where `out` is their folder."""
+    if of is None or not folder.is_dir():
+        return
+    for path in sorted(folder.rglob("*")):
+        if path.name not in of and not path.is_dir():
+            msg = f"{path}: would be removed and is no result; choose another folder for `out`"
+            raise UsageError(msg)
 
 
 def flush_folder(folder: Path) -> None:

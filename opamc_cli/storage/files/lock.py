@@ -14,8 +14,15 @@ LOCK_NAME = ".opamc.lock"
 
 
 @contextmanager
-def output_lock(folder: Path) -> Iterator[None]:
+def output_lock(folder: Path, chosen_by: str = "--out") -> Iterator[None]:
     """Hold the output folder for this process; the kernel lets go of it when the process dies.
+
+    Parameters
+    ----------
+    folder
+        Which.
+    chosen_by
+        What another one is named with, for errors.
 
     Raises
     ------
@@ -24,12 +31,13 @@ def output_lock(folder: Path) -> Iterator[None]:
     UsageError
         If the folder cannot be written.
     """
-    ensure_directory(folder)
+    ensure_directory(folder, chosen_by)
     path = folder / LOCK_NAME
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     except OSError as error:
-        msg = f"{folder}: cannot write here ({error.strerror}); choose another folder with --out"
+        reason = f"cannot write here ({error.strerror})"
+        msg = f"{folder}: {reason}; choose another folder with {chosen_by}"
         raise UsageError(msg) from error
     try:
         try:
@@ -37,7 +45,7 @@ def output_lock(folder: Path) -> Iterator[None]:
         except BlockingIOError as error:
             msg = (
                 f"{folder}: another opamc run is writing here (lock {path.name}); "
-                "wait for it to end or choose another folder with --out"
+                f"wait for it to end or choose another folder with {chosen_by}"
             )
             raise LockedError(msg) from error
         clear(folder)

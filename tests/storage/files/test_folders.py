@@ -38,5 +38,20 @@ def test_a_folder_goes_with_what_a_killed_process_left(tmp_path):
         remove_folder(tmp_path / "night")
 
 
+def test_what_is_no_result_is_not_taken_away(tmp_path):
+    (tmp_path / "night" / "deep").mkdir(parents=True)
+    (tmp_path / "night" / "a.txt").write_text("old")
+    log = tmp_path / "night" / "deep" / "cycle.parquet"
+    log.write_text("a year of work")
+    for take in (lambda: replace_folder(log.parents[1], {"a.txt": b"1"}, of={"a.txt"}),
+                 lambda: remove_folder(log.parents[1], of={"a.txt"})):  # fmt: skip
+        with pytest.raises(UsageError, match=r"cycle.parquet: would be removed and is no result"):
+            take()
+    assert log.read_text() == "a year of work"
+    log.unlink()
+    replace_folder(log.parents[1], {"a.txt": b"1"}, of={"a.txt"})
+    assert contents(tmp_path / "night") == {"a.txt": b"1"}
+
+
 def test_a_folder_that_is_not_there_needs_no_flush(tmp_path):
     flush_folder(tmp_path / "none")

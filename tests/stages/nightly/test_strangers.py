@@ -1,0 +1,161 @@
+"""What people who do not know the program do with it, by mistake."""
+
+import json
+import os
+import shutil
+import sqlite3
+from datetime import date, timedelta
+
+import pytest
+from cell_logs import night
+
+from opamc_cli.config.cell import load_cell
+from opamc_cli.errors import ExitCode, UsageError
+from opamc_cli.stages.nightly.claim import claim
+from opamc_cli.stages.nightly.morning import ahead
+from opamc_cli.storage.history import History, NightRow
+
+KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
+
+
+@pytest.fixture
+def small(cell):
+    """One robot in the nights of its baseline: nothing is computed."""
+    for robot in ("r2", "r3"):
+        shutil.rmtree(cell.parent / "logs" / robot)
+    for index in (3, 4):
+        shutil.rmtree(cell.parent / "logs" / "r1" / night(index))
+    return cell
+
+
+def test_logs_are_never_taken_for_results(small, opamc):
+    small.write_text(small.read_text() + "out: logs\n")
+    before = {path: path.read_bytes() for path in small.parent.rglob("*.parquet")}
+    ended = opamc("nightly", small)
+    assert ended.code == ExitCode.USAGE
+    assert "cycle.parquet: would be removed and is no result; choose another" in ended.err
+    assert {path: path.read_bytes() for path in small.parent.rglob("*.parquet")} == before
+
+
+@pytest.mark.parametrize(
+    ("robots", "said"),
+    [
+        ("{}", "write auto, or every robot as a key"),
+        ("[r1, r2]", "write auto, or every robot as a key"),
+        ("{1: {}}", "the name 1 is read as a number; put it in quotes"),
+    ],
+)
+def test_robots_are_named(small, opamc, robots, said):
+    small.write_text(small.read_text() + f"robots: {robots}\n")
+    ended = opamc("nightly", small)
+    assert (ended.code, ended.out) == (ExitCode.USAGE, "")
+    assert said in ended.err
+
+
+def test_a_name_that_fits_no_file_is_said_and_the_others_leave_the_page(small, opamc):
+    opamc("nightly", small)
+    assert "r1" in (small.parent / "nightly" / "metrics.prom").read_text()
+    small.write_text(small.read_text() + "robots: {r7: {}}\n")
+    ended = opamc("nightly", small)
+    assert ended.code == ExitCode.PARTIAL
+    assert "no file of r7 fits this pattern" in ended.out
+    for page in ("metrics.prom", "index.html"):
+        assert "r1" not in (small.parent / "nightly" / page).read_text()
+
+
+def test_names_that_are_no_text_are_their_robots_line(small, opamc):
+    logs = small.parent / "logs"
+    (logs / "r1").rename(logs / "Röbot 1")
+    shutil.copytree(logs / "Röbot 1", logs / os.fsdecode(b"\xff2"))
+    ended = opamc("nightly", small, "--json")
+    assert ended.code == ExitCode.PARTIAL
+    robots = json.loads(ended.out)["robots"]
+    assert robots["Röbot 1"]["failed"] == []
+    assert "its name is not UTF-8; rename it" in robots["\ufffd2"]["failed"][0]["why"]
+
+
+def test_joints_that_are_not_there_stay_a_failure(cell, opamc):
+    for robot in ("r2", "r3"):
+        shutil.rmtree(cell.parent / "logs" / robot)
+    shutil.rmtree(cell.parent / "logs" / "r1" / night(4))
+    cell.write_text(cell.read_text() + "robots: {r1: {axes: [7]}}\n")
+    first, second = opamc("nightly", cell), opamc("nightly", cell)
+    assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
+    assert "axis 7 of program 'cycle' cannot be judged" in first.out
+    assert "could not be judged" in second.out
+
+
+def test_two_cells_in_one_folder_are_refused(small, opamc):
+    assert opamc("nightly", small).code == ExitCode.DONE
+    other = small.with_name("other.yaml")
+    shutil.copytree(small.parent / "logs", small.parent / "logs2")
+    other.write_text(small.read_text().replace("logs", "logs2"))
+    ended = opamc("nightly", other)
+    assert ended.code == ExitCode.USAGE
+    assert "holds the results of" in ended.err
+    assert "give each cell an `out` of its own" in ended.err
+    # a copy of the file, or one that took its place, is no other cell
+    copy = shutil.copy(small, small.with_name("copy.yaml"))
+    claim(load_cell(copy), copy)
+    copy.unlink()
+    claim(load_cell(other), other)
+    with pytest.raises(UsageError, match="looks after other recordings"):
+        claim(load_cell(small), small)
+
+
+def test_a_database_of_something_else_is_left_alone(small, opamc):
+    path = small.parent / "nightly" / "history.sqlite"
+    path.parent.mkdir()
+    with sqlite3.connect(path) as made:
+        made.execute("CREATE TABLE mine (x)")
+    made.close()
+    assert "holds no history" in opamc("history", "--cell", small).err
+    ended = opamc("nightly", small)
+    assert ended.code == ExitCode.BAD_INPUT
+    assert "is a database of something else; move it away" in ended.err
+    with sqlite3.connect(path) as left:
+        assert left.execute("SELECT name FROM sqlite_master").fetchall() == [("mine",)]
+
+
+@pytest.mark.parametrize("open_elsewhere", [False, True])
+def test_a_history_of_somebody_else_is_read(tmp_path, monkeypatch, open_elsewhere):
+    path = tmp_path / "history.sqlite"
+    writer = History(path)
+    writer.record_night(NightRow("r1", "2026-03-01", KEY, "done", 0, "", ""))
+    if not open_elsewhere:
+        writer._db.close()
+    monkeypatch.setattr("opamc_cli.storage.history._writable", lambda path: False)
+    with History(path, read_only=True) as opened:
+        assert list(opened.nights()) == [("r1", "2026-03-01")]
+    writer._db.close()
+
+
+def test_a_folder_that_cannot_be_written_is_called_as_the_cell_calls_it(small, opamc):
+    small.write_text(small.read_text() + "out: cell.yaml\n")
+    ended = opamc("nightly", small)
+    assert ended.code == ExitCode.USAGE
+    assert "choose another with `out` in the cell's file" in ended.err
+
+
+def test_declarations_are_checked(small, opamc):
+    opamc("nightly", small)
+    begin = ("nightly", "rebaseline", "r1", "--cell", small, "--from")
+    assert "--why is blank" in opamc(*begin, night(1), "--why", " \n ").err
+    assert "more than a month ahead" in opamc(*begin, "3026-03-01", "--why", "oil").err
+    told = opamc(*begin, night(1), "--why", "new\n oil \x1b[31m")
+    assert told.code == ExitCode.DONE
+    assert told.out == f"r1 new baseline from {night(1)} on: new oil \ufffd[31m\n"
+    both = opamc("nightly", small, "--night", night(1), "--since", night(2))
+    assert both.code == ExitCode.USAGE
+    assert "is before --since" in both.err
+
+
+def test_a_night_to_come_is_said(tmp_path):
+    today = date(2026, 3, 1)
+    with History(tmp_path / "history.sqlite") as history:
+        for robot, days in (("r1", 1), ("r2", 2)):
+            last = (today + timedelta(days)).isoformat()
+            history.record_night(NightRow(robot, last, KEY, "done", 0, "", ""))
+        (event,) = ahead(history, today)
+    assert (event.robot, event.axis) == ("r2", None)
+    assert "lies in the future; check the clocks" in event.text
