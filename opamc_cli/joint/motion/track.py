@@ -3,7 +3,7 @@
 from collections.abc import Hashable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from opamc_cli.joint.least_squares import solve
-
-if TYPE_CHECKING:
-    from opamc_cli.joint.fit.model import Term
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -104,7 +101,7 @@ class Track:
     """With `temperature_c`: where known; (n,) or None."""
     period_samples: int | None = None
     """Length of a cycle, if the motion repeats."""
-    static_terms: "tuple[Term, ...]" = ()
+    static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
     kept: dict[Hashable, Floats] | None = None
     """Regressors of static terms that stay the same whatever is fitted, while a search goes on."""
@@ -173,7 +170,7 @@ class Track:
         blocks = [self._regressors(term, source).T for term in self.static_terms]
         return np.concatenate([np.zeros((0, source.size)), *blocks]).T
 
-    def _regressors(self, term: "Term", source: "Track") -> Floats:
+    def _regressors(self, term: "Regressors", source: "Track") -> Floats:
         if self.kept is None or not term.is_constant:
             return term.columns(source)
         if term.key not in self.kept:
@@ -205,7 +202,7 @@ class Track:
             self.__dict__.pop(name, None)
 
     def with_model(
-        self, load_a: Floats, model_a: Floats, static_terms: "tuple[Term, ...]"
+        self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":
         """Return the same track with the fitted load and model currents, given at its full rate."""
         if self.full is None:
@@ -227,6 +224,24 @@ class Reference:
 
     speed: float
     temperature_c: float | None
+
+
+class Regressors(Protocol):
+    """What has regressors on every track: a fitted term."""
+
+    @property
+    def key(self) -> Hashable:
+        """What makes two of them the same."""
+        ...
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether the regressors stay the same whatever the fitted model is."""
+        ...
+
+    def columns(self, track: Track) -> Floats:
+        """Regressors, shape (n, k)."""
+        ...
 
 
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
