@@ -46,32 +46,21 @@ def highest_folded(track: Track) -> float:
 
 def order_spectrum(
     track: Track, residual: Floats, top: float | None = None
-) -> tuple[Floats, Floats, int]:
+) -> tuple[Floats, Floats]:
     """Power of a residual over orders of the machine angle, in units of white noise's power.
 
     Samples are binned by angle, separately for both directions and for slow and fast motion, so
     that a ripple whose phase depends on either is seen; each class is transformed on its own and
     the powers are added.
 
-    Parameters
-    ----------
-    residual : array of shape (n,)
-        Zero where samples do not count.
-    top : float, optional
-        Highest order; that which is not folded at the median speed if missing.
-
-    Returns
-    -------
-    orders, power : arrays
-        Orders (cycles per revolution), oversampled four times, and the power summed over
-        classes; each class alone has mean 1 for white noise.
-    classes : int
-        Number of classes that were summed.
+    The residual, shape (n,), is zero where samples do not count; `top` is the highest order, that
+    which is not folded at the median speed if missing. Orders (cycles per revolution) are
+    oversampled four times; each class alone has mean 1 for white noise.
     """
     valid = track.moving & (residual != 0)
     top = highest_order(track) if top is None else top
     if valid.sum() < 50 or top <= 0:
-        return np.empty(0), np.empty(0), 1
+        return np.empty(0), np.empty(0)
     angle = track.machine_angle_rad[valid]
     values = residual[valid]
     speed = np.abs(track.velocity[valid])
@@ -90,7 +79,6 @@ def order_spectrum(
     index = np.minimum((angle / width).astype(np.int64), bins - 1)
     kept = int(top * length * width / (2 * np.pi))
     power = np.zeros(kept)
-    classes = 0
     for direction in (forward, ~forward):
         for pace in (fast, ~fast):
             members = direction & pace
@@ -102,9 +90,8 @@ def order_spectrum(
             if energy <= 0:
                 continue
             power += np.abs(rfft(binned, length)[:kept]) ** 2 / energy
-            classes += 1
     orders = np.arange(kept) * 2 * np.pi / (length * width)
-    return orders, power, max(classes, 1)
+    return orders, power
 
 
 def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
@@ -115,7 +102,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     their power in units of white noise's, where they hold 2 % of the residual's power. The
     residual, (n,) at the full rate, is zero where samples do not count.
     """
-    orders, power, _ = order_spectrum(track, residual, highest_folded(track))
+    orders, power = order_spectrum(track, residual, highest_folded(track))
     lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
     first = int(np.searchsorted(orders, lowest))
     if orders.size - first < 8:

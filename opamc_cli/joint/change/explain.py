@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import Energy, energy_of, rest_growth, shift_power
+from opamc_cli.joint.change.energy import energy_of, rest_growth, shift_power
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Reading
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
-from opamc_cli.joint.change.slow import Population, learn
+from opamc_cli.joint.change.slow import learn
 from opamc_cli.joint.change.units import Follow, Unit, follow, followed, read_side, usable_terms
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
@@ -151,7 +151,9 @@ def explain_change(
 
     energy = energy_of(units, population, slow_found=bool(slow))
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    moved, gains = energy.slow, _gains(units, population, energy, slow)
+    # What each slow cause takes from the change's mean square, in their order.
+    rests = [energy_of(units, population, True, found.shift).total for found in slow]
+    moved, gains = energy.slow, -np.diff(np.minimum.accumulate([energy.total, *rests]))
     powers = [shift_power(units, found.shift) for found in slow]
     friction = powers and {found.effect for found in slow} <= HIDDEN
     if friction and energy.slow < VISIBLE * powers[-1]:
@@ -184,14 +186,6 @@ def explain_change(
         sessions=not cycles,
         angle=units[0].fine.angle_kind,
     )
-
-
-def _gains(
-    units: list[Unit], population: Population, energy: Energy, slow: list[SlowCause]
-) -> Floats:
-    """Mean square that each slow cause takes from the change, in their order, A^2."""
-    rests = [energy_of(units, population, True, found.shift).total for found in slow]
-    return -np.diff(np.minimum.accumulate([energy.total, *rests]))
 
 
 def _slow_entries(

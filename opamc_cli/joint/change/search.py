@@ -148,7 +148,8 @@ def _next(
         name = shift.terms[-1].effect.name
         part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
         p_value = min(shift.p_value / part, 1.0)
-        if name not in best and _size(ready, shift) >= SMALLEST_SHIFT * population.power**0.5:
+        size = float(np.mean(_contribution(ready, shift) ** 2))
+        if name not in best and size >= SMALLEST_SHIFT**2 * population.power:
             best[name] = (p_value, shift)
     if not best:
         return None
@@ -187,17 +188,10 @@ def _next(
     p_value, shift = sure[first]
     cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
     if first == "payload_change":
-        return _payload(cause)
+        return replace(cause, parameters={}, note="another payload (check the tool, not the gear)")
     if {first, *ties} & GREASE:
         return _friction(ready, population, cause, library)
     return cause
-
-
-def _payload(cause: SlowCause) -> SlowCause:
-    return SlowCause(
-        cause.effect, {}, "another payload (check the tool, not the gear)", cause.shift,
-        cause.p_value, cause.ties,
-    )  # fmt: skip
 
 
 def _expected(
@@ -303,10 +297,6 @@ def _contribution(ready: list[Prepared], shift: Shift) -> Floats:
             columns = one.unit.columns(last)
             parts.append(columns @ shift.coefficients[-columns.shape[1] :])
     return np.concatenate(parts)
-
-
-def _size(ready: list[Prepared], shift: Shift) -> float:
-    return float(np.sqrt(np.mean(_contribution(ready, shift) ** 2)))
 
 
 def _correlation(one: Floats, other: Floats) -> float:

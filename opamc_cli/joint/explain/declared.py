@@ -21,6 +21,7 @@ JUDGED = ("moving", "clear", "channels", "period_samples")
 reversal: judged by its own, it is the best wherever friction is wrong."""
 
 Declared = tuple[tuple[Effect, Term | None], ...]
+"""Effects, with their terms where parameters are given."""
 
 
 def best_fit(
@@ -31,21 +32,8 @@ def best_fit(
 ) -> Fit | None:
     """Fit a declared model to recordings, differentiated in the way that predicts best.
 
-    Parameters
-    ----------
-    recordings : list of Recording
-        In time order, all at one rate.
-    joint : Joint
-        Gear ratio and pole pairs, where known.
-    declared : callable
-        Gives the model on a dataset.
-    without_rules : collection of str
-        Rules to switch off: "windows".
-
-    Returns
-    -------
-    Fit or None
-        None where too little moves to seal anything off.
+    The recordings are in time order, all at one rate; the rule "windows" may be switched off. None
+    where too little moves to seal anything off.
     """
     track, grouping = grouped_track(recordings, joint)
     if grouping is None or not is_moving(track):
@@ -88,21 +76,8 @@ def _judged_alike(other: Track, track: Track) -> Track:
     return replace(other, **{name: getattr(track, name) for name in JUDGED})
 
 
-def declared_fit(dataset: Dataset, declared: tuple[tuple[Effect, Term | None], ...]) -> Fit:
-    """Fit a declared model; non-linear parameters that are not given are searched first.
-
-    Parameters
-    ----------
-    dataset : Dataset
-        Recordings.
-    declared : tuple of (Effect, Term or None)
-        Effects with their terms where parameters are given.
-
-    Returns
-    -------
-    Fit
-        Terms in the declared order.
-    """
+def declared_fit(dataset: Dataset, declared: Declared) -> Fit:
+    """Fit a model, terms in its order; parameters that are not given are searched first."""
     terms: dict[int, Term] = {}
     open_places = []
     for place, (effect, term) in enumerate(declared):

@@ -37,26 +37,12 @@ def unnamed_library() -> dict[str, Effect]:
 
 
 def saturated(start: Chain, pool: Pool) -> Chain:
-    """Explain what a model leaves by unnamed functions, largest first.
-
-    Parameters
-    ----------
-    start : Chain
-        Declared model, fitted to the open data.
-    pool : Pool
-        Of unnamed effects.
-    """
+    """Explain what the declared model leaves by a pool of unnamed functions, largest first."""
     return beam(start, replace(pool, least_share=PRICE), width=1)
 
 
 def ceiling(before: Fit, explained: Fit) -> Ceiling:
-    """Hold an unnamed model against the sealed data, once.
-
-    Parameters
-    ----------
-    before, explained : Fit
-        Declared and saturated model, fitted to the open data.
-    """
+    """Hold the saturated model, fitted to the open data, against the sealed data, once."""
     first, last = sealed_parts(before), sealed_parts(explained)
     total = max(float(first.sum()), 1e-300)
     drop = first - last

@@ -12,6 +12,8 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, block_mean
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""
 QUANTILES = 65
+SAMPLES_OF_EACH = 100
+"""By which the ranks of a long recording's covariates are told, evenly spread."""
 RESPONSE_DAMPING = 0.3
 
 Covariate = Callable[[Track], Floats]
@@ -136,6 +138,7 @@ def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) 
     known, values = values[members], values[rows]
     if not known.size:
         return np.zeros_like(values)
+    known = known[:: max(known.size // (QUANTILES * SAMPLES_OF_EACH), 1)]
     levels = np.quantile(known, np.linspace(0, 1, QUANTILES))
     span = max(float(levels[-1] - levels[0]), 1e-300)
     rank = np.interp(values, levels, np.linspace(0, 1, QUANTILES))

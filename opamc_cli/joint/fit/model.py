@@ -111,10 +111,12 @@ class Dataset:
     def sharp(self) -> Grid:
         """The fine grid without the samples whose acceleration the smoothing has spoilt.
 
-        All samples are fitted, since some effects live there; residuals are looked at on these.
+        All samples are fitted, since some effects live there; residuals are looked at on these, if
+        there are any among the open ones and among the sealed ones.
         """
-        track = self.fine.track
-        if track.clear[self.fine.fit | self.fine.sealed].all():
+        track, rows = self.fine.track, (self.fine.fit, self.fine.sealed)
+        clear = [track.clear[some] for some in rows if some.any()]
+        if all(some.all() for some in clear) or not all(some.any() for some in clear):
             return self.fine
         track = replace(track, moving=track.moving & track.clear)
         return _grid(track, self.fit_groups, self.grouping.sealed)

@@ -61,11 +61,7 @@ class RegressorCache:
         Of one grid, current, shape (n,), and parts are the same in every call.
         """
         self._forget_strangers(blocks)
-        target = current[:, None] if "target" + str(fine) not in self.shared else None
-        if target is not None:
-            self.shared["target" + str(fine)] = target
-        target = self.shared["target" + str(fine)]
-        every = [*blocks, target]
+        every = [*blocks, self.shared.setdefault(f"target {fine}", current[:, None])]
         for i, block in enumerate(every):
             missing = [
                 other
@@ -79,16 +75,14 @@ class RegressorCache:
             for other, product in zip(missing, products, strict=True):
                 self._products[id(other), id(block), fine] = product
                 self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
-        own = [
-            np.concatenate([self._products[id(a), id(b), fine] for b in blocks], axis=2)
-            for a in blocks
-        ]
-        count = len(parts.slices)
-        gram = np.concatenate(own, axis=1) if own else np.zeros((count, 0, 0))
-        moments = [self._products[id(a), id(target), fine][:, :, 0] for a in blocks]
-        moment = np.concatenate(moments, axis=1) if moments else np.zeros((count, 0))
-        power = self._products[id(target), id(target), fine][:, 0, 0]
-        return Sums(gram, moment, power, parts)
+        whole = np.concatenate(
+            [
+                np.concatenate([self._products[id(a), id(b), fine] for b in every], axis=2)
+                for a in every
+            ],
+            axis=1,
+        )
+        return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts)
 
     def rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
         """Return the parts' rows of a regressor array."""

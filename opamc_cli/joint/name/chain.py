@@ -193,14 +193,6 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
 
 
 def price_of(term: Term, width: int) -> float:
-    """Price of a term: the effect, its coefficients and its searched parameters, alike.
-
-    Parameters
-    ----------
-    term : Term
-        With its parameters.
-    width : int
-        Coefficients.
-    """
+    """Price of a term: the effect, its `width` coefficients and its searched parameters, alike."""
     charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
     return PRICE * (1 + charged + term.effect.searched(term.parameters))

@@ -1,5 +1,6 @@
 """How much of its domain's curve an effect's form holds, and the curve beside it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,17 +17,33 @@ APPROXIMATE = 0.5
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 
-COVARIATES = {
-    "velocity": ("speed", "rad/s"),
-    "acceleration": ("acceleration", "rad/s²"),
-    "joint-angle": ("joint angle", "rad"),
-    "load": ("load", "A"),
-    "temperature": ("temperature", "°C"),
-    "time": ("time", "s"),
-    "motor-angle": ("angle within the period", "turns"),
-    "electrical": ("electrical angle", "turns"),
-    "frequency": ("time within the period", "periods"),
+COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | None]]] = {
+    "velocity": ("speed", "rad/s", True, lambda t, _: np.abs(t.velocity)),
+    "acceleration": ("acceleration", "rad/s²", False, lambda t, _: t.acceleration),
+    "joint-angle": ("joint angle", "rad", True, lambda t, _: t.position_rad),
+    "load": ("load", "A", True, lambda t, _: np.abs(t.load_a)),
+    "temperature": ("temperature", "°C", True, lambda t, _: t.temperature_c),
+    "time": ("time", "s", True, lambda t, _: t.time_s),
+    "motor-angle": (
+        "angle within the period",
+        "turns",
+        False,
+        lambda t, order: (order * t.machine_angle_rad / (2 * np.pi)) % 1.0,
+    ),
+    "electrical": (
+        "electrical angle",
+        "turns",
+        False,
+        lambda t, _: None if t.electrical_rad is None else (t.electrical_rad / (2 * np.pi)) % 1.0,
+    ),
+    "frequency": (
+        "time within the period",
+        "periods",
+        False,
+        lambda t, frequency_hz: (frequency_hz * t.time_s) % 1.0,
+    ),
 }
+"""Of each domain: name, unit, whether friction resists there, and its values, (n,) or None."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +91,13 @@ def curve_of(fit: Fit, place: int) -> Curve:
     rows = np.flatnonzero(grid.fit)
     named = (dataset.columns(term, fine=True) @ values)[rows]
     both = named + fit.residual_a[rows]
-    over, side = _covariate(grid.track, term)
-    over, side = over[rows], side[rows]
+    name, unit, resists, values_of = COVARIATES[term.effect.domain]
+    track = grid.track
+    known = values_of(track, next(iter(term.parameters.values()), 0.0))
+    over = (track.position_rad if known is None else known)[rows]
+    side = track.direction[rows] if resists or known is None else np.ones(rows.size)
     order = np.argsort(over, kind="stable")
     bins = [piece for piece in np.array_split(order, POINTS) if piece.size]
-    name, unit = COVARIATES[term.effect.domain]
     return Curve(
         name,
         unit,
@@ -86,26 +105,3 @@ def curve_of(fit: Fit, place: int) -> Curve:
         np.array([(side * both)[piece].mean() for piece in bins]),
         np.array([(side * named)[piece].mean() for piece in bins]),
     )
-
-
-def _covariate(track: Track, term: Term) -> tuple[Floats, Floats]:
-    one = np.ones(track.size)
-    turn = 2 * np.pi
-    domain = term.effect.domain
-    if domain == "velocity":
-        return np.abs(track.velocity), track.direction
-    if domain == "acceleration":
-        return track.acceleration, one
-    if domain == "load":
-        return np.abs(track.load_a), track.direction
-    if domain == "temperature" and track.temperature_c is not None:
-        return track.temperature_c, track.direction
-    if domain == "time":
-        return track.time_s, track.direction
-    if domain == "motor-angle":
-        return (next(iter(term.parameters.values())) * track.machine_angle_rad / turn) % 1.0, one
-    if domain == "electrical" and track.electrical_rad is not None:
-        return (track.electrical_rad / turn) % 1.0, one
-    if domain == "frequency":
-        return (next(iter(term.parameters.values())) * track.time_s) % 1.0, one
-    return track.position_rad, track.direction

@@ -3,16 +3,15 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import minimize, minimize_scalar
 
 from opamc_cli.joint.effects.base import Parameters
-from opamc_cli.joint.fit.model import Dataset, Term
+from opamc_cli.joint.fit.model import SETTLED, Dataset, Term
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Beside
 
-TRIALS_OF_ONE = 7
-TRIALS_OF_MORE = 30
-"""Parabolas settle a step to a hundredth of it; so does a simplex."""
+ROUNDS = 4
+"""Of three trials of each parameter, a quarter as far apart every time: the last step is a
+hundredth of the first one. None after one that takes next to nothing off."""
 LOGARITHMIC = 5.0
 """Ratio of a parameter's limits from which on it is refined as a logarithm."""
 
@@ -35,40 +34,33 @@ def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
         return moved
 
     def lost(values: Floats) -> float:
-        trial = Term(term.effect, outwards(np.atleast_1d(values)), term.keep)
+        trial = Term(term.effect, outwards(values), term.keep)
         columns = dataset.computed(trial, beside.fine, beside.refined_rows)
         return -beside.fitted_drop(columns, whole=term.effect.whole)
 
-    start = np.array(
-        [
-            np.log(max(term.parameters[n], limits[n][0])) if log else term.parameters[n]
-            for n, log in zip(names, logs, strict=True)
-        ]
-    )
-    step = np.array(
-        [
-            np.log1p(steps[n] / max(term.parameters[n], limits[n][0])) if log else steps[n]
-            for n, log in zip(names, logs, strict=True)
-        ]
-    )
-    found, least = (_one if len(names) == 1 else _several)(lost, start, step)
-    best = found if least < lost(start) else start
-    parameters = term.effect.settled(outwards(best), track)
+    start, step = np.empty((2, len(names)))
+    for i, (name, log) in enumerate(zip(names, logs, strict=True)):
+        value, first = term.parameters[name], steps[name]
+        value = max(value, limits[name][0]) if log else value
+        start[i], step[i] = (np.log(value), np.log1p(first / value)) if log else (value, first)
+    parameters = term.effect.settled(outwards(_lowest(lost, start, step)), track)
     return Term(term.effect, parameters, term.keep)
 
 
-def _one(lost: Callable[[Floats], float], start: Floats, step: Floats) -> tuple[Floats, float]:
-    bounds = (float(start[0] - step[0]), float(start[0] + step[0]))
-    found = minimize_scalar(
-        lost, bounds=bounds, method="bounded", options={"maxiter": TRIALS_OF_ONE}
-    )
-    return np.atleast_1d(found.x), float(found.fun)
-
-
-def _several(lost: Callable[[Floats], float], start: Floats, step: Floats) -> tuple[Floats, float]:
-    simplex = np.vstack(
-        [start, *(start + 0.5 * step[i] * np.eye(start.size)[i] for i in range(start.size))]
-    )
-    options = {"maxfev": TRIALS_OF_MORE, "initial_simplex": simplex}
-    found = minimize(lost, start, method="Nelder-Mead", options=options)
-    return found.x, float(found.fun)
+def _lowest(lost: Callable[[Floats], float], start: Floats, step: Floats) -> Floats:
+    """Go to the vertex of the parabola through a parameter's neighbours, one after the other."""
+    best, least = start, lost(start)
+    for number in range(ROUNDS):
+        before = least
+        for side in np.diag(step) / 4**number:
+            below, above = lost(best - side), lost(best + side)
+            bend = below - 2 * least + above
+            shift = 0.5 * (below - above) / bend if bend > 0 else np.sign(below - above)
+            vertex = best + np.clip(shift, -1.0, 1.0) * side
+            trials = [(below, best - side), (above, best + side), (lost(vertex), vertex)]
+            found, place = min(trials, key=lambda trial: trial[0])
+            if found < least:
+                best, least = place, found
+        if 0 < before - least <= SETTLED * abs(least):
+            break
+    return best

@@ -116,22 +116,7 @@ def guessed(effect: Effect, dataset: Dataset) -> list[Term]:
 
 
 def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]:
-    """Best guess of every effect beside a chain, refined.
-
-    Parameters
-    ----------
-    chain : Chain
-        What is known.
-    pool : Pool
-        What may be added.
-    every : bool
-        Refine and return the hopeless ones as well.
-
-    Returns
-    -------
-    list of Candidate
-        Best first.
-    """
+    """Best guess of every effect beside a chain, refined, best first; hopeless ones if `every`."""
     asked = frozenset(term.key for term in chain.fit.terms), every
     if asked in pool.asked:
         return pool.asked[asked]
@@ -185,14 +170,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
     """Fit the most promising candidates of a chain, and say of each whether it may be added.
 
-    Parameters
-    ----------
-    chain : Chain
-        What is known.
-    pool : Pool
-        What may be added.
-    known : set, optional
-        Chains that were tried; they are not tried again, and new ones are added.
+    The chains that are `known` were tried; they are not tried again, and new ones are added.
     """
     tried = set() if known is None else known
     ordered = [[candidate.term] for candidate in candidates(chain, pool)[:TRIED]]
@@ -267,16 +245,9 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
 
 
 def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
-    """Follow chains; return the one that is worth its price.
+    """Follow `width` chains side by side; return the one that is worth its price.
 
-    Parameters
-    ----------
-    start : Chain
-        What is known.
-    pool : Pool
-        What may be added.
-    width : int
-        Chains that are followed side by side; one alone as far as its score falls.
+    One alone is followed as far as its score falls.
     """
     width = 1 if "beam" in pool.without else width
     chains = [start]

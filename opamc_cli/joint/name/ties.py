@@ -6,26 +6,33 @@ from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Trial
 from opamc_cli.joint.name.significance import LEAST_T, paired
 
-SPEED = frozenset({"coulomb", "viscous", "stribeck", "quadratic_friction", "sublinear_friction"})
-PLACE = frozenset(
-    {"offset", "asymmetric_friction", "spring", "gravity", "position_drag", "hysteresis"}
-)
-WARMTH = frozenset({"thermal_viscous", "warmup", "viscous"})
-CHANGE = frozenset({"inertia", "elasticity", "coupling", "time_delay", "payload_change"})
-ELECTRIC = frozenset({"ripple", "sensor_offset", "sensor_gain", "dead_time"})
-LINE = frozenset({"ripple", "mains_hum", "elasticity"})
-
 ADVICE = (
-    (WARMTH, "record again with the joint already warm, logging its temperature"),
-    (SPEED, "move at more speeds, from a fiftieth of the top speed up to it"),
-    (ELECTRIC, "log all three phase currents together with the position"),
-    (LINE, "repeat the motion at another speed: what belongs to an angle moves, a line stays"),
     (
-        CHANGE,
+        {"thermal_viscous", "warmup", "viscous"},
+        "record again with the joint already warm, logging its temperature",
+    ),
+    (
+        {"coulomb", "viscous", "stribeck", "quadratic_friction", "sublinear_friction"},
+        "move at more speeds, from a fiftieth of the top speed up to it",
+    ),
+    (
+        {"ripple", "sensor_offset", "sensor_gain", "dead_time"},
+        "log all three phase currents together with the position",
+    ),
+    (
+        {"ripple", "mains_hum", "elasticity"},
+        "repeat the motion at another speed: what belongs to an angle moves, a line stays",
+    ),
+    (
+        {"inertia", "elasticity", "coupling", "time_delay", "payload_change"},
         "repeat the motion with other accelerations at equal speeds, without a change of tool",
     ),
-    (PLACE, "cover more of the travel, through every place in both directions"),
+    (
+        {"offset", "asymmetric_friction", "spring", "gravity", "position_drag", "hysteresis"},
+        "cover more of the travel, through every place in both directions",
+    ),
 )
+"""Effects that are alike, and what tells them apart."""
 
 
 def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:

@@ -251,7 +251,7 @@ def spectrum_table(axis: int, loop: Loop) -> pa.Table:
     orders = np.empty(0)
     for result in (loop.before, loop.after):
         residual = np.where(grid.fit, result.residual_a, 0.0)
-        orders, power, _classes = order_spectrum(grid.track, residual)
+        orders, power = order_spectrum(grid.track, residual)
         # Power counts in units of white noise: n/4 of it per class is a sine of this amplitude.
         level = float(np.mean(residual[grid.fit] ** 2))
         samples = max(int(grid.fit.sum()), 1)

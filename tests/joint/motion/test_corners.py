@@ -109,6 +109,16 @@ def test_all_samples_are_looked_at_where_the_encoder_is_fine_and_the_motion_smoo
     assert dataset.sharp is dataset.fine
 
 
+def test_all_samples_are_looked_at_where_no_sealed_one_is_clear():
+    made = simulate(28, kind="trapezoid", rate=500.0, quantum=5e-4)
+    dataset = dataset_from(made, made.current)
+    assert dataset.sharp is not dataset.fine
+    track = dataset.fine.track
+    fine = replace(dataset.fine, track=replace(track, clear=track.clear & ~dataset.fine.sealed))
+    dataset = replace(dataset, fine=fine)
+    assert dataset.sharp is dataset.fine
+
+
 BLOCKS = pytest.mark.xfail(reason="blocks are shorter than the noise of the speed asks for")
 
 
@@ -127,6 +137,22 @@ def test_nothing_is_added_to_a_joint_with_a_coarse_encoder(seed):
     _, loop = close_on(seed, (), ratio=0.0, quantum=5e-4)
     assert loop.steps == ()
     assert loop.verdict == "nothing-missing"
+
+
+def test_where_hardly_a_sample_is_clear_the_path_is_of_that_nature():
+    rate = 1000.0
+    t = np.arange(0, 4, 1 / rate)
+    steps = 30 * np.sign(np.sin(2 * np.pi * 5 * t))
+    path = np.cumsum(np.cumsum(steps)) / rate**2 + t
+    window = 59
+    clear = clear_of_corners(
+        derivatives(path, rate, window, 2),
+        0.2 * steps,
+        (t > 0.5) & (t < 3.5),
+        averaging_kernel(window, 2),
+        0.0,
+    )
+    assert clear.all()
 
 
 @pytest.mark.parametrize("sway", [0.02, 0.3])
