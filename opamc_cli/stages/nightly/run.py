@@ -20,7 +20,7 @@ from opamc_cli.stages.nightly.recordings import (
     find_recordings,
     some,
 )
-from opamc_cli.stages.nightly.settle import settle_cell
+from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import (
@@ -314,7 +314,7 @@ def _record_unjudged(
         [*(one.facts.error for one in night.broken), *(one.missing for one in night.comparisons)]
     ).strip("; ")
     status = "baseline" if night.in_baseline else "failed"
-    remove_folder(cell.out / night.robot / night.night, of=files.OF_NIGHT)
+    remove_folder(cell.out / night.robot / night.night, of=OF_NIGHT)
     row = NightRow(night.robot, night.night, night.key, status, 0, why, as_notes(night.notes))
     history.record_night(row)
     _note(outcome, row)
@@ -334,7 +334,7 @@ def _record(
         if answer.kind == "refused":
             # not the recordings' fault: the disk is full, or a folder cannot be written
             raise UsageError(answer.text)
-        remove_folder(cell.out / night.robot / night.night, of=files.OF_NIGHT)
+        remove_folder(cell.out / night.robot / night.night, of=OF_NIGHT)
         row = NightRow(*place, "broken", attempts + 1, answer.text)
         history.record_night(row)
         _note(outcome, row)
@@ -350,9 +350,9 @@ def _record(
             # the worst program's at the top, where scripts look
             below = "" if index == 0 else f"{_safe(result.program)}/"
             contents |= {below + name: content for name, content in result.files.items()}
-        replace_folder(cell.out / folder, contents, of=files.OF_NIGHT)
+        replace_folder(cell.out / folder, contents, of=OF_NIGHT)
     else:  # what an earlier start found must not pass for this night
-        remove_folder(cell.out / folder, of=files.OF_NIGHT)
+        remove_folder(cell.out / folder, of=OF_NIGHT)
     status = "failed" if not judged else "partial" if why else "done"
     row = NightRow(*place, status, 0, "; ".join(why), as_notes(notes))
     verdicts, measures = [], []

@@ -13,6 +13,9 @@ from opamc_cli.storage.files.folders import remove_folder
 from opamc_cli.storage.history import Event, History, NightRow
 from opamc_cli.storage.schemas import files
 
+OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
+"""All that a night's folder holds."""
+
 
 def settle_cell(
     cell: CellConfig, source: str, history: History, robots: Sequence[str], *, whole: bool = False
@@ -91,6 +94,6 @@ def _prune(cell: CellConfig, history: History) -> None:
     for robot, nights in kept.items():
         old = nights[: -cell.keep.reports]
         for night in old:
-            remove_folder(cell.out / robot / night, of=files.OF_NIGHT)
+            remove_folder(cell.out / robot / night, of=OF_NIGHT)
         if old:  # only then: a start that was killed finds them again
             history.forget_reports(robot, old)

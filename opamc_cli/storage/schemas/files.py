@@ -29,6 +29,3 @@ TRUTH = "truth.json"
 HISTORY = "history.sqlite"
 PAGE = "index.html"
 METRICS = "metrics.prom"
-
-OF_NIGHT = frozenset({VERDICT, REPORT})
-"""All that a night's folder holds."""
