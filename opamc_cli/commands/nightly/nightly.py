@@ -84,8 +84,8 @@ def run(
     # numpy with threads of its own could not be copied into the workers
     with one_thread_each():
         from opamc_cli.stages.nightly import run as stage
+    from opamc_cli.commands.nightly.claim import claim
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.claim import claim
     from opamc_cli.stages.nightly.morning import ahead, silent, tell
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas

@@ -9,9 +9,9 @@ from datetime import date, timedelta
 import pytest
 from cell_logs import night
 
+from opamc_cli.commands.nightly.claim import claim
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode, UsageError
-from opamc_cli.stages.nightly.claim import claim
 from opamc_cli.stages.nightly.morning import ahead
 from opamc_cli.storage.history import History, NightRow
 
