@@ -86,24 +86,38 @@ def test_what_the_readme_shows_is_what_its_commands_print(shown):
     assert readme.differs(README, (shown / "now.md").read_text(encoding="utf-8")) is None
 
 
-@pytest.mark.long
-def test_a_ros_bag_ends_in_a_verdict(logs, tmp_path):
+@pytest.fixture(scope="module")
+def bag(logs, tmp_path_factory):
+    """Verdict and report of the logs as ROS bags."""
+    work = tmp_path_factory.mktemp("bag")
     for path in sorted((logs / "logs").rglob("*.csv")):
-        target = tmp_path / "bags" / path.parent.name
+        target = work / "bags" / path.parent.name
         target.mkdir(parents=True, exist_ok=True)
         foreign.bag(target / path.stem, read_log(path), joints=("base", "shoulder", "elbow"))
     given = taken("opamc ingest bags/", "opamc diagnose --baseline runs/normal")
     # recordings of uneven clocks have to have one rate, as ingest says
     given[0] += " --set resample_hz=125"
-    verdict = verdict_of(tmp_path, given)
-    # with one session of short motions it is near the limit of three joints, 0.01 / 3
+    return verdict_of(work, given), (work / "opamc-out" / "report.html").read_text()
+
+
+@pytest.mark.long
+def test_a_ros_bag_ends_in_a_verdict(bag):
+    verdict, page = bag
     p_values = {entry["axis"]: entry["p_value"] for entry in verdict["axes"]}
     assert p_values[3] < 0.01 < 0.1 < min(p_values[1], p_values[2])
     # a torque is never called a current's ampere
     assert not re.search(r"[0-9] A\b", json.dumps(verdict))
-    page = (tmp_path / "opamc-out" / "report.html").read_text()
     assert "torque (Nm)" in page
     assert "(A)" not in page
+
+
+@pytest.mark.long
+@pytest.mark.xfail(
+    strict=True,
+    reason="one baseline session of short motions: p 0.004, and three joints ask for 0.01 / 3",
+)
+def test_the_fault_in_a_ros_bag_is_found(bag):
+    check_found(bag[0])
 
 
 @pytest.mark.long

@@ -206,7 +206,8 @@ def rebaseline(
         known = {name for name, _ in history.nights()}
         known |= set() if loaded.robots == "auto" else set(loaded.robots)
         if robot not in known:
-            msg = f"{robot} is none of the cell's robots; it has {', '.join(sorted(known)[:8])}"
+            has = f"it has {', '.join(sorted(known)[:8])}" if known else "no night is known yet"
+            msg = f"{robot} is none of the cell's robots; {has}"
             raise UsageError(msg)
         last = max([_now()[:10], *(of for _, of in history.nights())])
         if date.fromisoformat(night) > date.fromisoformat(last) + timedelta(AHEAD_DAYS):

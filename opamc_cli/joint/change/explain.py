@@ -150,9 +150,9 @@ def explain_change(
     held = 0.0 if periodic is None else periodic.power
 
     energy = energy_of(units, population, slow_found=bool(slow))
-    # A line stands out of the spectrum before it stands out of the whole mean square.
     # What each slow cause takes from the change's mean square, in their order.
     rests = [energy_of(units, population, True, found.shift).total for found in slow]
+    # A line stands out of the spectrum before it stands out of the whole mean square.
     moved, gains = energy.slow, -np.diff(np.minimum.accumulate([energy.total, *rests]))
     powers = [shift_power(units, found.shift) for found in slow]
     friction = powers and {found.effect for found in slow} <= HIDDEN

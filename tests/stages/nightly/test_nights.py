@@ -187,13 +187,15 @@ def test_logs_out_of_reach_and_joints_that_are_not_there_are_said(cell, opamc):
     assert f"r2 {NIGHTS[4]}: {why}" in first.out
     assert first.code == ExitCode.UNHEALTHY  # axis 2 is, by one gross night
     # an alarm does not end because a disk is not mounted
-    for text in (cell.read_text(), cell.read_text().replace("robots: {r2: {axes: [2, 7]}}\n", "")):
+    named = cell.read_text()
+    unnamed = named.replace("robots: {r2: {axes: [2, 7]}}\n", "")
+    for text, of in ((named, " of r2"), (unnamed, "")):
         cell.write_text(text)
         (cell.parent / "logs").rename(cell.parent / "unmounted")
         for _ in range(2):
             lost = opamc("nightly", cell, "--quiet")
             assert lost.code == ExitCode.UNHEALTHY
-            assert "fits this pattern any more; is its folder there?" in lost.out
+            assert f"no file{of} fits this pattern any more; is its folder there?" in lost.out
         (cell.parent / "unmounted").rename(cell.parent / "logs")
     cell.write_text(cell.read_text() + "robots: {r2: {axes: []}}\n")
     assert "robots.r2.axes" in opamc("nightly", cell).err

@@ -138,8 +138,9 @@ def test_a_folder_that_cannot_be_written_is_called_as_the_cell_calls_it(small, o
 
 
 def test_declarations_are_checked(small, opamc):
-    opamc("nightly", small)
     begin = ("nightly", "rebaseline", "r1", "--cell", small, "--from")
+    assert "no night is known yet" in opamc(*begin, night(1), "--why", "oil").err
+    opamc("nightly", small)
     assert "--why is blank" in opamc(*begin, night(1), "--why", " \n ").err
     assert "more than a month ahead" in opamc(*begin, "3026-03-01", "--why", "oil").err
     told = opamc(*begin, night(1), "--why", "new\n oil \x1b[31m")
