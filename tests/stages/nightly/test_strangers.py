@@ -139,7 +139,11 @@ def test_a_folder_that_cannot_be_written_is_called_as_the_cell_calls_it(small, o
 
 def test_declarations_are_checked(small, opamc):
     begin = ("nightly", "rebaseline", "r1", "--cell", small, "--from")
+    logs = small.parent / "logs"
+    logs.rename(small.parent / "unmounted")
+    opamc("nightly", small)
     assert "no night is known yet" in opamc(*begin, night(1), "--why", "oil").err
+    (small.parent / "unmounted").rename(logs)
     opamc("nightly", small)
     assert "--why is blank" in opamc(*begin, night(1), "--why", " \n ").err
     assert "more than a month ahead" in opamc(*begin, "3026-03-01", "--why", "oil").err
