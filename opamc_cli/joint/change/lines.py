@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.change.moderated import moderated_t
@@ -12,14 +11,18 @@ from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
+from opamc_cli.joint.spectra import (
+    FEWEST_SAMPLES,
+    LOWEST_ORDER,
+    OVERSAMPLING,
+    AngleBins,
+    highest_order,
+    vertex,
+)
 
-MOST_BINS = 2**19
-BINS_PER_WAVE = 16
 SHORTEST_STROKE = 0.4
 """Cycles of the lowest order that is looked for: a turn of the motor."""
 
-FEWEST_SAMPLES = 50
 LARGEST_P = 5e-3
 SMALLEST_RATIO = 2.0
 """A line has to hold twice its power in the baseline, and twice its neighbours' growth."""
@@ -127,33 +130,25 @@ def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | 
     tops = [highest_order(unit.fine) for unit, _, _ in pieces]
     if not pieces or min(tops) <= 0:
         return None
-    top = min(tops)
-    width = 2 * np.pi / top / BINS_PER_WAVE
-    bins = int(np.ceil(max(travels) / width)) + 1
-    if bins > MOST_BINS:
-        return None
-    length = next_fast_len(OVERSAMPLING * bins, real=True)
+    bins = AngleBins.of(max(travels), min(tops))
     # long strokes carry the energy: their resolution is what the sum has
     resolution = 2 * np.pi / float(np.average(travels, weights=travels))
-    kept = int(top * length * width / (2 * np.pi))
-    orders = np.arange(kept) * 2 * np.pi / (length * width)
-    first = int(
-        np.searchsorted(orders, max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution))
-    )
+    lowest = max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution)
+    first = int(np.searchsorted(bins.orders, lowest))
     rows: dict[bool, list[Floats]] = {False: [], True: []}
     for unit, residual, cut in pieces:
-        power = np.zeros(kept)
+        power = np.zeros(bins.orders.size)
         samples = 0
         for start, stop in cut:
             angle = unit.fine.machine_angle_rad[start:stop]
-            index = ((angle - angle.min()) / width).astype(np.int64)
-            binned = np.bincount(index, weights=residual[start:stop], minlength=bins)
-            power += np.abs(rfft(binned[:bins], length)[:kept]) ** 2
+            power += bins.power(angle - angle.min(), residual[start:stop])
             samples += int(np.count_nonzero(residual[start:stop]))
         rows[unit.after].append(power[first:] / samples)
     if len(rows[False]) < 2 or not rows[True]:
         return None
-    return OrderSpectra(orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution)
+    return OrderSpectra(
+        bins.orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution
+    )
 
 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:

@@ -68,12 +68,10 @@ class Ripple(Effect):
     def _density(self, track: Track, order: float, power: float) -> float:
         """Choose how many filters per octave a line may be worth; 0 where it has no answer."""
         top_hz = _top_hz(track, order)
-        if order > highest_order(track):
-            # Its frequency is not the one that the samples show.
+        if order > highest_order(track) or top_hz <= LOWEST_HZ:
+            # Its frequency is not the one that the samples show, or nothing answers to it.
             return 0.0
-        if top_hz <= LOWEST_HZ:
-            return 0.0
-        turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)
+        turns = order / order_resolution(track)
         for least, density in FILTERS_PER_OCTAVE.items():
             # With fewer turns than pairs of coefficients in each direction a wave takes the form
             # of any friction.
@@ -144,9 +142,8 @@ class Ripple(Effect):
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
         order = parameters["order"]
-        travel = float(np.ptp(track.machine_angle_rad[track.moving]))
         nearest = min(named_orders(track, order), key=lambda named: abs(named - order))
-        close = abs(nearest - order) < 0.25 * 2 * math.pi / travel
+        close = abs(nearest - order) < 0.25 * order_resolution(track)
         return parameters | {"order": nearest} if close else parameters
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
@@ -261,8 +258,7 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
             "counted per motor revolution)"
         )
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
-    travel = float(np.ptp(track.machine_angle_rad[track.moving]))
-    width = min(0.35 * 2 * math.pi / travel, 0.25)
+    width = min(0.35 * order_resolution(track), 0.25)
     if ratio:
         for harmonic, (formula, teeth) in product((1, 2), meshes(ratio)):
             tooth = 2 * teeth / ratio * harmonic

@@ -52,12 +52,6 @@ class Term:
         columns = self.effect.columns_at(track, self.parameters, rows)
         return columns if self.keep is None else columns[:, self.keep]
 
-    def averaged(self, fine: Track, coarse: Track, factor: int) -> Floats:
-        """Regressors on a coarse track; fast ones are averaged, not resampled."""
-        if not self.effect.fast:
-            return self.columns(coarse)
-        return averaged_blocks(self.columns(fine), fine.bounds, fine.kernel, factor)
-
     @cached_property
     def key(self) -> tuple[object, ...]:
         """What makes two terms the same."""
@@ -204,7 +198,7 @@ def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Gri
     stops = np.cumsum([counts[g] for g in groups])
     starts = np.concatenate([[0], stops[:-1]])
     slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
-    track = replace(track, open_samples=fit, kept={})
+    track = replace(track, open_samples=fit)
     return Grid(track, fit, member & np.isin(track.group, sealed), slices)
 
 

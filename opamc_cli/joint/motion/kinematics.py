@@ -20,7 +20,6 @@ from opamc_cli.joint.motion.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
-    quiet_block,
     smoothing_window,
     taken_noise_gain,
     unstepped,
@@ -123,8 +122,6 @@ class Motion:
     """Standard deviation of the speed's noise."""
     kernel: Floats
     """Moving average that the acceleration has gone through."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
     None."""
@@ -190,7 +187,7 @@ def _smoothed(
 ) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
-    noise, spread = measurement_noise(path), float(np.std(values[-1]))
+    noise = measurement_noise(path)
     return Motion(
         position_rad=values[0],
         velocity=values[-2],
@@ -198,7 +195,6 @@ def _smoothed(
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        quiet=quiet_block(noise, spread, rate_hz, window, derivative),
         blur=blurred(path, rate_hz, window, derivative) if beside else None,
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
@@ -296,7 +292,6 @@ def build_track(
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
-        quiet=max(piece.quiet for piece in pieces),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
@@ -343,7 +338,7 @@ def _one(
         channels |= {"position", "scale", "logged"}
         kind = "joint"
     elif phase_angle is not None:
-        period = cycle_length(phase_angle.velocity_rad_s, rate)
+        period = cycle_length(phase_angle.velocity_rad_s)
         if period is not None:
             phase_angle = without_slips(phase_angle, period, rate)
         scale = 1.0
@@ -442,7 +437,6 @@ def _one(
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,
-        quiet=motion.quiet,
         blur=motion.blur,
         others=others,
         other_axes=beside,

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import convolve1d
 
 from opamc_cli.joint.least_squares import solve
 
@@ -103,8 +103,6 @@ class Track:
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
-    kept: dict[Hashable, Floats] | None = None
-    """Regressors of static terms that stay the same whatever is fitted, while a search goes on."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
     None."""
@@ -114,8 +112,6 @@ class Track:
     evenly_smooth: bool = False
     """True where position and speed have gone through it as well; otherwise the coarse grid puts
     them through it."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
     others: Floats | None = None
@@ -167,15 +163,8 @@ class Track:
     def static_columns(self) -> Floats:
         """Regressors of the static terms, shape (m, k), on the full rate's samples."""
         source = self.full or self
-        blocks = [self._regressors(term, source).T for term in self.static_terms]
+        blocks = [term.columns(source).T for term in self.static_terms]
         return np.concatenate([np.zeros((0, source.size)), *blocks]).T
-
-    def _regressors(self, term: "Regressors", source: "Track") -> Floats:
-        if self.kept is None or not term.is_constant:
-            return term.columns(source)
-        if term.key not in self.kept:
-            self.kept[term.key] = term.columns(source)
-        return self.kept[term.key]
 
     @cached_property
     def static_sums(self) -> Floats:
@@ -266,19 +255,9 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
     """Put signals through a moving average inside each recording; ends keep their last value."""
-    if kernel.size == 1:
-        return values
-    half = kernel.size // 2
     smooth = np.empty_like(values)
     for start, stop in bounds:
-        part = values[start:stop]
-        padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
-        padded = np.pad(part, padding, mode="edge")
-        length = next_fast_len(len(padded), real=True)
-        answer = rfft(kernel, length).reshape(-1, *(1,) * (part.ndim - 1))
-        # What wraps round lies before the first sample that all weights reach.
-        whole = irfft(rfft(padded, length, axis=0) * answer, length, axis=0)
-        smooth[start:stop] = whole[2 * half : 2 * half + stop - start]
+        smooth[start:stop] = convolve1d(values[start:stop], kernel, axis=0, mode="nearest")
     return smooth
 
 

@@ -32,7 +32,8 @@ def test_an_angle_line_has_both_phases_of_four_parts_side_by_side():
         direction=np.array([1.0, -1.0, 0.0]),
         model_a=np.array([5.0, 6.0, 7.0]),
     )
-    columns = AngleLine().columns(small, {"order": 2.0})
+    follows = {"speed": 1.0, "direction": 1.0, "current": 1.0}
+    columns = AngleLine().columns(small, {"order": 2.0, **follows})
     cosine, sine = np.array([1.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
     speed = np.array([0.0, 0.5, -0.5])
     for k, part in enumerate(([1, 1, 1], speed, small.direction, small.model_a)):

@@ -107,25 +107,6 @@ def test_spans_become_recordings_of_their_own():
     assert cut.group[[0, 19, 20, 199, 200, 249, 250]].tolist() == [-1, -1, 0, 0, 1, 1, -1]
 
 
-def test_static_regressors_that_never_change_are_computed_once_where_they_are_kept():
-    asked = []
-
-    def columns(on):
-        asked.append(on.size)
-        return on.velocity[:, None]
-
-    constant, following = (
-        SimpleNamespace(columns=columns, key=name, is_constant=name == "constant")
-        for name in ("constant", "following")
-    )
-    for kept, times in (({}, 3), (None, 4)):
-        asked.clear()
-        track = replace(track_of(), static_terms=(constant, following), kept=kept)
-        later = track.with_model(2 * track.velocity, track.velocity, (following, constant))
-        np.testing.assert_array_equal(track.static_columns, later.static_columns)
-        assert len(asked) == times
-
-
 def test_the_static_terms_are_summed_from_zero_in_each_recording():
     track = track_of()
     assert track.static_columns.shape == (2000, 0)
