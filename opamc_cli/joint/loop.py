@@ -23,7 +23,7 @@ class Step:
     """An effect that was added, with what spoke for it."""
 
     trial: Tried
-    """Effect, parameters, and what they take off the error that all the others leave."""
+    """Effect, parameters, and what they take off the error."""
     interpretation: str
     """What it means to a maintainer."""
     decoy_gain: float
@@ -155,8 +155,7 @@ def _steps(
     for place, term in enumerate(final.terms):
         following = extended(chain, term)
         known = by_term.get(id(term))
-        gain, t_value = following.gain_over(chain)
-        trial = Trial(chain, following, gain, t_value, None) if known is None else known.trial
+        trial = Trial.of(chain, following) if known is None else known.trial
         ties = () if known is None else known.ties
         steps.append(
             Step(

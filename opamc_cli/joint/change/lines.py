@@ -185,14 +185,7 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         around = around[around < orders.size]
         if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
             continue
-        line = _line(
-            spectra,
-            peak,
-            guard,
-            growth=float(np.exp(growth[peak])),
-            excess=float(excess[peak]),
-            p_value=float(p_values[peak]),
-        )
+        line = _line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak])
         if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
             found.append(line)
     return found
@@ -217,7 +210,7 @@ def _line(
         error=error,
         reference=float(np.median(before)) if has_line else None,
         reference_error=scatter / np.sqrt(before.size),
-        growth=growth,
-        excess=excess,
-        p_value=p_value,
+        growth=float(np.exp(growth)),
+        excess=float(excess),
+        p_value=float(p_value),
     )

@@ -310,81 +310,57 @@ def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
 def _one(
     recording: Recording, joint: Joint, smoothing: Smoothing | None, beside: tuple[int, ...]
 ) -> Track:
-    rate = recording.rate_hz
+    rate, n = recording.rate_hz, recording.size
     ratio, poles = joint.gear_ratio, joint.pole_pairs
-    channels: set[str] = set()
-    phase_angle: PhaseAngle | None = None
-    phases = recording.phases_a
-    usable = np.ones(recording.size, dtype=bool)
+    turns = poles * ratio if poles and ratio else None
+    logged = recording.position_rad is not None or recording.velocity_rad_s is not None
+    phases, phase_angle = recording.phases_a, None
+    usable = np.ones(n, dtype=bool)
     if phases is not None:
         usable &= np.isfinite(phases).all(axis=1)
         phases = np.stack([filled(phases[:, k]) for k in range(3)], axis=1)
         phase_angle = follow_phases(phases, rate)
-        channels |= {"phases"}
-    if recording.position_rad is not None:
-        speed = recording.velocity_rad_s
-        usable &= np.isfinite(recording.position_rad)
-        motion = motion_from_position(
-            filled(recording.position_rad),
-            None if speed is None else filled(speed),
-            rate,
-            smoothing,
-        )
-        channels |= {"position", "scale", "logged"}
-        kind = "joint"
-    elif recording.velocity_rad_s is not None:
-        usable &= np.isfinite(recording.velocity_rad_s)
-        motion = motion_from_velocity(filled(recording.velocity_rad_s), rate)
-        channels |= {"position", "scale", "logged"}
-        kind = "joint"
+    if logged:
+        motion, known = _logged_motion(recording, smoothing)
+        usable &= known
     elif phase_angle is not None:
         period = cycle_length(phase_angle.velocity_rad_s)
         if period is not None:
             phase_angle = without_slips(phase_angle, period, rate)
-        scale = 1.0
-        kind = "electrical"
-        if poles and ratio:
-            scale, kind = 1.0 / (poles * ratio), "joint"
-            channels |= {"scale"}
-        motion = _scaled(phase_angle, scale)
+        motion = _scaled(phase_angle, 1.0 if turns is None else 1.0 / turns)
         # Where there is too little current to tell an angle, the motion is a guess.
         usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear
-        channels |= {"position"}
     else:
         msg = "a recording needs a position, a velocity or three phase currents"
         raise ValueError(msg)
 
     electrical = None
     if phases is not None and phase_angle is not None:
-        if recording.position_rad is not None or recording.velocity_rad_s is not None:
-            known = poles * ratio if poles and ratio else None
+        electrical = phase_angle.angle_rad
+        if logged:
             electrical, lag_s = phase_angle.aligned_with(
-                motion.position_rad, motion.velocity, known, rate
+                motion.position_rad, motion.velocity, turns, rate
             )
             if abs(lag_s) * rate <= 1:
                 # Sensors' filters and channels read in turn come to this, no clock does.
                 motion = motion.later(lag_s, rate)
-        else:
-            electrical = phase_angle.angle_rad
         current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
             current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)
-        channels |= {"electrical"}
     elif recording.current_a is not None:
         usable &= np.isfinite(recording.current_a)
         current = filled(recording.current_a)
-        if poles and ratio:
-            electrical = poles * ratio * motion.position_rad
-            channels |= {"electrical"}
+        electrical = None if turns is None else turns * motion.position_rad
     else:
         msg = "a recording needs a signed current or three phase currents"
         raise ValueError(msg)
 
-    machine, angle_kind = motion.position_rad, kind
-    if kind == "joint" and ratio:
+    scaled = logged or turns is not None
+    machine, angle_kind = motion.position_rad, "joint" if scaled else "electrical"
+    if scaled and ratio:
         machine, angle_kind = ratio * motion.position_rad, "motor"
     elif electrical is not None and poles:
         machine, angle_kind = electrical / poles, "motor"
@@ -393,20 +369,21 @@ def _one(
     temperature = recording.temperature_c
     if temperature is not None and not np.isfinite(temperature).any():
         temperature = None
-    if temperature is not None:
-        channels |= {"temperature"}
     others = None
-    if beside and "logged" in channels:
-        channels |= {"others"}
-        paths = [recording.others_rad[axis] for axis in beside]
+    if beside and logged:
+        paths = [filled(recording.others_rad[axis]) for axis in beside]
         others = np.stack(
-            [
-                derivatives(filled(path), rate, motion.window, order)
-                for order in range(3)
-                for path in paths
-            ]
+            [derivatives(path, rate, motion.window, order) for order in range(3) for path in paths]
         ).T
-    n = motion.velocity.size
+    channels = {
+        "position": True,
+        "logged": logged,
+        "scale": scaled,
+        "phases": phases is not None,
+        "electrical": electrical is not None,
+        "temperature": temperature is not None,
+        "others": others is not None,
+    }
     moving = moving_samples(motion, usable)
     # Of vibration the window takes a little everywhere.
     uncertain = max(motion.taken_noise, LEAST_CORNER * float(np.std(motion.acceleration)))
@@ -432,7 +409,7 @@ def _one(
         load_a=np.zeros(n),
         model_a=np.zeros(n),
         joint=joint,
-        channels=frozenset(channels),
+        channels=frozenset(name for name, known in channels.items() if known),
         temperature_c=None if temperature is None else unstepped(filled(temperature)),
         electrical_rad=electrical,
         kernel=motion.kernel,
@@ -441,6 +418,18 @@ def _one(
         others=others,
         other_axes=beside,
     )
+
+
+def _logged_motion(recording: Recording, smoothing: Smoothing | None) -> tuple[Motion, Bools]:
+    """Motion of a logged position or, without one, of a logged speed, and where that is known."""
+    position, speed = recording.position_rad, recording.velocity_rad_s
+    whole = None if speed is None else filled(speed)
+    if position is not None:
+        motion = motion_from_position(filled(position), whole, recording.rate_hz, smoothing)
+        return motion, np.isfinite(position)
+    assert speed is not None
+    assert whole is not None
+    return motion_from_velocity(whole, recording.rate_hz), np.isfinite(speed)
 
 
 def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:

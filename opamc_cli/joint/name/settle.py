@@ -135,5 +135,4 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
 def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:
     """Judge an effect as if it were added last: the same chain in another order."""
     chain = extended(parent, term)
-    gain, t_value = chain.gain_over(parent)
-    return Trial(parent, chain, gain, t_value, objection(chain, parent, pool))
+    return Trial.of(parent, chain, objection(chain, parent, pool))
