@@ -187,22 +187,40 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
         interpretation, ties, order = EITHER, (FLEXSPLINE_TIE,), 2.0
     if track.angle_kind == "electrical":
         interpretation += f" (order {measured:.4g} per motor turn if it has {poles:.0f} pole pairs)"
+    evidence = _evidence(first, measured / poles, resolution)
+    evidence["power_ratio"] = max(line.growth for line in lines)
+    return _read(lines, order / poles, evidence, interpretation, ties, mesh=True)
+
+
+def _evidence(line: Line, order: float, resolution: float) -> Parameters:
+    return {
+        "measured_order": order,
+        "order_error": _error(line, 1.0, resolution),
+        "order_resolution": resolution,
+        "power_ratio": line.growth,
+    }
+
+
+def _read(
+    lines: list[Line],
+    order: float,
+    evidence: Parameters,
+    text: str,
+    ties: tuple[str, ...],
+    effect: str = "ripple",
+    mesh: bool = False,
+) -> Reading:
     return Reading(
-        effect="ripple",
-        parameters={"order": order / poles},
-        interpretation=interpretation,
+        effect=effect,
+        parameters={"order": order},
+        interpretation=text,
         p_value=min(line.p_value for line in lines),
         ties=ties,
-        evidence={
-            "measured_order": measured / poles,
-            "order_error": _error(first, 1.0, resolution),
-            "order_resolution": resolution,
-            "power_ratio": max(line.growth for line in lines),
-        },
+        evidence=evidence,
         lines=tuple(lines),
-        fundamental=order / poles,
-        known=True,
-        mesh=True,
+        fundamental=order,
+        known="unknown" not in text,
+        mesh=mesh,
     )
 
 
@@ -246,19 +264,5 @@ def _other(line: Line, track: Track, resolution: float) -> Reading:
             if f"electrical, {multiple} " in text:
                 effect, ties = name, ("ripple",)
                 text += " (the drive's current measurement, not the gear)"
-    return Reading(
-        effect=effect,
-        parameters={"order": line.order},
-        interpretation=text,
-        p_value=line.p_value,
-        ties=ties,
-        evidence={
-            "measured_order": line.order,
-            "order_error": _error(line, 1.0, resolution),
-            "order_resolution": resolution,
-            "power_ratio": line.growth,
-        },
-        lines=(line,),
-        fundamental=line.order,
-        known="unknown" not in text,
-    )
+    evidence = _evidence(line, line.order, resolution)
+    return _read([line], line.order, evidence, text, ties, effect)
