@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +148,6 @@ def close(
     paths: Runs,
     axes: Sequence[int],
     out: Path,
-    seed: int = 0,
     *,
     jobs: int = 1,
     watch: Watch = unwatched,
@@ -160,11 +158,8 @@ def close(
     ----------
     model, paths, axes, out, jobs, watch
         As of `fit`.
-    seed : int
-        For the decoys.
     """
-    work = partial(_closed, seed)
-    done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
+    done, errors, inputs = on_each_axis(_closed, model, paths, axes, jobs, watch)
     ensure_directory(out)
     candidates = [row for each in done for row in each.candidates]
     fits = [row for each in done for row in each.fit]
@@ -185,9 +180,9 @@ def close(
     return Outcome(entries, tuple(written), tuple(errors))
 
 
-def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
+def _closed(model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
     laid = lay(model, runs, axis)
-    loop = close_loop(laid.fit, laid.library, seed)
+    loop = close_loop(laid.fit, laid.library)
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),
