@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.mains_hum import MainsHum
 from opamc_cli.joint.effects.ripple import Ripple
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines
@@ -36,17 +37,12 @@ class AngleLine(Ripple):
         return self.meaning
 
 
-class Tone(Effect):
+class Tone(MainsHum):
     """A line over time of any frequency."""
 
     unnamed = True
     name = "unnamed_tone"
-    domain = "frequency"
     meaning = "a line over time"
-    searches = ("frequency_hz",)
-    from_motion = True
-    fast = True
-    several = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest frequency of the residual."""
@@ -62,11 +58,6 @@ class Tone(Effect):
         """Up to what the rate can show."""
         return {"frequency_hz": (0.5 * LOWEST_HZ, 0.49 * track.rate_hz)}
 
-    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Half of what two frequencies have to differ by."""
-        return {"frequency_hz": 0.5 / max(float(np.ptp(track.time_s)), 1e-9)}
-
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Cosine and sine of time."""
-        angle = 2 * np.pi * parameters["frequency_hz"] * track.time_s
-        return stack(np.cos(angle), np.sin(angle))
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """Claim nothing."""
+        return self.meaning

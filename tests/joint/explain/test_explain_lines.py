@@ -83,7 +83,7 @@ def test_a_line_over_time_is_sought_from_one_hertz_to_nearly_half_of_the_rate(
 
 
 def test_a_tone_is_cosine_and_sine_of_time():
-    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]))
+    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]), own_clocks_s=())
     columns = Tone().columns(small, {"frequency_hz": 2.0})
     np.testing.assert_allclose(columns, [[1, 0], [0, 1], [-1, 0]], atol=1e-12)
 
