@@ -92,8 +92,8 @@ class Loop:
 def close_loop(before: Fit, library: Library, without_rules: Collection[str] = ()) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
-    The sealed ones are looked at once, at the end. For the ablation rules of
-    `opamc_cli.joint.name.rules` can be switched off.
+    The sealed ones are looked at once, at the end. For the ablation the rules
+    of docs/loop.md can be switched off.
     """
     start = chain_of(before, 0)
     dataset = before.dataset

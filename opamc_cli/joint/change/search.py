@@ -10,6 +10,7 @@ from opamc_cli.joint.change.slow import (
     Prepared,
     Shift,
     prepared,
+    shift_current,
     shifts,
     slow_candidates,
 )
@@ -137,7 +138,7 @@ def _next(
     left = _left(ready, before)
     gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
     most = max(gains.values())
-    if most < SMALLEST_GAIN * max(left - _usual(ready), 0.0) or most <= 0:
+    if most < SMALLEST_GAIN * max(left - _left(ready, None, after=False), 0.0) or most <= 0:
         # Friction differs most between sessions, and what they differ by may happen to hide it.
         surest = min(sure, key=lambda name: sure[name][0])
         if chosen or surest not in ("coulomb", "viscous") or sure[surest][0] > HIDDEN_P:
@@ -284,21 +285,12 @@ def _correlation(one: Floats, other: Floats) -> float:
     return float(np.dot(one, other)) / product if product > 0 else 0.0
 
 
-def _left(ready: list[Prepared], shift: Shift | None) -> float:
-    """Compute the target's mean square beyond the baseline's mean model and a shift."""
-    found = []
-    for one in ready:
-        if one.unit.after:
-            rest = one.residual
-            if shift is not None:
-                rest = rest - one.unit.stacked(shift.terms) @ shift.coefficients
-            found.append(float(np.mean(rest**2)))
-    return float(np.mean(found))
-
-
-def _usual(ready: list[Prepared]) -> float:
-    """Compute the baseline's mean square beyond its mean model."""
-    return float(np.mean([np.mean(one.residual**2) for one in ready if not one.unit.after]))
+def _left(ready: list[Prepared], shift: Shift | None, after: bool = True) -> float:
+    """Mean square of one side's units beyond the baseline's mean model and a shift."""
+    rests = [
+        one.residual - shift_current(one.unit, shift) for one in ready if one.unit.after == after
+    ]
+    return float(np.mean([np.mean(rest**2) for rest in rests]))
 
 
 def _rank(name: str) -> int:

@@ -180,10 +180,14 @@ def slow_candidates(units: list[Unit], effects: list[Effect]) -> list[Term]:
     return found
 
 
-def without(unit: Unit, shift: Shift | None, fine: bool = True) -> Floats:
-    """Take a shift from the target's current; the baseline has none."""
-    current = unit.current_a(fine)
+def shift_current(unit: Unit, shift: Shift | None, fine: bool = False) -> Floats | float:
+    """Compute a shift's own current in a unit of the target; the baseline has none."""
     if shift is None or not unit.after:
-        return current
-    rest: Floats = current - unit.stacked(shift.terms, fine) @ shift.coefficients
+        return 0.0
+    return unit.stacked(shift.terms, fine) @ shift.coefficients
+
+
+def without(unit: Unit, shift: Shift | None, fine: bool = True) -> Floats:
+    """Take a shift from a unit's current."""
+    rest: Floats = unit.current_a(fine) - shift_current(unit, shift, fine)
     return rest

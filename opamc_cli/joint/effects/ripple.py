@@ -271,26 +271,25 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
                 return damage
             for sideband in (-2, -1, 1, 2):
-                if harmonic == 1 and abs(order - tooth - sideband / ratio) < min(
-                    width, 0.35 / ratio
-                ):
-                    if abs(order - 2.0) < 0.35 / ratio:
-                        continue
+                beside = abs(order - tooth - sideband / ratio) < min(width, 0.35 / ratio)
+                if harmonic == 1 and beside and abs(order - 2.0) >= 0.35 / ratio:
                     return f"sideband of {formula}, {damage}"
-    advice = {
-        True: ("check rotor and wave generator", "check the wave generator"),
-        False: ("many healthy gears have it, compare with an earlier recording",) * 2,
-    }[compared]
-    if abs(order - 1) < width:
-        return f"eccentricity, once per motor revolution: {advice[0]}"
-    if abs(order - 2) < width or abs(order - 4) < width:
-        times = "twice" if abs(order - 2) < width else "four times"
-        return f"kinematic error, {times} per wave generator turn: {advice[1]}"
+    healthy = "many healthy gears have it, compare with an earlier recording"
+    rotor = "check rotor and wave generator" if compared else healthy
+    generator = "check the wave generator" if compared else healthy
+    known = [
+        (1, f"eccentricity, once per motor revolution: {rotor}"),
+        (2, f"kinematic error, twice per wave generator turn: {generator}"),
+        (4, f"kinematic error, four times per wave generator turn: {generator}"),
+    ]
     if poles:
-        for multiple in (1, 2, 6):
-            if abs(order - multiple * poles) < width:
-                return f"electrical, {multiple}p per motor revolution: check drive and sensors"
-        for slots in (6, 9, 12, 15, 18, 24, 27, 36):
-            if abs(order - math.lcm(slots, 2 * poles)) < width:
-                return f"cogging of {slots} slots and {2 * poles} poles"
-    return f"unknown periodic source, order {order:.5g} per motor revolution"
+        known += [
+            (k * poles, f"electrical, {k}p per motor revolution: check drive and sensors")
+            for k in (1, 2, 6)
+        ]
+        known += [
+            (math.lcm(slots, 2 * poles), f"cogging of {slots} slots and {2 * poles} poles")
+            for slots in (6, 9, 12, 15, 18, 24, 27, 36)
+        ]
+    unknown = f"unknown periodic source, order {order:.5g} per motor revolution"
+    return next((text for meant, text in known if abs(order - meant) < width), unknown)

@@ -236,26 +236,22 @@ class Fit:
     @cached_property
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
-        dataset = self.dataset
-        shared = dataset.cache.shared
+        parts, track = self.dataset.parts[0], self.dataset.fine.track
+        shared = self.dataset.cache.shared
         if "ones" not in shared:
-            shared["ones"] = np.ones((dataset.fine.track.size, 1))
-        blocks = [dataset.columns(term, fine=True) for term in self.terms]
-        if "stretches" not in shared:
-            shared["stretches"] = dataset.parts[0].stretches(dataset.fine.track.direction)
-        sums = dataset.sums_of([*blocks, shared["ones"]], True)
-        error: Floats = sums.without_drift(shared["stretches"]).held_out()
-        return error
+            shared["ones"] = np.ones((track.size, 1))
+            shared["stretches"] = parts.stretches(track.direction)
+        return self._sums_beside(shared["ones"]).without_drift(shared["stretches"]).held_out()
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
         """Held-out error of each part, with the difference to other windows beside the terms."""
-        dataset = self.dataset
-        blocks = [dataset.columns(term, fine=True) for term in self.terms]
-        blur = dataset.fine.track.blur
-        beside = [] if blur is None else [blur]
-        error: Floats = dataset.sums_of([*blocks, *beside], True).held_out()
-        return error
+        blur = self.dataset.fine.track.blur
+        return self._sums_beside(*(() if blur is None else (blur,))).held_out()
+
+    def _sums_beside(self, *blocks: Floats) -> Sums:
+        own = [self.dataset.columns(term, fine=True) for term in self.terms]
+        return self.dataset.sums_of([*own, *blocks], True)
 
     def forget(self) -> None:
         """Drop what is computed again where it is asked for: a search keeps many fits."""

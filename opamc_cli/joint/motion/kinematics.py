@@ -134,16 +134,9 @@ class Motion:
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
         """Return the motion delayed by a fraction of a sample."""
         time_s = np.arange(self.velocity.size) / rate_hz
-
-        def delayed(values: Floats) -> Floats:
-            return np.interp(time_s - lag_s, time_s, values)
-
-        return replace(
-            self,
-            position_rad=delayed(self.position_rad),
-            velocity=delayed(self.velocity),
-            acceleration=delayed(self.acceleration),
-        )
+        names = ("position_rad", "velocity", "acceleration")
+        late = {name: np.interp(time_s - lag_s, time_s, getattr(self, name)) for name in names}
+        return replace(self, **late)
 
 
 def motion_from_position(

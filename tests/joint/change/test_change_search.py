@@ -127,7 +127,7 @@ def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
 
 
 def test_only_friction_is_a_first_cause_that_the_mean_square_does_not_show(monkeypatch):
-    monkeypatch.setattr(search, "_left", lambda ready, shift: 1.0)
+    monkeypatch.setattr(search, "_left", lambda *given, **named: 1.0)
     assert [cause.effect for cause in causes_of(heavy)] == ["coulomb"]
     assert causes_of(payload, library=only("payload_change")) == []
     assert causes_of(stiff, library=only("spring")) == []
