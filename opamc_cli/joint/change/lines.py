@@ -88,33 +88,22 @@ def clocked(unit: Unit) -> Unit:
 
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     """Half-open stretches of motion in one direction long enough to count orders."""
-    side = np.where(rows, track.direction, 0.0)
-    if "logged" in track.channels:
-        # Samples that do not count, at a corner of the acceleration say, do not end a stroke: the
-        # angle is known on both sides of them.
-        side = _bridged(side, track)
+    # Where the motion is logged, samples that do not count, at a corner of the acceleration say, do
+    # not end a stroke: the angle is known on both sides of them.
+    logged = "logged" in track.channels
+    side = track.direction if logged else np.where(rows, track.direction, 0.0)
     edges = np.flatnonzero(np.diff(side) != 0) + 1
-    edges = np.concatenate([[0], edges, [side.size]])
     shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
     found = []
-    for start, stop in pairwise(edges):
-        angle = track.machine_angle_rad[start:stop]
-        long_enough = stop - start >= FEWEST_SAMPLES
-        if side[start] != 0 and long_enough and np.ptp(angle) >= shortest_rad:
-            found.append((int(start), int(stop)))
+    for first, last in pairwise([0, *edges, side.size]):
+        counted = first + np.flatnonzero(rows[first:last])
+        if side[first] == 0 or not counted.size:
+            continue
+        start, stop = int(counted[0]), int(counted[-1]) + 1
+        travel = np.ptp(track.machine_angle_rad[start:stop])
+        if stop - start >= FEWEST_SAMPLES and travel >= shortest_rad:
+            found.append((start, stop))
     return found
-
-
-def _bridged(side: Floats, track: Track) -> Floats:
-    """Directions with gaps filled inside which the joint goes on in the direction of both ends."""
-    bridged = side.copy()
-    for first, last in track.bounds:
-        known = first + np.flatnonzero(side[first:last])
-        for place in np.flatnonzero(np.diff(known) > 1):
-            start, stop = known[place], known[place + 1]
-            if side[start] == side[stop] and np.all(track.direction[start:stop] == side[start]):
-                bridged[start:stop] = side[start]
-    return bridged
 
 
 def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | None:

@@ -21,7 +21,7 @@ LEAST_SHARE = 0.05
 function without a name, scores that differ by less do not differ."""
 MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
-REFINED, TRIED = 6, 4
+TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
 PROMISING = 0.25
 """Share of the best candidate's fall in the score below which none is refined."""
@@ -149,7 +149,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     ordered = sorted(found.values(), key=lambda candidate: candidate.score)
     least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
     better = []
-    for candidate in [one for one in ordered if one.score < least][:REFINED]:
+    for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
         term = refined(dataset, candidate.term, beside)
         (batch,) = batches_of(dataset, [term], beside.fine)
@@ -167,7 +167,7 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
     The chains that are `known` were tried; they are not tried again, and new ones are added.
     """
     tried = set() if known is None else known
-    ordered = [[candidate.term] for candidate in candidates(chain, pool)[:TRIED]]
+    ordered = [[candidate.term] for candidate in candidates(chain, pool)]
     ordered = [forms for forms in ordered if not forms[0].effect.follows_load]
     found = []
     for forms in (*ordered, *_by_load(chain, pool)):
