@@ -18,7 +18,7 @@ from opamc_cli.joint.motion.track import (
     Floats,
     Ints,
     Track,
-    averaged_blocks,
+    averaged,
     block_mean,
     coarsen,
 )
@@ -229,7 +229,8 @@ class Fit:
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:
                 fast += dataset.columns(term, True) @ values[:, None]
-        fast = averaged_blocks(fast, track.bounds, track.kernel, dataset.factor)
+        smooth = averaged(fast, track.bounds, track.kernel)
+        fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
         return dataset.sums_of([*slow, fast], False).less_last(), slow, fast[:, 0]
 

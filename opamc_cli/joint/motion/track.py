@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
@@ -259,20 +258,6 @@ def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats
     for start, stop in bounds:
         smooth[start:stop] = convolve1d(values[start:stop], kernel, axis=0, mode="nearest")
     return smooth
-
-
-def averaged_blocks(
-    values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats, factor: int
-) -> Floats:
-    """Average blocks of what went through a moving average; one sum of products a block."""
-    weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
-    half = kernel.size // 2
-    parts = []
-    for start, stop in bounds:
-        wide = np.pad(values[start:stop].T, [(0, 0), (half, half)], mode="edge")
-        reached = sliding_window_view(wide, weights.size, axis=1)[:, ::factor]
-        parts.append(reached @ weights)
-    return np.concatenate(parts, axis=1).T
 
 
 def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:

@@ -12,7 +12,6 @@ from opamc_cli.joint.motion.track import (
     Joint,
     Reference,
     averaged,
-    averaged_blocks,
     block_mean,
     coarsen,
     excerpt,
@@ -41,8 +40,7 @@ def test_blocks_end_with_their_recording():
 
 
 @pytest.mark.parametrize("width", [1, 3, 5])
-@pytest.mark.parametrize("factor", [1, 2, 4])
-def test_a_moving_average_keeps_the_last_value_at_both_ends(width, factor):
+def test_a_moving_average_keeps_the_last_value_at_both_ends(width):
     rng = np.random.default_rng(0)
     values = rng.normal(size=(18, 2))
     kernel = rng.random(width)
@@ -54,11 +52,6 @@ def test_a_moving_average_keeps_the_last_value_at_both_ends(width, factor):
             near = np.clip(np.arange(i - half, i + half + 1), start, stop - 1)
             slow[i] = kernel @ values[near]
     np.testing.assert_allclose(averaged(values, BOUNDS, kernel), slow, atol=1e-12)
-    np.testing.assert_allclose(
-        averaged_blocks(values, BOUNDS, kernel, factor),
-        block_mean(slow, BOUNDS, factor),
-        atol=1e-12,
-    )
 
 
 def test_a_reference_stands_for_what_moving_samples_reach():
