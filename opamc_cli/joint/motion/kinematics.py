@@ -33,9 +33,8 @@ SAME_MOTION = 0.98
 LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""
 SLOWEST_SHARE = 0.02
-"""Samples below this share of the top speed do not count: their direction is not certain."""
-LEAST_TRAVEL_RAD = 0.01
-"""Of another joint that moves beside: half a degree; what is less is held still."""
+"""Samples below this share of the top speed do not count: their direction is not certain. Another
+joint that goes less than this share of the way beside is held still."""
 
 
 LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
@@ -293,11 +292,13 @@ def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Axes that every recording holds; none where none of them moves."""
     common = set.intersection(*(set(recording.others_rad) for recording in recordings))
 
-    def moves(axis: int) -> bool:
-        travels = (np.ptp(filled(one.others_rad[axis])) for one in recordings)
-        return bool(max(travels) > LEAST_TRAVEL_RAD)
-
-    return tuple(sorted(common)) if any(moves(axis) for axis in common) else ()
+    moves = any(
+        np.ptp(filled(one.others_rad[axis])) > SLOWEST_SHARE * np.ptp(filled(one.position_rad))
+        for one in recordings
+        for axis in common
+        if one.position_rad is not None
+    )
+    return tuple(sorted(common)) if moves else ()
 
 
 def _one(
