@@ -183,22 +183,15 @@ def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floa
 
 
 def line_power(track: Track, signals: list[Floats]) -> tuple[Floats, Floats]:
-    """Mean power over frequency of signals on one track, see `frequency_lines`."""
-    lines = [frequency_lines(track, signal) for signal in signals]
-    power: Floats = np.mean([line[1] for line in lines], axis=0)
-    return lines[0][0], power
+    """Frequencies in Hz, and the mean power of signals over them in units of white noise's.
 
-
-def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
-    """Frequencies in Hz, and a residual's power over them in units of white noise's.
-
-    Oversampled twice; the residual, shape (n,), is zero where samples do not count. The track gives
-    the rate, and the time that passes between its recordings or pieces.
+    Oversampled twice; signals, (n,) each, are zero where samples do not count. The track gives the
+    rate, and the time that passes between its recordings or pieces.
     """
-    residual = _on_the_clock(track, residual)
-    length = next_fast_len(2 * residual.size, real=True)
-    energy = float(np.dot(residual, residual))
-    power = np.abs(rfft(residual, length)) ** 2 / max(energy, 1e-300)
+    clocked = [_on_the_clock(track, signal) for signal in signals]
+    length = next_fast_len(2 * clocked[0].size, real=True)
+    powers = [np.abs(rfft(one, length)) ** 2 / max(float(one @ one), 1e-300) for one in clocked]
+    power: Floats = np.mean(powers, axis=0)
     return np.arange(power.size) * track.rate_hz / length, power
 
 

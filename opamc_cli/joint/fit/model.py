@@ -73,14 +73,12 @@ class Grid:
     sealed: Bools
     """With `fit`: moving samples of the groups that are open, and of those that are sealed; bool
     arrays of shape (n,)."""
-    slices: tuple[tuple[int, int], ...]
-    """Half-open ranges of the open groups among the `fit` samples."""
 
     @property
     def rows(self) -> list[Ints]:
         """Places of each open group's `fit` samples on the grid."""
         places = np.flatnonzero(self.fit)
-        return [places[start:stop] for start, stop in self.slices]
+        return np.split(places, np.flatnonzero(np.diff(self.track.group[places])) + 1)
 
 
 @dataclass(frozen=True)
@@ -194,12 +192,8 @@ def _dataset(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Datas
 def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
     member = track.moving & (track.group >= 0)
     fit = member & np.isin(track.group, groups)
-    counts = np.bincount(track.group[fit], minlength=max([*groups, 0]) + 1)
-    stops = np.cumsum([counts[g] for g in groups])
-    starts = np.concatenate([[0], stops[:-1]])
-    slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
     track = replace(track, open_samples=fit)
-    return Grid(track, fit, member & np.isin(track.group, sealed), slices)
+    return Grid(track, fit, member & np.isin(track.group, sealed))
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track
+from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track, ranges
 
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
@@ -257,19 +257,12 @@ def build_track(
     rate = recordings[0].rate_hz
     beside = _moving_beside(recordings)
     pieces = [_one(recording, joint, smoothing, beside) for recording in recordings]
-    bounds = []
-    offset = 0
-    clock = 0.0
-    times = []
+    first, clock, times = recordings[0].started_s, 0.0, []
     for recording, piece in zip(recordings, pieces, strict=True):
-        n = piece.size
-        bounds.append((offset, offset + n))
-        offset += n
-        first = recordings[0].started_s
         if recording.started_s is not None and first is not None:
             clock = max(recording.started_s - first, clock)
-        times.append(clock + np.arange(n) / rate)
-        clock += n / rate
+        times.append(clock + piece.time_s)
+        clock += piece.size / rate
     joined: dict[str, Any] = {}
     for name in SAMPLED:
         values = [getattr(piece, name) for piece in pieces]
@@ -280,7 +273,7 @@ def build_track(
     return replace(
         pieces[0],
         **joined | {"time_s": np.concatenate(times)},
-        bounds=tuple(bounds),
+        bounds=ranges(piece.size for piece in pieces),
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),

@@ -1,8 +1,9 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any, Protocol
 
 import numpy as np
@@ -232,6 +233,11 @@ class Regressors(Protocol):
         ...
 
 
+def ranges(lengths: Iterable[int]) -> tuple[tuple[int, int], ...]:
+    """Half-open ranges of so many samples each, one after another."""
+    return tuple(pairwise(accumulate(lengths, initial=0)))
+
+
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
     """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
 
@@ -266,14 +272,11 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     Samples that are not `inside`, bool (n,), lose their group.
     """
     rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
-    stops = np.cumsum([stop - start for start, stop in spans])
-    lengths = [stop - start for start, stop in spans]
-    bounds = tuple((int(b) - n, int(b)) for b, n in zip(stops, lengths, strict=True))
     group = np.where(inside, track.group, -1)
     track = replace(track, group=group)
     sampled = {name: getattr(track, name) for name in SAMPLED}
     taken = {name: values[rows] for name, values in sampled.items() if values is not None}
-    return replace(track, bounds=bounds, **taken)
+    return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
 
 
 def coarsen(track: Track, factor: int) -> Track:
@@ -298,12 +301,6 @@ def coarsen(track: Track, factor: int) -> Track:
             full, position_rad=smooth(track.position_rad), velocity=smooth(track.velocity)
         )
 
-    bounds = []
-    offset = 0
-    for start, stop in track.bounds:
-        blocks = (stop - start) // factor
-        bounds.append((offset, offset + blocks))
-        offset += blocks
     group = mean(track.group.astype(float))
     clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
@@ -316,7 +313,7 @@ def coarsen(track: Track, factor: int) -> Track:
     return replace(
         track,
         rate_hz=track.rate_hz / factor,
-        bounds=tuple(bounds),
+        bounds=ranges((stop - start) // factor for start, stop in track.bounds),
         direction=np.sign(mean(track.direction)),
         moving=moving,
         clear=clear,

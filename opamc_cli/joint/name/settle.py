@@ -103,13 +103,12 @@ def _rivals_of(term: Term, unnamed: Pool) -> Pool:
     A line that shakes the joint is in the measured acceleration, too: what looks at that, or
     filters it, is no rival.
     """
-    library = {name: one for name, one in unnamed.library.items() if not one.fast}
-    if term.effect.fast:
-        library = {
-            name: one
-            for name, one in library.items()
-            if one.domain != "acceleration" and not one.as_smoothing
-        }
+    library = {
+        name: one
+        for name, one in unnamed.library.items()
+        if not one.fast
+        and not (term.effect.fast and (one.domain == "acceleration" or one.as_smoothing))
+    }
     return replace(unnamed, library=library)
 
 
