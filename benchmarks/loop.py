@@ -121,7 +121,7 @@ def run_trial(
     if before is None:
         msg = f"seed {seed} moves too little"
         raise TooLittleError(msg)
-    return Trial("+".join(effects), made, close_loop(before, built_in_library(without)))
+    return Trial("+".join(effects), made, close_loop(before, built_in_library(without), seed))
 
 
 @dataclass(frozen=True)

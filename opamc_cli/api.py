@@ -299,6 +299,7 @@ def close_loop(
     axes: Sequence[int] = (),
     out: AnyPath = OUT,
     settings: Settings | None = None,
+    seed: int = 0,
     jobs: int = 1,
 ) -> ClosedLoop:
     """Find and name what a declared model of a joint lacks, as `opamc model close` does.
@@ -313,6 +314,8 @@ def close_loop(
         From 1; empty: all.
     out, settings
         As of `segment`; options are those of the model, such as ``{"joint.gear_ratio": 100}``.
+    seed
+        Of what is drawn.
     jobs
         Worker processes.
     """
@@ -320,7 +323,7 @@ def close_loop(
     declared = load_joint_model(Path(model), _overrides(settings))
     extended = [path.name for path in folder.glob("model_axis*.yaml")]
     with output_lock(folder), result(folder, *joint_model.CLOSE_FILES, *extended) as staged:
-        done = joint_model.close(declared, find_runs(_paths(runs)), axes, staged, jobs=jobs)
+        done = joint_model.close(declared, find_runs(_paths(runs)), axes, staged, seed, jobs=jobs)
     rows = [
         {**step, "axis": axis["axis"], "parameters": json.dumps(step["parameters"])}
         for axis in done.results

@@ -17,7 +17,7 @@ Contestant = Callable[[Case, list[Logged], tuple[str, ...]], dict[str, Any]]
 def loop(case: Case, recordings: list[Logged], without: tuple[str, ...]) -> dict[str, Any]:
     """Call the package's loop, as it is installed."""
     began = time.process_time()
-    closed = loop_adapter.close(recordings, case.declared, case.gear, without)
+    closed = loop_adapter.close(recordings, case.declared, case.gear, case.seed, without)
     return {**asdict(closed), "seconds": time.process_time() - began}
 
 

@@ -32,6 +32,7 @@ def close(
     recordings: list[Logged],
     declared: tuple[str, ...],
     gear: tuple[float, int] | None,
+    seed: int,
     without_rules: tuple[str, ...] = (),
 ) -> Closed:
     """Close the loop on one joint's recordings.
@@ -60,7 +61,7 @@ def close(
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)
-    loop = close_loop(fit, library, without_rules)
+    loop = close_loop(fit, library, seed, without_rules)
     return Closed(
         loop.rmse_before_a,
         loop.rmse_after_a,

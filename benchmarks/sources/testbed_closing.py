@@ -89,7 +89,7 @@ def close_on_testbed(
 ) -> Loop:
     """Close the loop on a session, with what `sensing` logs; what is missing is not declared."""
     fitted = declared_on_testbed(sensing, seed, names=names)
-    return close_loop(fitted, built_in_library(without))
+    return close_loop(fitted, built_in_library(without), seed)
 
 
 def error_on(healthy_a: Floats, loop: Loop) -> float:

@@ -13,6 +13,7 @@ from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
+from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
 
@@ -25,6 +26,8 @@ class Step:
     """Effect, parameters, and what they take off the error."""
     interpretation: str
     """What it means to a maintainer."""
+    decoy_gain: float
+    """What the same regressors take off a residual whose signs were drawn at random."""
     ties: tuple[str, ...]
     """Effects that explain the data as well."""
     experiment: str | None
@@ -89,7 +92,9 @@ class Loop:
     """What the recordings can tell of orders."""
 
 
-def close_loop(before: Fit, library: Library, without_rules: Collection[str] = ()) -> Loop:
+def close_loop(
+    before: Fit, library: Library, seed: int = 0, without_rules: Collection[str] = ()
+) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
     The sealed ones are looked at once, at the end. For the ablation the rules
@@ -115,7 +120,7 @@ def close_loop(before: Fit, library: Library, without_rules: Collection[str] = (
     for place in reversed(range(final.added)):
         if final.terms[place].effect.unnamed:
             only_named = without(only_named, place)
-    steps = _steps(start, final, named, shares)
+    steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
     # Only now, and only once, are the sealed groups looked at.
@@ -139,7 +144,9 @@ def _with_true_names(
     return best, named, shares
 
 
-def _steps(start: Chain, final: Chain, named: list[Named], shares: dict[int, float]) -> list[Step]:
+def _steps(
+    start: Chain, final: Chain, named: list[Named], shares: dict[int, float], seed: int
+) -> list[Step]:
     by_term = {id(one.term): one for one in named}
     steps: list[Step] = []
     chain = start
@@ -154,6 +161,7 @@ def _steps(start: Chain, final: Chain, named: list[Named], shares: dict[int, flo
             Step(
                 trial=trial.told,
                 interpretation=term.effect.interpretation(term.parameters, track),
+                decoy_gain=decoy_gain(trial.parent, term, seed),
                 ties=ties,
                 experiment=separating_experiment(term.effect.name, ties),
                 fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,

@@ -15,10 +15,10 @@ from opamc_cli.joint.motion.track import Joint
 def close_on(seed, effects, ratio=0.8, without=(), **options):
     base = tuple(name for name in DECLARED if name not in effects)
     made = simulate(seed, effects, ratio, declared=base, **options)
-    return close_recording(made, made.current, base, without)
+    return close_recording(made, made.current, base, without, seed)
 
 
-def close_recording(made, current, base=DECLARED, without=()):
+def close_recording(made, current, base=DECLARED, without=(), seed=0):
     recording = Recording(
         "run",
         made.rate_hz,
@@ -28,7 +28,7 @@ def close_recording(made, current, base=DECLARED, without=()):
     )
     fitted = fit_declared([recording], Joint(made.gear_ratio, made.pole_pairs), base)
     assert fitted is not None
-    return made, close_loop(fitted, built_in_library(without))
+    return made, close_loop(fitted, built_in_library(without), seed)
 
 
 def fit_declared(recordings, joint=None, base=DECLARED):

@@ -51,7 +51,7 @@ def close(names, orders=(), cycles=5):
     ripple = library["ripple"]
     lines = ((ripple, Term(ripple, {"order": order, **forms})) for order in orders)
     declared = (*((library[name], None) for name in names), *lines)
-    return close_loop(best_fit([session], known, lambda _: declared), library)
+    return close_loop(best_fit([session], known, lambda _: declared), library, SEED)
 
 
 @pytest.mark.long

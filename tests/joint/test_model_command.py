@@ -73,7 +73,7 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     step = loop["steps"][0]
     assert step["effect"] == "stribeck"
     assert step["domain"] == "velocity"
-    for key in ("parameters", "interpretation", "gain", "t_value", "p_value", "ties"):
+    for key in ("parameters", "interpretation", "gain", "t_value", "p_value", "decoy_gain", "ties"):
         assert key in step
     assert step["fit_of_name"] > 0.9
     assert step["approximate"] is False

@@ -129,6 +129,7 @@ class Inputs:
                             "interpretation": "kinematic error",
                             "gain": 0.2,
                             "p_value": 0.01,
+                            "decoy_gain": 0.0,
                             "ties": ["coulomb"],
                             "rmse_before_a": 0.1,
                             "rmse_after_a": 0.08,

@@ -90,6 +90,7 @@ def close(
     model: ModelFile = DECLARED,
     overrides: options.Overrides = None,
     axis: Axis = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the decoys.")] = 0,
     out: options.Out = options.DEFAULT_OUT,
     jobs: options.Jobs = options.ALL_CORES,
     as_json: options.Json = False,
@@ -114,7 +115,7 @@ def close(
         output.steps() as steps,
     ):
         outcome = stage.close(
-            declared, find_runs(runs), axis or (), staged, jobs=jobs, watch=steps("close")
+            declared, find_runs(runs), axis or (), staged, seed, jobs=jobs, watch=steps("close")
         )
     output.result(
         {"axes": list(outcome.results)},

@@ -1,12 +1,17 @@
-"""How sure it is that an effect does something."""
+"""How sure it is that an effect does something, and what it does to a residual of chance."""
 
 import numpy as np
 from scipy.special import stdtr
 
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.name.chain import Chain
 
 LEAST_T = 2.0
 """A difference over its standard error, over parts of the open data, that is none below it."""
+
+DECOYS = 5
 
 
 def paired(before: Floats, after: Floats) -> tuple[float, float]:
@@ -19,3 +24,24 @@ def paired(before: Floats, after: Floats) -> tuple[float, float]:
 def p_value(t_value: float, n_parts: int) -> float:
     """Probability of such a t where the effect does nothing."""
     return float(stdtr(max(n_parts - 1, 1), -t_value))
+
+
+def decoy_gain(chain: Chain, term: Term, seed: int) -> float:
+    """Largest held-out gain of an effect on a chain's residual with random signs of its units.
+
+    Share of the residual's sum of squares; mostly below 0.
+    """
+    dataset = chain.fit.dataset
+    fine, _ = dataset.parts
+    columns = fine.taken(dataset.columns(term, fine=True))
+    residual = fine.taken(chain.fit.residual_a)[:, None]
+    gram = fine.products(columns, columns)
+    moment = fine.products(columns, residual)[:, :, 0]
+    power = fine.products(residual, residual)[:, 0, 0]
+    draw = np.random.default_rng(seed)
+    gains = []
+    for _ in range(DECOYS):
+        signs = draw.choice([-1.0, 1.0], size=fine.units)[fine.unit]
+        left = Sums(gram, moment * signs[:, None], power, fine).held_out()
+        gains.append(1.0 - float(left.sum()) / max(float(power.sum()), 1e-300))
+    return max(gains)

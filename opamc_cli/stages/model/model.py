@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,7 @@ def close(
     paths: Runs,
     axes: Sequence[int],
     out: Path,
+    seed: int = 0,
     *,
     jobs: int = 1,
     watch: Watch = unwatched,
@@ -158,8 +160,11 @@ def close(
     ----------
     model, paths, axes, out, jobs, watch
         As of `fit`.
+    seed : int
+        For the decoys.
     """
-    done, errors, inputs = on_each_axis(_closed, model, paths, axes, jobs, watch)
+    work = partial(_closed, seed)
+    done, errors, inputs = on_each_axis(work, model, paths, axes, jobs, watch)
     ensure_directory(out)
     candidates = [row for each in done for row in each.candidates]
     fits = [row for each in done for row in each.fit]
@@ -180,9 +185,9 @@ def close(
     return Outcome(entries, tuple(written), tuple(errors))
 
 
-def _closed(model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
+def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
     laid = lay(model, runs, axis)
-    loop = close_loop(laid.fit, laid.library)
+    loop = close_loop(laid.fit, laid.library, seed)
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),

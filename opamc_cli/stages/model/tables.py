@@ -137,6 +137,7 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
         "gain": step.trial.gain,
         "t_value": step.trial.t_value,
         "p_value": step.trial.p_value,
+        "decoy_gain": step.decoy_gain,
         "ties": ties,
         "separating_experiment": step.experiment,
         "fit_of_name": step.fit_of_name,

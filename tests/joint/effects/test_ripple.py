@@ -49,7 +49,7 @@ def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
     made = simulate(seed, (), 0.0, rate=500.0, kind="quintic")
     wave = np.cos(2 * made.gear_ratio * made.position + 0.4)
     current = made.current + 8 * made.noise_rms * resonant(wave, made.rate_hz)
-    _, loop = close_recording(made, current)
+    _, loop = close_recording(made, current, seed=seed)
     assert [step.term.effect.name for step in loop.steps] == ["ripple"]
     assert loop.steps[0].term.parameters["order"] == pytest.approx(2.0, abs=1e-6)
     assert loop.verdict == "closed"
@@ -62,7 +62,7 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     made = simulate(seed, (), 0.0, rate=500.0)
     made = replace(made, gear_ratio=None, pole_pairs=None)
     current = made.current * (1 + 0.2 * np.cos(160 * made.position + 0.4))
-    _, loop = close_recording(made, current)
+    _, loop = close_recording(made, current, seed=seed)
     assert [step.term.effect.name for step in loop.steps] == ["ripple"]
     assert loop.steps[0].term.parameters["order"] == pytest.approx(160.0, rel=1e-3)
     assert loop.rmse_after_a < 1.1 * made.noise_rms

@@ -1,9 +1,15 @@
-"""Differences over their standard errors."""
+"""Differences over their standard errors, and what an effect makes of a residual of chance."""
 
 import numpy as np
 import pytest
+from closing import joint_of, plain_fit
 
-from opamc_cli.joint.name.significance import p_value, paired
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.significance import decoy_gain, p_value, paired
+
+DRAWS = 5
 
 
 def test_a_difference_and_its_standard_error_over_the_parts():
@@ -25,3 +31,40 @@ def test_a_difference_and_its_standard_error_over_the_parts():
 )
 def test_the_probability_of_a_t_is_student_s(t_value, parts, p):
     assert p_value(t_value, parts) == pytest.approx(p)
+
+
+@pytest.fixture(scope="module")
+def chain():
+    def spring(q, v, a, t):
+        return q
+
+    return chain_of(plain_fit(joint_of("cyclic", spring, strength=5.0, rate=100.0)), 0)
+
+
+def slow_gains(chain, term, seed):
+    """Turn the sign of whole units, and leave each out in turn, by plain least squares."""
+    parts = chain.fit.dataset.parts[0]
+    columns = chain.fit.dataset.columns(term, True)[parts.rows]
+    residual = chain.fit.residual_a[parts.rows]
+    unit = np.repeat(parts.unit, [b - a for a, b in parts.slices])
+    draw = np.random.default_rng(seed)
+    gains = []
+    for _ in range(DRAWS):
+        turned = draw.choice([-1.0, 1.0], size=parts.units)[unit] * residual
+        left = 0.0
+        for number in range(parts.units):
+            rest, mine = unit != number, unit == number
+            values = np.linalg.lstsq(columns[rest], turned[rest])[0]
+            left += float(np.sum((turned[mine] - columns[mine] @ values) ** 2))
+        gains.append(1 - left / float(residual @ residual))
+    return gains
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_decoy_is_the_best_of_five_residuals_with_random_signs(chain, seed):
+    term = Term(built_in_library()["spring"], {})
+    gains = slow_gains(chain, term, seed)
+    assert decoy_gain(chain, term, seed) == pytest.approx(max(gains), rel=1e-6)
+    # The effect is there, and with signs of chance it does not show.
+    assert max(gains) < 0.2
+    assert len(set(gains)) > 1

@@ -125,6 +125,7 @@ def add_loop(out: Path, axis: int = 3, seed: int = 0) -> None:
         "interpretation": "kinematic error, twice per wave generator turn",
         "gain": 0.61,
         "p_value": 3e-6,
+        "decoy_gain": 0.02,
         "ties": [],
         "rmse_before_a": 0.065,
         "rmse_after_a": 0.031,
