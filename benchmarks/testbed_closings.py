@@ -36,7 +36,7 @@ def close_one(effect: str, sensing: str, seed: int, healthy_a: Floats) -> Closin
     return Closing(
         named=any(effect in names for names in names_of(loop)),
         added=tuple(step.term.effect.name for step in loop.steps if step.named),
-        untestable=any(entry.effect == effect for entry in loop.untestable),
+        untestable=effect in loop.untestable,
         verdict=loop.verdict,
         before_a=loop.rmse_before_a,
         after_a=loop.rmse_after_a,

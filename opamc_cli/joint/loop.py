@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
@@ -23,16 +22,10 @@ from opamc_cli.joint.spectra import highest_order, order_resolution
 class Step:
     """An effect that was added, with what spoke for it."""
 
-    term: Term
-    """Effect and parameters."""
+    trial: Tried
+    """Effect, parameters, and what they take off the error."""
     interpretation: str
     """What it means to a maintainer."""
-    gain: float
-    t_value: float
-    p_value: float
-    """With `gain`, `t_value`: share of the held-out error of all the others that it takes away,
-    over its standard error over parts of the data, and the probability of such a ratio by
-    chance."""
     decoy_gain: float
     """What the same regressors take off a residual whose signs were drawn at random."""
     ties: tuple[str, ...]
@@ -48,6 +41,11 @@ class Step:
     """Partial residual."""
 
     @property
+    def term(self) -> Term:
+        """Effect and parameters."""
+        return self.trial.term
+
+    @property
     def approximate(self) -> bool:
         """Whether the form holds less than nine tenths of the curve."""
         return self.fit_of_name < EXACT
@@ -56,26 +54,6 @@ class Step:
     def named(self) -> bool:
         """Whether the step is an effect of the library."""
         return not self.term.effect.unnamed
-
-
-@dataclass(frozen=True)
-class Rejected:
-    """The best form of an effect that was not added, and why."""
-
-    effect: str
-    domain: str
-    parameters: Parameters
-    gain: float
-    p_value: float
-    why: str
-
-
-@dataclass(frozen=True)
-class Untestable:
-    """An effect that the recordings cannot show, and why."""
-
-    effect: str
-    why: str
 
 
 @dataclass(frozen=True)
@@ -89,9 +67,10 @@ class Loop:
     """Effects added, largest first; functions without a name are among them."""
     tried: tuple[tuple[int, Tried], ...]
     """What was asked beside the final model, with the step in whose place it was tried."""
-    rejected: tuple[Rejected, ...]
-    untestable: tuple[Untestable, ...]
-    """With `rejected`: what was not added, and what could not be tried."""
+    rejected: tuple[Tried, ...]
+    """The best form of each effect that was not added, and why."""
+    untestable: dict[str, str]
+    """Effects that the recordings cannot show, and why."""
     ceiling: Ceiling
     """What can be explained of the sealed data without a name."""
     verdict: str
@@ -118,8 +97,8 @@ def close_loop(
 ) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
-    The sealed ones are looked at once, at the end. For the ablation rules of
-    `opamc_cli.joint.name.rules` can be switched off.
+    The sealed ones are looked at once, at the end. For the ablation the rules
+    of docs/loop.md can be switched off.
     """
     start = chain_of(before, 0)
     dataset = before.dataset
@@ -176,16 +155,12 @@ def _steps(
     for place, term in enumerate(final.terms):
         following = extended(chain, term)
         known = by_term.get(id(term))
-        gain, t_value = following.gain_over(chain)
-        trial = Trial(chain, following, gain, t_value, None) if known is None else known.trial
+        trial = Trial.of(chain, following) if known is None else known.trial
         ties = () if known is None else known.ties
         steps.append(
             Step(
-                term=term,
+                trial=trial.told,
                 interpretation=term.effect.interpretation(term.parameters, track),
-                gain=trial.gain,
-                t_value=trial.t_value,
-                p_value=trial.p_value,
                 decoy_gain=decoy_gain(trial.parent, term, seed),
                 ties=ties,
                 experiment=separating_experiment(term.effect.name, ties),
@@ -210,11 +185,13 @@ def _opened(
 ) -> Loop:
     found = ceiling(before, explained)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
-    refused: list[Rejected] = []
+    refused: list[Tried] = []
     if rmse_after > rmse_before:
         # As a whole, or not at all: steps are never chosen among by the sealed data.
-        refused = [_refused(step) for step in steps]
+        why = "does not hold on the sealed data"
+        refused = [replace(step.trial, why_not=why) for step in steps]
         steps, after, rmse_named, rmse_after = [], before, rmse_before, rmse_before
+    added = {one.term.effect.name for one in [step.trial for step in steps] + refused}
     # Where functions without a name explain nothing, all of the error may be there to explain.
     reach = rmse_before**2 * (found.share or 1.0)
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
@@ -239,7 +216,7 @@ def _opened(
         after=after,
         steps=tuple(steps),
         tried=tuple(tried),
-        rejected=(*refused, *_rejected(tried, steps, refused)),
+        rejected=(*refused, *_rejected(tried, added)),
         untestable=untestable(before, library),
         ceiling=found,
         verdict=verdict,
@@ -259,35 +236,22 @@ def _opened(
     )
 
 
-def _refused(step: Step) -> Rejected:
-    effect = step.term.effect
-    why = "does not hold on the sealed data"
-    return Rejected(effect.name, effect.domain, step.term.parameters, step.gain, step.p_value, why)
-
-
-def _rejected(
-    tried: list[tuple[int, Tried]], steps: list[Step], refused: list[Rejected]
-) -> tuple[Rejected, ...]:
-    added = {step.term.effect.name for step in steps} | {one.effect for one in refused}
-    found: dict[str, Rejected] = {}
+def _rejected(tried: list[tuple[int, Tried]], added: set[str]) -> list[Tried]:
+    found: dict[str, Tried] = {}
     for _, trial in tried:
-        effect = trial.term.effect
-        if effect.name in added:
+        name = trial.term.effect.name
+        if name in added or (name in found and trial.gain <= found[name].gain):
             continue
         why = trial.why_not or "another effect explains the residual better"
-        known = found.get(effect.name)
-        if known is None or trial.gain > known.gain:
-            found[effect.name] = Rejected(
-                effect.name, effect.domain, trial.term.parameters, trial.gain, trial.p_value, why
-            )
-    return tuple(sorted(found.values(), key=lambda one: -one.gain))
+        found[name] = replace(trial, why_not=why)
+    return sorted(found.values(), key=lambda one: -one.gain)
 
 
-def untestable(before: Fit, library: Library) -> tuple[Untestable, ...]:
-    """List the effects that the recordings cannot show."""
+def untestable(before: Fit, library: Library) -> dict[str, str]:
+    """Say of the effects that the recordings cannot show why."""
     track = before.dataset.fine.track
-    reasons = ((name, effect.untestable(track)) for name, effect in library.items())
-    return tuple(Untestable(name, why) for name, why in reasons if why is not None)
+    reasons = {name: effect.untestable(track) for name, effect in library.items()}
+    return {name: why for name, why in reasons.items() if why is not None}
 
 
 def _r2(fitted: Fit) -> float:

@@ -1,5 +1,7 @@
 """Order and frequency spectra of a residual, from samples that are uniform in time only."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
@@ -8,6 +10,8 @@ from opamc_cli.joint.motion.track import Floats, Track
 
 OVERSAMPLING = 4
 MOST_BINS = 2**21
+BINS_PER_WAVE = 16
+FEWEST_SAMPLES = 50
 MOST_TIME = 8
 """Pieces of a recording are put on its clock if it is at most so many times as long."""
 NYQUIST_SHARE = 0.9
@@ -44,6 +48,42 @@ def highest_folded(track: Track) -> float:
     return max(highest, min(FOLDED * highest, FOLDED_HZ * per_hz))
 
 
+@dataclass(frozen=True)
+class AngleBins:
+    """Bins of an angle, and the orders of their spectrum, oversampled four times."""
+
+    width_rad: float
+    travel_rad: float
+    """Over which they lie; a longer one is wound up."""
+    orders: Floats
+    """Cycles per revolution, up to the highest; (k,)."""
+
+    @classmethod
+    def of(cls, travel_rad: float, top: float) -> "AngleBins":
+        """Lay bins over a travel, fine enough for the highest order.
+
+        A sample's angle is off by half a bin at most: 16 bins per shortest wave lose 1.3 %. A very
+        long travel is wound up by whole turns.
+        """
+        width, travel = 2 * np.pi / top / BINS_PER_WAVE, travel_rad + 1e-9
+        if travel / width > MOST_BINS:
+            travel = 2 * np.pi * max(int(MOST_BINS * width / (2 * np.pi)), 1)
+        step = 2 * np.pi / (cls._length(travel, width) * width)
+        return cls(width, travel, step * np.arange(int(top / step), dtype=np.float64))
+
+    @staticmethod
+    def _length(travel_rad: float, width_rad: float) -> int:
+        count = int(np.ceil(travel_rad / width_rad)) + 1
+        return int(next_fast_len(OVERSAMPLING * count, real=True))
+
+    def power(self, angle_rad: Floats, values: Floats) -> Floats:
+        """Power over the orders, (k,), of samples at angles from zero on, both (n,)."""
+        places = (angle_rad % self.travel_rad / self.width_rad).astype(np.int64)
+        length = self._length(self.travel_rad, self.width_rad)
+        power: Floats = np.abs(rfft(np.bincount(places, values), length)[: self.orders.size]) ** 2
+        return power
+
+
 def order_spectrum(
     track: Track, residual: Floats, top: float | None = None
 ) -> tuple[Floats, Floats]:
@@ -59,7 +99,7 @@ def order_spectrum(
     """
     valid = track.moving & (residual != 0)
     top = highest_order(track) if top is None else top
-    if valid.sum() < 50 or top <= 0:
+    if valid.sum() < FEWEST_SAMPLES or top <= 0:
         return np.empty(0), np.empty(0)
     angle = track.machine_angle_rad[valid]
     values = residual[valid]
@@ -67,31 +107,15 @@ def order_spectrum(
     fast = speed > np.median(speed)
     forward = track.velocity[valid] > 0
     angle = angle - angle.min()
-    travel = float(angle.max()) + 1e-9
-    # A sample's angle is off by half a bin at most: 16 bins per shortest wave lose 1.3 %.
-    width = 2 * np.pi / top / 16
-    if travel / width > MOST_BINS:
-        turns = max(int(MOST_BINS * width / (2 * np.pi)), 1)
-        angle = angle % (2 * np.pi * turns)
-        travel = 2 * np.pi * turns
-    bins = int(np.ceil(travel / width)) + 1
-    length = next_fast_len(OVERSAMPLING * bins, real=True)
-    index = np.minimum((angle / width).astype(np.int64), bins - 1)
-    kept = int(top * length * width / (2 * np.pi))
-    power = np.zeros(kept)
+    bins = AngleBins.of(float(angle.max()), top)
+    power = np.zeros(bins.orders.size)
     for direction in (forward, ~forward):
         for pace in (fast, ~fast):
             members = direction & pace
-            if members.sum() < 50:
-                continue
-            part = values[members]
-            binned = np.bincount(index[members], weights=part, minlength=bins)
-            energy = float(np.dot(part, part))
-            if energy <= 0:
-                continue
-            power += np.abs(rfft(binned, length)[:kept]) ** 2 / energy
-    orders = np.arange(kept) * 2 * np.pi / (length * width)
-    return orders, power
+            energy = float(np.dot(values[members], values[members]))
+            if members.sum() >= FEWEST_SAMPLES and energy > 0:
+                power += bins.power(angle[members], values[members]) / energy
+    return bins.orders, power
 
 
 def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
@@ -159,22 +183,15 @@ def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floa
 
 
 def line_power(track: Track, signals: list[Floats]) -> tuple[Floats, Floats]:
-    """Mean power over frequency of signals on one track, see `frequency_lines`."""
-    lines = [frequency_lines(track, signal) for signal in signals]
-    power: Floats = np.mean([line[1] for line in lines], axis=0)
-    return lines[0][0], power
+    """Frequencies in Hz, and the mean power of signals over them in units of white noise's.
 
-
-def frequency_lines(track: Track, residual: Floats) -> tuple[Floats, Floats]:
-    """Frequencies in Hz, and a residual's power over them in units of white noise's.
-
-    Oversampled twice; the residual, shape (n,), is zero where samples do not count. The track gives
-    the rate, and the time that passes between its recordings or pieces.
+    Oversampled twice; signals, (n,) each, are zero where samples do not count. The track gives the
+    rate, and the time that passes between its recordings or pieces.
     """
-    residual = _on_the_clock(track, residual)
-    length = next_fast_len(2 * residual.size, real=True)
-    energy = float(np.dot(residual, residual))
-    power = np.abs(rfft(residual, length)) ** 2 / max(energy, 1e-300)
+    clocked = [_on_the_clock(track, signal) for signal in signals]
+    length = next_fast_len(2 * clocked[0].size, real=True)
+    powers = [np.abs(rfft(one, length)) ** 2 / max(float(one @ one), 1e-300) for one in clocked]
+    power: Floats = np.mean(powers, axis=0)
     return np.arange(power.size) * track.rate_hz / length, power
 
 

@@ -81,7 +81,7 @@ def test_the_missing_effect_is_found_alone(effect, sensing, healthy):
 @pytest.mark.parametrize(("effect", "sensing"), sorted(UNTESTABLE))
 def test_what_the_phases_cannot_show_is_said_to_be_untestable(effect, sensing):
     loop = close_on_testbed((effect,), sensing, SEED)
-    reasons = {entry.effect: entry.why for entry in loop.untestable}
+    reasons = loop.untestable
     assert FROM_CURRENT in reasons[effect]
     assert effect not in set().union(*names_of(loop))
 

@@ -7,7 +7,6 @@ import pytest
 from track_of import track_of
 
 from opamc_cli.joint.spectra import (
-    frequency_lines,
     highest_folded,
     highest_order,
     line_power,
@@ -84,13 +83,13 @@ def test_frequency_is_that_of_the_clock_through_what_was_left_out():
     time = track.time_s + np.where(np.arange(track.size) < 1000, 0.0, 7.3)
     two = replace(track, time_s=time, bounds=((0, 1000), (1000, track.size)))
     wave = np.sin(2 * np.pi * 31.7 * time)
-    frequency, power = frequency_lines(two, wave)
+    frequency, power = line_power(two, [wave])
     assert frequency[np.argmax(power)] == pytest.approx(31.7, abs=0.03)
     # Over pauses far longer than what was recorded pieces are laid side by side.
     apart = replace(two, time_s=track.time_s + np.where(np.arange(track.size) < 1000, 0, 1e4))
-    assert frequency_lines(apart, wave)[0].size < 4 * track.size
+    assert line_power(apart, [wave])[0].size < 4 * track.size
     noise = np.random.default_rng(1).normal(size=track.size)
-    assert np.mean(frequency_lines(track, noise)[1]) == pytest.approx(1.0, rel=0.1)
+    assert np.mean(line_power(track, [noise])[1]) == pytest.approx(1.0, rel=0.1)
 
 
 def test_what_phases_pick_up_stands_still_in_their_frame():

@@ -134,7 +134,7 @@ def test_two_runs_of_the_loop_are_equal():
     _, first = close_on(2, ("stribeck",), rate=250.0)
     _, second = close_on(2, ("stribeck",), rate=250.0)
     assert first.rmse_after_a == second.rmse_after_a
-    assert [s.p_value for s in first.steps] == [s.p_value for s in second.steps]
+    assert [s.trial.p_value for s in first.steps] == [s.trial.p_value for s in second.steps]
 
 
 @pytest.mark.long

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.joint.change.lines import strokes
-from opamc_cli.joint.change.slow import Population, Shift, without
+from opamc_cli.joint.change.slow import Population, Shift, shift_current, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import highest_order
@@ -77,15 +77,8 @@ def rest_growth(units: list[Unit], population: Population, shift: Shift | None) 
 
 def shift_power(units: list[Unit], shift: Shift) -> float:
     """Mean square of a shift's own current in the target's units, A^2."""
-    return float(
-        np.mean(
-            [
-                np.mean((unit.stacked(shift.terms) @ shift.coefficients) ** 2)
-                for unit in units
-                if unit.after
-            ]
-        )
-    )
+    powers = [np.mean(shift_current(unit, shift) ** 2) for unit in units if unit.after]
+    return float(np.mean(powers))
 
 
 def comb_energy(units: list[Unit], plain: list[Floats], fundamental: float) -> float:

@@ -1,20 +1,19 @@
 """What changed between two sets of recordings of one joint, as effects of the library."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from opamc_cli.joint.change.energy import energy_of, rest_growth, shift_power
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
-from opamc_cli.joint.change.reading import Reading
+from opamc_cli.joint.change.reading import Finding, Reading
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
 from opamc_cli.joint.change.slow import learn
-from opamc_cli.joint.change.units import Follow, Unit, follow, followed, read_side, usable_terms
-from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.change.units import Follow, follow, followed, read_side, usable_terms
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.track import Floats, Joint
+from opamc_cli.joint.motion.track import Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 """The joint's model; what the recordings cannot show of it is left out."""
@@ -49,32 +48,20 @@ grease let what no effect holds grow fourfold: on eight joints like those of
 """
 
 
-@dataclass(frozen=True)
-class Cause:
-    """One effect that the target has and the baseline has not, or has less of."""
+@dataclass(frozen=True, kw_only=True)
+class Cause(Finding):
+    """A finding with its weight."""
 
-    effect: str
     domain: str
-    """With `effect`: from the library."""
-    parameters: Parameters
-    """Non-linear parameters."""
-    interpretation: str
-    """What it means to a maintainer."""
     share: float
     """Share of the change of the current's mean square beyond the sessions' own differences that it
     explains, 0 to 1."""
-    p_value: float
-    """Probability with which healthy units show as much, corrected for what was tried."""
-    ties: tuple[str, ...]
-    """Effects or readings that explain the change as well."""
     origin: str
     """The effect's: "joint", or "environment", "load", "measurement", which are no fault of it."""
     serious: bool
     """True where it is the joint's and large enough to be called a fault whatever else changed."""
     clear: bool = False
     """True where nothing that all joints have in common could look like it."""
-    evidence: Parameters = field(default_factory=dict)
-    """What was measured, by name."""
 
     @property
     def harmless(self) -> bool:
@@ -160,12 +147,14 @@ def explain_change(
         # The mean square hardly shows the change: its own power is what there is of it.
         moved, gains = powers[-1], np.diff(powers, prepend=0.0)
     whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
-    causes = _slow_entries(units, gains / whole, slow, library)
+    causes = [
+        _slow_cause(found, gain / whole, library) for found, gain in zip(slow, gains, strict=True)
+    ]
     if periodic is not None and periodic.reading.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
         if periodic.reading.known or carries:
             loaded = any(cause.origin == "load" for cause in causes)
-            causes.append(_periodic_entry(periodic.reading, held / whole, library, loaded))
+            causes.append(_periodic_cause(periodic.reading, held / whole, library, loaded))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -188,49 +177,28 @@ def explain_change(
     )
 
 
-def _slow_entries(
-    units: list[Unit], shares: Floats, slow: list[SlowCause], library: Library
-) -> list[Cause]:
-    causes = []
-    for found, unclipped in zip(slow, shares, strict=True):
-        share = float(np.clip(unclipped, 0.0, 1.0))
-        effect = library[found.effect]
-        causes.append(
-            Cause(
-                effect=found.effect,
-                domain=effect.domain,
-                parameters=found.parameters,
-                interpretation=found.note
-                or effect.interpretation(found.parameters, units[-1].fine),
-                share=share,
-                p_value=found.p_value,
-                ties=found.ties,
-                origin=effect.origin,
-                serious=not effect.harmless and share >= FAULT_SHARE,
-            )
-        )
-    return causes
+def _slow_cause(found: SlowCause, unclipped: float, library: Library) -> Cause:
+    share = float(np.clip(unclipped, 0.0, 1.0))
+    return _weighed(found, share, library, serious=share >= FAULT_SHARE)
 
 
-def _periodic_entry(reading: Reading, share: float, library: Library, loaded: bool) -> Cause:
-    effect = library[reading.effect]
-    grown = reading.evidence["power_ratio"] >= CLEAR_GROWTH
+def _periodic_cause(reading: Reading, share: float, library: Library, loaded: bool) -> Cause:
+    ratio = reading.evidence["power_ratio"]
+    grown, doubled = ratio >= CLEAR_GROWTH, reading.mesh and ratio >= GROWTH
+    enough = share >= FAULT_SHARE and grown if loaded else share >= FAULT_SHARE or doubled
     clear = reading.mesh and grown
-    if loaded:
-        enough = share >= FAULT_SHARE and grown
-    else:
-        doubled = reading.mesh and reading.evidence["power_ratio"] >= GROWTH
-        enough = share >= FAULT_SHARE or doubled
+    return _weighed(reading, share, library, serious=clear or enough, clear=clear)
+
+
+def _weighed(
+    found: Finding, share: float, library: Library, serious: bool, clear: bool = False
+) -> Cause:
+    effect = library[found.effect]
     return Cause(
-        effect=reading.effect,
+        **{one.name: getattr(found, one.name) for one in fields(Finding)},
         domain=effect.domain,
-        parameters=reading.parameters,
-        interpretation=reading.interpretation,
         share=share,
-        p_value=min(line.p_value for line in reading.lines),
-        ties=reading.ties,
         origin=effect.origin,
-        serious=clear or (not effect.harmless and enough),
+        serious=serious and not effect.harmless,
         clear=clear,
-        evidence=reading.evidence,
     )

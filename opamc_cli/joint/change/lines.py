@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.change.moderated import moderated_t
@@ -12,14 +11,18 @@ from opamc_cli.joint.change.slow import Shift, without
 from opamc_cli.joint.change.units import Unit, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.spectra import LOWEST_ORDER, OVERSAMPLING, highest_order, vertex
+from opamc_cli.joint.spectra import (
+    FEWEST_SAMPLES,
+    LOWEST_ORDER,
+    OVERSAMPLING,
+    AngleBins,
+    highest_order,
+    vertex,
+)
 
-MOST_BINS = 2**19
-BINS_PER_WAVE = 16
 SHORTEST_STROKE = 0.4
 """Cycles of the lowest order that is looked for: a turn of the motor."""
 
-FEWEST_SAMPLES = 50
 LARGEST_P = 5e-3
 SMALLEST_RATIO = 2.0
 """A line has to hold twice its power in the baseline, and twice its neighbours' growth."""
@@ -85,33 +88,22 @@ def clocked(unit: Unit) -> Unit:
 
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     """Half-open stretches of motion in one direction long enough to count orders."""
-    side = np.where(rows, track.direction, 0.0)
-    if "logged" in track.channels:
-        # Samples that do not count, at a corner of the acceleration say, do not end a stroke: the
-        # angle is known on both sides of them.
-        side = _bridged(side, track)
+    # Where the motion is logged, samples that do not count, at a corner of the acceleration say, do
+    # not end a stroke: the angle is known on both sides of them.
+    logged = "logged" in track.channels
+    side = track.direction if logged else np.where(rows, track.direction, 0.0)
     edges = np.flatnonzero(np.diff(side) != 0) + 1
-    edges = np.concatenate([[0], edges, [side.size]])
     shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
     found = []
-    for start, stop in pairwise(edges):
-        angle = track.machine_angle_rad[start:stop]
-        long_enough = stop - start >= FEWEST_SAMPLES
-        if side[start] != 0 and long_enough and np.ptp(angle) >= shortest_rad:
-            found.append((int(start), int(stop)))
+    for first, last in pairwise([0, *edges, side.size]):
+        counted = first + np.flatnonzero(rows[first:last])
+        if side[first] == 0 or not counted.size:
+            continue
+        start, stop = int(counted[0]), int(counted[-1]) + 1
+        travel = np.ptp(track.machine_angle_rad[start:stop])
+        if stop - start >= FEWEST_SAMPLES and travel >= shortest_rad:
+            found.append((start, stop))
     return found
-
-
-def _bridged(side: Floats, track: Track) -> Floats:
-    """Directions with gaps filled inside which the joint goes on in the direction of both ends."""
-    bridged = side.copy()
-    for first, last in track.bounds:
-        known = first + np.flatnonzero(side[first:last])
-        for place in np.flatnonzero(np.diff(known) > 1):
-            start, stop = known[place], known[place + 1]
-            if side[start] == side[stop] and np.all(track.direction[start:stop] == side[start]):
-                bridged[start:stop] = side[start]
-    return bridged
 
 
 def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | None:
@@ -127,33 +119,25 @@ def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | 
     tops = [highest_order(unit.fine) for unit, _, _ in pieces]
     if not pieces or min(tops) <= 0:
         return None
-    top = min(tops)
-    width = 2 * np.pi / top / BINS_PER_WAVE
-    bins = int(np.ceil(max(travels) / width)) + 1
-    if bins > MOST_BINS:
-        return None
-    length = next_fast_len(OVERSAMPLING * bins, real=True)
+    bins = AngleBins.of(max(travels), min(tops))
     # long strokes carry the energy: their resolution is what the sum has
     resolution = 2 * np.pi / float(np.average(travels, weights=travels))
-    kept = int(top * length * width / (2 * np.pi))
-    orders = np.arange(kept) * 2 * np.pi / (length * width)
-    first = int(
-        np.searchsorted(orders, max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution))
-    )
+    lowest = max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution)
+    first = int(np.searchsorted(bins.orders, lowest))
     rows: dict[bool, list[Floats]] = {False: [], True: []}
     for unit, residual, cut in pieces:
-        power = np.zeros(kept)
+        power = np.zeros(bins.orders.size)
         samples = 0
         for start, stop in cut:
             angle = unit.fine.machine_angle_rad[start:stop]
-            index = ((angle - angle.min()) / width).astype(np.int64)
-            binned = np.bincount(index, weights=residual[start:stop], minlength=bins)
-            power += np.abs(rfft(binned[:bins], length)[:kept]) ** 2
+            power += bins.power(angle - angle.min(), residual[start:stop])
             samples += int(np.count_nonzero(residual[start:stop]))
         rows[unit.after].append(power[first:] / samples)
     if len(rows[False]) < 2 or not rows[True]:
         return None
-    return OrderSpectra(orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution)
+    return OrderSpectra(
+        bins.orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution
+    )
 
 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
@@ -190,14 +174,7 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         around = around[around < orders.size]
         if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
             continue
-        line = _line(
-            spectra,
-            peak,
-            guard,
-            growth=float(np.exp(growth[peak])),
-            excess=float(excess[peak]),
-            p_value=float(p_values[peak]),
-        )
+        line = _line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak])
         if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
             found.append(line)
     return found
@@ -222,7 +199,7 @@ def _line(
         error=error,
         reference=float(np.median(before)) if has_line else None,
         reference_error=scatter / np.sqrt(before.size),
-        growth=growth,
-        excess=excess,
-        p_value=p_value,
+        growth=float(np.exp(growth)),
+        excess=float(excess),
+        p_value=float(p_value),
     )

@@ -1,7 +1,7 @@
 """What lines over the motor angle mean that the target has and the baseline has not."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,21 +39,28 @@ KINEMATIC_TIE = "kinematic error of the wave generator (order 2), which does not
 FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
 
 
-@dataclass(frozen=True)
-class Reading:
-    """What the lines say."""
+@dataclass(frozen=True, kw_only=True)
+class Finding:
+    """An effect that the target has and the baseline has not, or has less of."""
 
     effect: str
     """Name in the library."""
     parameters: Parameters
-    """Order per revolution of the track's machine angle."""
-    evidence: Parameters
-    """The order as measured, its error, the smallest difference of orders that a stroke can tell
-    apart, and by which factor the power of the line has grown."""
+    """Non-linear parameters; orders are per revolution of the track's machine angle."""
     interpretation: str
-    """To a maintainer."""
+    """What it means to a maintainer."""
+    p_value: float
+    """Probability with which healthy units show as much, corrected for what was tried."""
     ties: tuple[str, ...]
-    """Effects or readings that the data cannot tell from it."""
+    """Effects or readings that explain the change as well."""
+    evidence: Parameters = field(default_factory=dict)
+    """What was measured, by name."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reading(Finding):
+    """What the lines say."""
+
     lines: tuple[Line, ...]
     """Those that belong to it."""
     fundamental: float
@@ -86,14 +93,20 @@ def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
     mains = min(multiples, key=lambda frequency: abs(frequency - line.order))
     if abs(line.order - mains) > resolution_hz:
         return None
-    evidence = {
-        "measured_frequency_hz": line.order,
-        "frequency_resolution_hz": resolution_hz,
-        "power_ratio": line.growth,
-    }
-    parameters = {"frequency_hz": mains}
     return Reading(
-        "mains_hum", parameters, evidence, MainsHum.meaning, (), (line,), line.order, True
+        effect="mains_hum",
+        parameters={"frequency_hz": mains},
+        interpretation=MainsHum.meaning,
+        p_value=line.p_value,
+        ties=(),
+        evidence={
+            "measured_frequency_hz": line.order,
+            "frequency_resolution_hz": resolution_hz,
+            "power_ratio": line.growth,
+        },
+        lines=(line,),
+        fundamental=line.order,
+        known=True,
     )
 
 
@@ -172,20 +185,43 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
         order = 2 * (ratio + 1) / ratio if ratio else measured
     else:
         interpretation, ties, order = EITHER, (FLEXSPLINE_TIE,), 2.0
-    growth = max(line.growth for line in lines)
     if track.angle_kind == "electrical":
         interpretation += f" (order {measured:.4g} per motor turn if it has {poles:.0f} pole pairs)"
-    evidence = {
-        "measured_order": measured / poles,
-        "order_error": _error(first, 1.0, resolution),
+    evidence = _evidence(first, measured / poles, resolution)
+    evidence["power_ratio"] = max(line.growth for line in lines)
+    return _read(lines, order / poles, evidence, interpretation, ties, mesh=True)
+
+
+def _evidence(line: Line, order: float, resolution: float) -> Parameters:
+    return {
+        "measured_order": order,
+        "order_error": _error(line, 1.0, resolution),
         "order_resolution": resolution,
-        "power_ratio": growth,
+        "power_ratio": line.growth,
     }
-    named_order = order / poles
+
+
+def _read(
+    lines: list[Line],
+    order: float,
+    evidence: Parameters,
+    text: str,
+    ties: tuple[str, ...],
+    effect: str = "ripple",
+    mesh: bool = False,
+) -> Reading:
     return Reading(
-        "ripple", {"order": named_order}, evidence, interpretation, ties, tuple(lines),
-        named_order, known=True, mesh=True,
-    )  # fmt: skip
+        effect=effect,
+        parameters={"order": order},
+        interpretation=text,
+        p_value=min(line.p_value for line in lines),
+        ties=ties,
+        evidence=evidence,
+        lines=tuple(lines),
+        fundamental=order,
+        known="unknown" not in text,
+        mesh=mesh,
+    )
 
 
 def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> tuple[float, float]:
@@ -220,12 +256,6 @@ def _meant(order: float, track: Track, resolution: float) -> float:
 
 
 def _other(line: Line, track: Track, resolution: float) -> Reading:
-    evidence = {
-        "measured_order": line.order,
-        "order_error": _error(line, 1.0, resolution),
-        "order_resolution": resolution,
-        "power_ratio": line.growth,
-    }
     text = read_order(_meant(line.order, track, resolution), track)
     effect = "ripple"
     ties: tuple[str, ...] = ()
@@ -234,5 +264,5 @@ def _other(line: Line, track: Track, resolution: float) -> Reading:
             if f"electrical, {multiple} " in text:
                 effect, ties = name, ("ripple",)
                 text += " (the drive's current measurement, not the gear)"
-    known = "unknown" not in text
-    return Reading(effect, {"order": line.order}, evidence, text, ties, (line,), line.order, known)
+    evidence = _evidence(line, line.order, resolution)
+    return _read([line], line.order, evidence, text, ties, effect)

@@ -1,14 +1,16 @@
 """Which slow effects of the library acted in the target alone."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from opamc_cli.joint.change.reading import Finding
 from opamc_cli.joint.change.slow import (
     Population,
     Prepared,
     Shift,
     prepared,
+    shift_current,
     shifts,
     slow_candidates,
 )
@@ -63,22 +65,12 @@ SMALLEST_WARMTH_C = 2.0
 LARGEST_COLD_FACTOR = 2.0
 
 
-@dataclass(frozen=True)
-class SlowCause:
-    """A slow effect that changed."""
+@dataclass(frozen=True, kw_only=True)
+class SlowCause(Finding):
+    """A slow effect that changed; for the temperature its parameters say how much warmer it was."""
 
-    effect: str
-    """From the library."""
-    parameters: Parameters
-    """Non-linear parameters and, for the temperature, how much colder it was."""
-    note: str
-    """What it means, where the effect itself does not say enough."""
     shift: Shift
     """Jointly with the causes before it."""
-    p_value: float
-    """Corrected for what was tried."""
-    ties: tuple[str, ...]
-    """Effects whose contribution is nearly the same."""
 
 
 def find_slow_causes(
@@ -113,23 +105,7 @@ def find_slow_causes(
         if cause.effect == "thermal_viscous":
             gone |= GREASE
         candidates = [term for term in candidates if term.effect.name not in gone]
-    return _one_grease(ready, population, found)
-
-
-def _one_grease(
-    ready: list[Prepared], population: Population, found: list[SlowCause]
-) -> list[SlowCause]:
-    """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
-    names = [cause.effect for cause in found]
-    pair = {"thermal_viscous", "coulomb"}
-    if not pair <= set(names) or not _mostly_wet(*_relative(ready, population)):
-        return found
-    first, last = sorted(names.index(name) for name in pair)
-    one = [*found]
-    one[first] = replace(found[names.index("thermal_viscous")], shift=found[first].shift)
-    # Each cause's shift holds those before it: what comes before the later one takes it over.
-    one[last - 1] = replace(one[last - 1], shift=found[last].shift)
-    return [*one[:last], *one[last + 1 :]]
+    return found
 
 
 def _next(
@@ -162,7 +138,7 @@ def _next(
     left = _left(ready, before)
     gains = {name: left - _left(ready, shift) for name, (_, shift) in sure.items()}
     most = max(gains.values())
-    if most < SMALLEST_GAIN * max(left - _usual(ready), 0.0) or most <= 0:
+    if most < SMALLEST_GAIN * max(left - _left(ready, None, after=False), 0.0) or most <= 0:
         # Friction differs most between sessions, and what they differ by may happen to hide it.
         surest = min(sure, key=lambda name: sure[name][0])
         if chosen or surest not in ("coulomb", "viscous") or sure[surest][0] > HIDDEN_P:
@@ -186,9 +162,18 @@ def _next(
             ("spring", *(tie for tie in ties if tie != "payload_change")),
         )
     p_value, shift = sure[first]
-    cause = SlowCause(first, dict(shift.terms[-1].parameters), "", shift, p_value, ties)
+    parameters = dict(shift.terms[-1].parameters)
+    meaning = library[first].interpretation(parameters, ready[-1].unit.fine)
     if first == "payload_change":
-        return replace(cause, parameters={}, note="another payload (check the tool, not the gear)")
+        parameters, meaning = {}, "another payload (check the tool, not the gear)"
+    cause = SlowCause(
+        effect=first,
+        parameters=parameters,
+        interpretation=meaning,
+        shift=shift,
+        p_value=p_value,
+        ties=ties,
+    )
     if {first, *ties} & GREASE:
         return _friction(ready, population, cause, library)
     return cause
@@ -225,7 +210,8 @@ def _friction(
     if ready[0].unit.fine.temperature_c is not None:
         return cause  # as warm as ever
     dry, wet = _relative(ready, population)
-    if _mostly_wet(dry, wet) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
+    as_cold = abs(wet) > 2 * abs(dry)
+    if as_cold and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
         return _thermal(cause.shift, cause.p_value, ties, None)
     return cause
 
@@ -233,17 +219,23 @@ def _friction(
 def _thermal(
     shift: Shift, p_value: float, ties: tuple[str, ...], warmer: float | None
 ) -> SlowCause:
-    if warmer is None:
-        note = (
-            "colder or warmer grease: friction that grows with the speed has changed (no "
-            "temperature was logged: compare at equal temperature, and look at the grease if it "
-            "remains)"
-        )
-        return SlowCause("thermal_viscous", {}, note, shift, p_value, ties)
-    word = "warmer" if warmer > 0 else "colder"
-    note = f"{word} grease (by {abs(warmer):.0f} °C; it is stiffer when cold), not a fault"
-    parameters = {"warmer_c": warmer}
-    return SlowCause("thermal_viscous", parameters, note, shift, p_value, ties)
+    parameters: Parameters = {}
+    meaning = (
+        "colder or warmer grease: friction that grows with the speed has changed (no temperature "
+        "was logged: compare at equal temperature, and look at the grease if it remains)"
+    )
+    if warmer is not None:
+        parameters = {"warmer_c": warmer}
+        word = "warmer" if warmer > 0 else "colder"
+        meaning = f"{word} grease (by {abs(warmer):.0f} °C; it is stiffer when cold), not a fault"
+    return SlowCause(
+        effect="thermal_viscous",
+        parameters=parameters,
+        interpretation=meaning,
+        shift=shift,
+        p_value=p_value,
+        ties=ties,
+    )
 
 
 def _warmer(ready: list[Prepared]) -> float | None:
@@ -267,25 +259,14 @@ def _plausible(ready: list[Prepared], population: Population, shift: Shift, warm
 
 def _relative(ready: list[Prepared], population: Population) -> tuple[float, float]:
     """Relative changes of dry and of viscous friction."""
-    places = {}
-    first = 0
-    for term in population.terms:
-        places[term.effect.name] = first
-        first += term.columns(ready[0].unit.coarse).shape[1]
     mean = np.mean(
         [own_fit(one.unit, population.terms)[0] for one in ready if one.unit.after], axis=0
     )
-    changes = []
-    for name in ("coulomb", "viscous"):
-        at = places.get(name)
-        before = 0.0 if at is None else float(population.mean[at])
-        changes.append(0.0 if at is None or before == 0 else float(mean[at]) / before - 1)
-    return changes[0], changes[1]
-
-
-def _mostly_wet(dry: float, wet: float) -> bool:
-    """Tell whether friction changed as grease of another temperature changes it."""
-    return abs(wet) > 2 * abs(dry)
+    changes = {"coulomb": 0.0, "viscous": 0.0}
+    for name, before, after in zip(population.names, population.mean, mean, strict=True):
+        if name in changes and before != 0:
+            changes[name] = float(after / before - 1)
+    return changes["coulomb"], changes["viscous"]
 
 
 def _contribution(ready: list[Prepared], shift: Shift) -> Floats:
@@ -304,21 +285,12 @@ def _correlation(one: Floats, other: Floats) -> float:
     return float(np.dot(one, other)) / product if product > 0 else 0.0
 
 
-def _left(ready: list[Prepared], shift: Shift | None) -> float:
-    """Compute the target's mean square beyond the baseline's mean model and a shift."""
-    found = []
-    for one in ready:
-        if one.unit.after:
-            rest = one.residual
-            if shift is not None:
-                rest = rest - one.unit.stacked(shift.terms) @ shift.coefficients
-            found.append(float(np.mean(rest**2)))
-    return float(np.mean(found))
-
-
-def _usual(ready: list[Prepared]) -> float:
-    """Compute the baseline's mean square beyond its mean model."""
-    return float(np.mean([np.mean(one.residual**2) for one in ready if not one.unit.after]))
+def _left(ready: list[Prepared], shift: Shift | None, after: bool = True) -> float:
+    """Mean square of one side's units beyond the baseline's mean model and a shift."""
+    rests = [
+        one.residual - shift_current(one.unit, shift) for one in ready if one.unit.after == after
+    ]
+    return float(np.mean([np.mean(rest**2) for rest in rests]))
 
 
 def _rank(name: str) -> int:

@@ -37,6 +37,8 @@ class Population:
     """Of the coarse grid's residual."""
     power: float
     """Mean square of the slow current."""
+    names: tuple[str, ...]
+    """Effect of each coefficient."""
     between: float
     """Variance, in shares of the slow current's power, by which sessions differ beyond what units
     of one session can show."""
@@ -83,24 +85,18 @@ def learn(units: list[Unit], terms: tuple[Term, ...], between: float = 0.0) -> P
     sizes = np.mean([np.mean(unit.stacked(terms) ** 2, axis=0) for unit in units], axis=0)
     power = float(np.mean([np.mean(unit.current_a() ** 2) for unit in units]))
     centre = np.median(sample, axis=0)
-    own = [
-        np.full(
-            units[0].columns(term).shape[1], 0.0 if term.effect.carries_load else FRICTION_SPREAD
-        )
-        for term in terms
-    ]
-    prior = np.diag(
-        (np.concatenate(own) * centre) ** 2 + COMMON_SPREAD**2 * power / np.maximum(sizes, 1e-300)
-    )
+    owners = [term.effect for term in terms for _ in units[0].columns(term).T]
+    own = np.array([0.0 if one.carries_load else FRICTION_SPREAD for one in owners])
+    prior = np.diag((own * centre) ** 2 + COMMON_SPREAD**2 * power / np.maximum(sizes, 1e-300))
     prior += GAIN_SPREAD**2 * np.outer(centre, centre)
     # Where sessions differ more than is expected, friction is what differs most.
-    names = np.repeat([term.effect.domain for term in terms], [part.size for part in own])
-    friction = np.flatnonzero(names == "velocity")
+    friction = np.flatnonzero([one.domain == "velocity" for one in owners])
     ratio = float(np.median(np.var(sample, axis=0, ddof=1) / np.diag(prior)))
     prior[np.ix_(friction, friction)] *= max(ratio, 1.0)
     variance = float(np.median([np.mean(residual**2) for _, residual in fits]))
     covariance = moderated_covariance(sample, prior)
-    return Population(terms, sample.mean(axis=0), covariance, variance, power, between)
+    names = tuple(one.name for one in owners)
+    return Population(terms, sample.mean(axis=0), covariance, variance, power, names, between)
 
 
 def prepared(units: list[Unit], population: Population) -> list[Prepared]:
@@ -184,10 +180,14 @@ def slow_candidates(units: list[Unit], effects: list[Effect]) -> list[Term]:
     return found
 
 
-def without(unit: Unit, shift: Shift | None, fine: bool = True) -> Floats:
-    """Take a shift from the target's current; the baseline has none."""
-    current = unit.current_a(fine)
+def shift_current(unit: Unit, shift: Shift | None, fine: bool = False) -> Floats | float:
+    """Compute a shift's own current in a unit of the target; the baseline has none."""
     if shift is None or not unit.after:
-        return current
-    rest: Floats = current - unit.stacked(shift.terms, fine) @ shift.coefficients
+        return 0.0
+    return unit.stacked(shift.terms, fine) @ shift.coefficients
+
+
+def without(unit: Unit, shift: Shift | None, fine: bool = True) -> Floats:
+    """Take a shift from a unit's current."""
+    rest: Floats = unit.current_a(fine) - shift_current(unit, shift, fine)
     return rest

@@ -27,8 +27,6 @@ class Unit:
     fine: Track
     coarse: Track
     """With `fine`: the recording at its own rate, and averaged to about 100 Hz."""
-    factor: int
-    """Samples per coarse one."""
     fine_rows: Bools
     coarse_rows: Bools
     """With `fine_rows`: samples of the unit that count."""
@@ -38,12 +36,11 @@ class Unit:
     _coarse_columns: dict[object, Floats] = field(init=False, repr=False, default_factory=dict)
 
     def columns(self, term: Term, fine: bool = False) -> Floats:
-        """Regressors of a term on the unit's own samples; fast ones are averaged, not resampled."""
+        """Regressors of a slow term on the unit's own samples."""
         if fine:
             return term.columns(self.fine)[self.fine_rows]
         if term.key not in self._coarse_columns:
-            whole = term.averaged(self.fine, self.coarse, self.factor)
-            self._coarse_columns[term.key] = whole[self.coarse_rows]
+            self._coarse_columns[term.key] = term.columns(self.coarse)[self.coarse_rows]
         return self._coarse_columns[term.key]
 
     def stacked(self, terms: tuple[Term, ...], fine: bool = False) -> Floats:
@@ -96,7 +93,7 @@ def read_side(
         group = grouping.group if cycles else np.where(grouping.group >= 0, 0, -1)
         fine = replace(track, group=group)
         width = 1.0 / float(np.sum(fine.kernel**2))
-        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), fine.quiet, 1)
+        factor = max(int(fine.rate_hz / COARSE_RATE_HZ), int(0.8 * width), 1)
         coarse = coarsen(fine, factor)
         members = _cycles(fine, grouping.names) if cycles else [fine.group >= 0]
         for member in members:
@@ -104,7 +101,7 @@ def read_side(
             rows = moving & fine.clear
             slow = block_mean(moving.astype(float), fine.bounds, factor) > 1 - 1e-9
             if np.count_nonzero(slow & coarse.moving) >= FEWEST_SAMPLES:
-                units.append(Unit(fine, coarse, factor, rows, slow & coarse.moving, after))
+                units.append(Unit(fine, coarse, rows, slow & coarse.moving, after))
     return units
 
 

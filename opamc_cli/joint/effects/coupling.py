@@ -4,7 +4,7 @@ import numpy as np
 
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.motion.kinematics import LEAST_TRAVEL_RAD
+from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
 from opamc_cli.joint.motion.track import Floats, Track
 
 FORMS = (
@@ -43,7 +43,8 @@ class Coupling(Effect):
         if track.others is None:
             return []
         travels = np.ptp(track.others[:, : len(track.other_axes)], axis=0)
-        moving = zip(track.other_axes, travels > LEAST_TRAVEL_RAD, strict=True)
+        least = SLOWEST_SHARE * np.ptp(track.position_rad)
+        moving = zip(track.other_axes, travels > least, strict=True)
         return [{"axis": float(axis)} for axis, moves in moving if moves]
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

@@ -1,6 +1,7 @@
 """Friction that builds up over some travel after a reversal."""
 
 import numpy as np
+from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.motion.track import Floats, Track
@@ -45,30 +46,16 @@ class Hysteresis(Effect):
         return float(np.ptp(track.position_rad[track.moving]))
 
 
+@njit(cache=True)
 def dahl_state(position_rad: Floats, length_rad: float) -> Floats:
     """Solve Dahl's equation ``dz/dq = (1 - z sgn(dq)) / length`` along a path, (n,).
 
     The state lies between -1 and 1 and starts at 0; exact for a path that is monotone between
     samples.
     """
-    steps = np.diff(position_rad, prepend=position_rad[:1])
-    direction = np.sign(steps)
-    # Stand-still keeps the direction of the last move, so that stretches are few.
-    index = np.maximum.accumulate(np.where(direction != 0, np.arange(steps.size), 0))
-    direction = direction[index]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(direction) != 0) + 1])
-    path = np.cumsum(np.abs(steps))
-    begun = np.concatenate([[0.0], path[edges[1:] - 1]])
-    length = np.diff(begun, append=path[-1:])
-    # Only the states at the reversals follow from one another; the rest is one expression.
-    before, state = [], 0.0
-    for target, decay in zip(
-        direction[edges].tolist(), np.exp(-length / length_rad).tolist(), strict=True
-    ):
-        before.append(state)
-        state = target + (state - target) * decay
-    counts = np.diff(edges, append=position_rad.size)
-    travelled = path - np.repeat(begun, counts)
-    away = np.repeat(np.array(before) - direction[edges], counts)
-    settled: Floats = direction + away * np.exp(-travelled / length_rad)
-    return settled
+    states = np.zeros(position_rad.size)
+    for n in range(1, position_rad.size):
+        step = position_rad[n] - position_rad[n - 1]
+        settled = np.sign(step)
+        states[n] = settled + (states[n - 1] - settled) * np.exp(-abs(step) / length_rad)
+    return states

@@ -1,7 +1,5 @@
 """Pick-up from the mains."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
@@ -14,28 +12,16 @@ TOLERANCE = 0.005
 SAME_START_S = 1e-3
 
 
-@dataclass(frozen=True)
-class _Line:
-    """A multiple of the mains, and where the sampling rate folds it to."""
-
-    true_hz: float
-    shown_hz: float
-
-
-def _mains_lines(rate_hz: float) -> list[_Line]:
+def _mains_lines(rate_hz: float) -> list[tuple[float, float]]:
+    """Where the sampling rate shows multiples of the mains, and how far from it they may lie."""
     lines = []
     for mains in MAINS_HZ:
         for harmonic in range(1, HIGHEST_HARMONIC + 1):
             line = mains * harmonic
             folded = abs((line + rate_hz / 2) % rate_hz - rate_hz / 2)
             if 5 <= folded <= 0.48 * rate_hz:
-                lines.append(_Line(line, folded))
+                lines.append((folded, max(TOLERANCE * line, 0.1)))
     return lines
-
-
-def _reach_hz(line: _Line) -> float:
-    """How far from a multiple of the mains' nominal frequency a line may lie."""
-    return max(TOLERANCE * line.true_hz, 0.1)
 
 
 class MainsHum(Effect):
@@ -63,10 +49,9 @@ class MainsHum(Effect):
         found: list[tuple[float, float, float]] = []
         for turning, signals in standing_views(track, residual):
             frequencies, power = line_power(track, signals)
-            for line in _mains_lines(track.rate_hz):
-                reach = _reach_hz(line)
-                first = int(np.searchsorted(frequencies, line.shown_hz - reach))
-                last = int(np.searchsorted(frequencies, line.shown_hz + reach, side="right"))
+            for shown_hz, reach_hz in _mains_lines(track.rate_hz):
+                first = int(np.searchsorted(frequencies, shown_hz - reach_hz))
+                last = int(np.searchsorted(frequencies, shown_hz + reach_hz, side="right"))
                 if last > first:
                     best = first + int(np.argmax(power[first:last]))
                     found.append((float(power[best]), float(frequencies[best]), float(turning)))

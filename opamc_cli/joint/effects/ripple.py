@@ -68,12 +68,10 @@ class Ripple(Effect):
     def _density(self, track: Track, order: float, power: float) -> float:
         """Choose how many filters per octave a line may be worth; 0 where it has no answer."""
         top_hz = _top_hz(track, order)
-        if order > highest_order(track):
-            # Its frequency is not the one that the samples show.
+        if order > highest_order(track) or top_hz <= LOWEST_HZ:
+            # Its frequency is not the one that the samples show, or nothing answers to it.
             return 0.0
-        if top_hz <= LOWEST_HZ:
-            return 0.0
-        turns = order * float(np.ptp(track.machine_angle_rad[track.moving])) / (2 * math.pi)
+        turns = order / order_resolution(track)
         for least, density in FILTERS_PER_OCTAVE.items():
             # With fewer turns than pairs of coefficients in each direction a wave takes the form
             # of any friction.
@@ -144,9 +142,8 @@ class Ripple(Effect):
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
         order = parameters["order"]
-        travel = float(np.ptp(track.machine_angle_rad[track.moving]))
         nearest = min(named_orders(track, order), key=lambda named: abs(named - order))
-        close = abs(nearest - order) < 0.25 * 2 * math.pi / travel
+        close = abs(nearest - order) < 0.25 * order_resolution(track)
         return parameters | {"order": nearest} if close else parameters
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
@@ -261,8 +258,7 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
             "counted per motor revolution)"
         )
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
-    travel = float(np.ptp(track.machine_angle_rad[track.moving]))
-    width = min(0.35 * 2 * math.pi / travel, 0.25)
+    width = min(0.35 * order_resolution(track), 0.25)
     if ratio:
         for harmonic, (formula, teeth) in product((1, 2), meshes(ratio)):
             tooth = 2 * teeth / ratio * harmonic
@@ -275,26 +271,25 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
                 return damage
             for sideband in (-2, -1, 1, 2):
-                if harmonic == 1 and abs(order - tooth - sideband / ratio) < min(
-                    width, 0.35 / ratio
-                ):
-                    if abs(order - 2.0) < 0.35 / ratio:
-                        continue
+                beside = abs(order - tooth - sideband / ratio) < min(width, 0.35 / ratio)
+                if harmonic == 1 and beside and abs(order - 2.0) >= 0.35 / ratio:
                     return f"sideband of {formula}, {damage}"
-    advice = {
-        True: ("check rotor and wave generator", "check the wave generator"),
-        False: ("many healthy gears have it, compare with an earlier recording",) * 2,
-    }[compared]
-    if abs(order - 1) < width:
-        return f"eccentricity, once per motor revolution: {advice[0]}"
-    if abs(order - 2) < width or abs(order - 4) < width:
-        times = "twice" if abs(order - 2) < width else "four times"
-        return f"kinematic error, {times} per wave generator turn: {advice[1]}"
+    healthy = "many healthy gears have it, compare with an earlier recording"
+    rotor = "check rotor and wave generator" if compared else healthy
+    generator = "check the wave generator" if compared else healthy
+    known = [
+        (1, f"eccentricity, once per motor revolution: {rotor}"),
+        (2, f"kinematic error, twice per wave generator turn: {generator}"),
+        (4, f"kinematic error, four times per wave generator turn: {generator}"),
+    ]
     if poles:
-        for multiple in (1, 2, 6):
-            if abs(order - multiple * poles) < width:
-                return f"electrical, {multiple}p per motor revolution: check drive and sensors"
-        for slots in (6, 9, 12, 15, 18, 24, 27, 36):
-            if abs(order - math.lcm(slots, 2 * poles)) < width:
-                return f"cogging of {slots} slots and {2 * poles} poles"
-    return f"unknown periodic source, order {order:.5g} per motor revolution"
+        known += [
+            (k * poles, f"electrical, {k}p per motor revolution: check drive and sensors")
+            for k in (1, 2, 6)
+        ]
+        known += [
+            (math.lcm(slots, 2 * poles), f"cogging of {slots} slots and {2 * poles} poles")
+            for slots in (6, 9, 12, 15, 18, 24, 27, 36)
+        ]
+    unknown = f"unknown periodic source, order {order:.5g} per motor revolution"
+    return next((text for meant, text in known if abs(order - meant) < width), unknown)

@@ -7,8 +7,6 @@ from numba import njit
 
 from opamc_cli.joint.motion.track import Floats, Ints
 
-Quadratic = tuple[float, float, float]
-
 
 def answers(
     signals: Sequence[Floats],
@@ -38,9 +36,10 @@ def answers(
         All k signals through the low-pass, of gain 1 at rest; then through the band-pass, the
         low-pass's rate of change in units of the resonance.
     """
-    # The bilinear transform bends frequencies; start from the bent one.
-    w = 2 * rate_hz * np.tan(rad_per_s / (2 * rate_hz))
-    zeros, poles = discrete((0.0, 0.0, w * w), (1.0, 2 * damping * w, w * w), rate_hz)
+    # The bilinear transform bends frequencies; start from the bent one, as a share of twice the
+    # rate.
+    w = np.tan(rad_per_s / (2 * rate_hz))
+    poles = np.array([1 + 2 * damping * w + w * w, 2 * (w * w - 1), 1 - 2 * damping * w + w * w])
     size = signals[0].size
     places = np.arange(size)
     if rows is not None:
@@ -54,7 +53,7 @@ def answers(
         j = min(i + 1, last)
         out_of_both = (found[i], found[j], found[len(signals) + i], found[len(signals) + j])
         both = (signals[i], signals[j])
-        _put_through(both, edges, poles, zeros[0], 2 * rate_hz / w, places, out_of_both)
+        _put_through(both, edges, poles / poles[0], w * w / poles[0], 1 / w, places, out_of_both)
     return found
 
 
@@ -85,22 +84,3 @@ def _put_through(
                 band[place] = steeper * (poled - b)
                 band_of_other[place] = steeper * (poled_other - d)
             a, b, c, d = poled, a, poled_other, c
-
-
-def discrete(above: Quadratic, below: Quadratic, rate_hz: float) -> tuple[Floats, Floats]:
-    """Bilinear transform of a filter of second order, given by its coefficients of s^2, s and 1.
-
-    Returns those of 1, 1/z and 1/z^2 above and below; the denominator begins with 1.
-    `scipy.signal.bilinear` returns the same by way of polynomial objects, at a hundred times the
-    cost.
-    """
-    k = 2 * rate_hz
-
-    def in_z(s: Quadratic) -> Floats:
-        square, linear, constant = s[0] * k * k, s[1] * k, s[2]
-        return np.array(
-            [square + linear + constant, 2 * (constant - square), square - linear + constant]
-        )
-
-    first = in_z(below)[0]
-    return in_z(above) / first, in_z(below) / first

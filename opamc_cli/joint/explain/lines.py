@@ -2,62 +2,47 @@
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.motion.track import Floats, Ints, Track
-from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines, order_resolution
+from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.mains_hum import MainsHum
+from opamc_cli.joint.effects.ripple import Ripple
+from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines
 
 LOWEST_HZ = 1.0
 HIGHEST_SHARE = 0.48
 
 
-class AngleLine(Effect):
+class AngleLine(Ripple):
     """A line over the motor's angle, which may follow speed, direction and the model's current."""
 
     unnamed = True
     name = "unnamed_order"
-    domain = "motor-angle"
     meaning = "a line over the angle"
-    needs = ("position",)
-    searches = ("order",)
-    fast = True
-    several = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest orders of the residual."""
-        return [{"order": order} for order, _ in order_lines(track, residual, count=2)]
+        follows = dict.fromkeys(("speed", "direction", "current"), 1.0)
+        return [{"order": order, **follows} for order, _ in order_lines(track, residual, count=2)]
 
-    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
+        """None: all that a line may follow is explained."""
+        return []
+
+    def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Any order."""
-        return {"order": (0.0, 1e6)}
+        return parameters
 
-    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Half of what two orders have to differ by."""
-        return {"order": 0.5 * order_resolution(track)}
-
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Cosine and sine, times one, speed, direction and the model's current."""
-        return self.columns_at(track, parameters, np.arange(track.size))
-
-    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
-        """Likewise."""
-        angle = parameters["order"] * track.machine_angle_rad[rows]
-        speed = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
-        parts = (np.ones(rows.size), speed, track.direction[rows], track.model_a[rows])
-        waves = (np.cos(angle), np.sin(angle))
-        return stack(*(part * wave for part in parts for wave in waves))
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """Claim nothing."""
+        return self.meaning
 
 
-class Tone(Effect):
+class Tone(MainsHum):
     """A line over time of any frequency."""
 
     unnamed = True
     name = "unnamed_tone"
-    domain = "frequency"
     meaning = "a line over time"
-    searches = ("frequency_hz",)
-    from_motion = True
-    fast = True
-    several = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest frequency of the residual."""
@@ -73,11 +58,6 @@ class Tone(Effect):
         """Up to what the rate can show."""
         return {"frequency_hz": (0.5 * LOWEST_HZ, 0.49 * track.rate_hz)}
 
-    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Half of what two frequencies have to differ by."""
-        return {"frequency_hz": 0.5 / max(float(np.ptp(track.time_s)), 1e-9)}
-
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Cosine and sine of time."""
-        angle = 2 * np.pi * parameters["frequency_hz"] * track.time_s
-        return stack(np.cos(angle), np.sin(angle))
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """Claim nothing."""
+        return self.meaning

@@ -18,7 +18,7 @@ from opamc_cli.joint.motion.track import (
     Floats,
     Ints,
     Track,
-    averaged_blocks,
+    averaged,
     block_mean,
     coarsen,
 )
@@ -52,12 +52,6 @@ class Term:
         columns = self.effect.columns_at(track, self.parameters, rows)
         return columns if self.keep is None else columns[:, self.keep]
 
-    def averaged(self, fine: Track, coarse: Track, factor: int) -> Floats:
-        """Regressors on a coarse track; fast ones are averaged, not resampled."""
-        if not self.effect.fast:
-            return self.columns(coarse)
-        return averaged_blocks(self.columns(fine), fine.bounds, fine.kernel, factor)
-
     @cached_property
     def key(self) -> tuple[object, ...]:
         """What makes two terms the same."""
@@ -79,14 +73,12 @@ class Grid:
     sealed: Bools
     """With `fit`: moving samples of the groups that are open, and of those that are sealed; bool
     arrays of shape (n,)."""
-    slices: tuple[tuple[int, int], ...]
-    """Half-open ranges of the open groups among the `fit` samples."""
 
     @property
     def rows(self) -> list[Ints]:
         """Places of each open group's `fit` samples on the grid."""
         places = np.flatnonzero(self.fit)
-        return [places[start:stop] for start, stop in self.slices]
+        return np.split(places, np.flatnonzero(np.diff(self.track.group[places])) + 1)
 
 
 @dataclass(frozen=True)
@@ -200,12 +192,8 @@ def _dataset(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Datas
 def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
     member = track.moving & (track.group >= 0)
     fit = member & np.isin(track.group, groups)
-    counts = np.bincount(track.group[fit], minlength=max([*groups, 0]) + 1)
-    stops = np.cumsum([counts[g] for g in groups])
-    starts = np.concatenate([[0], stops[:-1]])
-    slices = tuple((int(a), int(b)) for a, b in zip(starts, stops, strict=True) if b > a)
-    track = replace(track, open_samples=fit, kept={})
-    return Grid(track, fit, member & np.isin(track.group, sealed), slices)
+    track = replace(track, open_samples=fit)
+    return Grid(track, fit, member & np.isin(track.group, sealed))
 
 
 @dataclass(frozen=True)
@@ -235,33 +223,30 @@ class Fit:
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:
                 fast += dataset.columns(term, True) @ values[:, None]
-        fast = averaged_blocks(fast, track.bounds, track.kernel, dataset.factor)
+        smooth = averaged(fast, track.bounds, track.kernel)
+        fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
         return dataset.sums_of([*slow, fast], False).less_last(), slow, fast[:, 0]
 
     @cached_property
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
-        dataset = self.dataset
-        shared = dataset.cache.shared
+        parts, track = self.dataset.parts[0], self.dataset.fine.track
+        shared = self.dataset.cache.shared
         if "ones" not in shared:
-            shared["ones"] = np.ones((dataset.fine.track.size, 1))
-        blocks = [dataset.columns(term, fine=True) for term in self.terms]
-        if "stretches" not in shared:
-            shared["stretches"] = dataset.parts[0].stretches(dataset.fine.track.direction)
-        sums = dataset.sums_of([*blocks, shared["ones"]], True)
-        error: Floats = sums.without_drift(shared["stretches"]).held_out()
-        return error
+            shared["ones"] = np.ones((track.size, 1))
+            shared["stretches"] = parts.stretches(track.direction)
+        return self._sums_beside(shared["ones"]).without_drift(shared["stretches"]).held_out()
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
         """Held-out error of each part, with the difference to other windows beside the terms."""
-        dataset = self.dataset
-        blocks = [dataset.columns(term, fine=True) for term in self.terms]
-        blur = dataset.fine.track.blur
-        beside = [] if blur is None else [blur]
-        error: Floats = dataset.sums_of([*blocks, *beside], True).held_out()
-        return error
+        blur = self.dataset.fine.track.blur
+        return self._sums_beside(*(() if blur is None else (blur,))).held_out()
+
+    def _sums_beside(self, *blocks: Floats) -> Sums:
+        own = [self.dataset.columns(term, fine=True) for term in self.terms]
+        return self.dataset.sums_of([*own, *blocks], True)
 
     def forget(self) -> None:
         """Drop what is computed again where it is asked for: a search keeps many fits."""

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from opamc_cli.joint.least_squares import inverse
-from opamc_cli.joint.motion.track import Bools, Floats, Ints
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, ranges
 
 FEWEST_UNITS = 8
 """Units that are left out in turn: fewer groups than that are halved until they suffice."""
@@ -128,8 +128,7 @@ def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
                     rows.append(chosen)
                     unit.append(number)
                     judged.append(kind)
-    stops = np.cumsum([piece.size for piece in rows])
-    slices = tuple((int(b) - piece.size, int(b)) for b, piece in zip(stops, rows, strict=True))
+    slices = ranges(piece.size for piece in rows)
     return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged))
 
 

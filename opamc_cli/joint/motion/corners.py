@@ -6,6 +6,7 @@ over: broad in frequency, the same in every cycle, and well fitted by sines of t
 """
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d
 
 from opamc_cli.joint.motion.track import Bools, Floats, averaged
 
@@ -48,9 +49,5 @@ def clear_of_corners(
 
 def widened(rows: Bools, reach: int) -> Bools:
     """Rows that are true, or at most `reach` from one that is."""
-    change = np.zeros(rows.size + 1, dtype=np.int64)
-    at = np.flatnonzero(rows)
-    np.add.at(change, np.maximum(at - reach, 0), 1)
-    np.add.at(change, np.minimum(at + reach + 1, rows.size), -1)
-    wide: Bools = np.cumsum(change[:-1]) > 0
+    wide: Bools = maximum_filter1d(rows, 2 * reach + 1, mode="constant")
     return wide

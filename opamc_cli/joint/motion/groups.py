@@ -8,9 +8,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 REPEAT_ERROR = 0.02
-COARSE_REPEAT_ERROR = 0.3
-"""At 50 Hz a cycle is rarely a whole number of samples: first look with a wide mesh."""
-MOST_DIPS = 30
+LONGEST_SHARE = 0.7
 SEALED_SHARE = 0.27
 BLOCKS_WITHOUT_CYCLES = 12
 SEALED_BLOCKS = (2, 5, 9)
@@ -35,40 +33,23 @@ class Grouping:
     """"""
 
 
-def cycle_length(path: Floats, rate_hz: float) -> int | None:
+def cycle_length(path: Floats) -> int | None:
     """Shortest lag, in samples, at which the speed (or position) of a recording repeats itself.
 
     None where it does not. A lag counts if the mean square of ``path[t + lag] - path[t]`` is below
-    2 % of twice the variance and at least half of the recording overlaps with itself, or 60 % of a
-    cycle.
+    2 % of twice the variance, up to 70 % of the recording; of such neighbours the best.
     """
-    factor = max(int(rate_hz // 50), 1)
-    usable = path.size // factor * factor
-    coarse = path[:usable].reshape(-1, factor).mean(axis=1)
-    n = coarse.size
-    variance = float(np.var(coarse))
+    n, variance = path.size, float(np.var(path))
     if n < 16 or variance <= 0:
         return None
-    lags = np.arange(1, int(n * 0.7))
-    mismatch = _mismatch(coarse)[lags] / (2 * variance)
+    mismatch = _mismatch(path)[: int(n * LONGEST_SHARE)] / (2 * variance)
     # Everything looks alike at short lags: first leave that neighbourhood.
-    away = np.flatnonzero(mismatch > 0.5)
-    if not away.size:
+    away = int(np.argmax(mismatch > 0.5))
+    alike = np.flatnonzero(mismatch[away:] < REPEAT_ERROR) + away
+    if not away or not alike.size:
         return None
-    inner = mismatch[1:-1]
-    dips = np.flatnonzero((inner <= mismatch[:-2]) & (inner <= mismatch[2:])) + 1
-    dips = dips[(dips > away[0]) & (mismatch[dips] < COARSE_REPEAT_ERROR)]
-    if not dips.size:
-        return None
-    mismatch = _mismatch(path)
-    limit = REPEAT_ERROR * 2 * float(np.var(path))
-    for dip in dips[:MOST_DIPS]:
-        near = int(lags[dip]) * factor
-        first = max(near - factor, 1)
-        lag = first + int(np.argmin(mismatch[first : near + factor + 1]))
-        if mismatch[lag] < limit:
-            return lag
-    return None
+    near = mismatch[alike[0] : alike[0] + alike[0] // 10 + 1]
+    return int(alike[0] + np.argmin(near))
 
 
 def _mismatch(path: Floats) -> Floats:

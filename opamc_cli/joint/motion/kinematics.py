@@ -20,12 +20,11 @@ from opamc_cli.joint.motion.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
-    quiet_block,
     smoothing_window,
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track
+from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track, ranges
 
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
@@ -34,9 +33,8 @@ SAME_MOTION = 0.98
 LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""
 SLOWEST_SHARE = 0.02
-"""Samples below this share of the top speed do not count: their direction is not certain."""
-LEAST_TRAVEL_RAD = 0.01
-"""Of another joint that moves beside: half a degree; what is less is held still."""
+"""Samples below this share of the top speed do not count: their direction is not certain. Another
+joint that goes less than this share of the way beside is held still."""
 
 
 LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
@@ -123,8 +121,6 @@ class Motion:
     """Standard deviation of the speed's noise."""
     kernel: Floats
     """Moving average that the acceleration has gone through."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
     None."""
@@ -137,16 +133,9 @@ class Motion:
     def later(self, lag_s: float, rate_hz: float) -> "Motion":
         """Return the motion delayed by a fraction of a sample."""
         time_s = np.arange(self.velocity.size) / rate_hz
-
-        def delayed(values: Floats) -> Floats:
-            return np.interp(time_s - lag_s, time_s, values)
-
-        return replace(
-            self,
-            position_rad=delayed(self.position_rad),
-            velocity=delayed(self.velocity),
-            acceleration=delayed(self.acceleration),
-        )
+        names = ("position_rad", "velocity", "acceleration")
+        late = {name: np.interp(time_s - lag_s, time_s, getattr(self, name)) for name in names}
+        return replace(self, **late)
 
 
 def motion_from_position(
@@ -190,7 +179,7 @@ def _smoothed(
 ) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
-    noise, spread = measurement_noise(path), float(np.std(values[-1]))
+    noise = measurement_noise(path)
     return Motion(
         position_rad=values[0],
         velocity=values[-2],
@@ -198,7 +187,6 @@ def _smoothed(
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        quiet=quiet_block(noise, spread, rate_hz, window, derivative),
         blur=blurred(path, rate_hz, window, derivative) if beside else None,
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
@@ -269,19 +257,12 @@ def build_track(
     rate = recordings[0].rate_hz
     beside = _moving_beside(recordings)
     pieces = [_one(recording, joint, smoothing, beside) for recording in recordings]
-    bounds = []
-    offset = 0
-    clock = 0.0
-    times = []
+    first, clock, times = recordings[0].started_s, 0.0, []
     for recording, piece in zip(recordings, pieces, strict=True):
-        n = piece.size
-        bounds.append((offset, offset + n))
-        offset += n
-        first = recordings[0].started_s
         if recording.started_s is not None and first is not None:
             clock = max(recording.started_s - first, clock)
-        times.append(clock + np.arange(n) / rate)
-        clock += n / rate
+        times.append(clock + piece.time_s)
+        clock += piece.size / rate
     joined: dict[str, Any] = {}
     for name in SAMPLED:
         values = [getattr(piece, name) for piece in pieces]
@@ -292,11 +273,10 @@ def build_track(
     return replace(
         pieces[0],
         **joined | {"time_s": np.concatenate(times)},
-        bounds=tuple(bounds),
+        bounds=ranges(piece.size for piece in pieces),
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
-        quiet=max(piece.quiet for piece in pieces),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
@@ -305,91 +285,69 @@ def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Axes that every recording holds; none where none of them moves."""
     common = set.intersection(*(set(recording.others_rad) for recording in recordings))
 
-    def moves(axis: int) -> bool:
-        travels = (np.ptp(filled(one.others_rad[axis])) for one in recordings)
-        return bool(max(travels) > LEAST_TRAVEL_RAD)
-
-    return tuple(sorted(common)) if any(moves(axis) for axis in common) else ()
+    moves = any(
+        np.ptp(filled(one.others_rad[axis])) > SLOWEST_SHARE * np.ptp(filled(one.position_rad))
+        for one in recordings
+        for axis in common
+        if one.position_rad is not None
+    )
+    return tuple(sorted(common)) if moves else ()
 
 
 def _one(
     recording: Recording, joint: Joint, smoothing: Smoothing | None, beside: tuple[int, ...]
 ) -> Track:
-    rate = recording.rate_hz
+    rate, n = recording.rate_hz, recording.size
     ratio, poles = joint.gear_ratio, joint.pole_pairs
-    channels: set[str] = set()
-    phase_angle: PhaseAngle | None = None
-    phases = recording.phases_a
-    usable = np.ones(recording.size, dtype=bool)
+    turns = poles * ratio if poles and ratio else None
+    logged = recording.position_rad is not None or recording.velocity_rad_s is not None
+    phases, phase_angle = recording.phases_a, None
+    usable = np.ones(n, dtype=bool)
     if phases is not None:
         usable &= np.isfinite(phases).all(axis=1)
         phases = np.stack([filled(phases[:, k]) for k in range(3)], axis=1)
         phase_angle = follow_phases(phases, rate)
-        channels |= {"phases"}
-    if recording.position_rad is not None:
-        speed = recording.velocity_rad_s
-        usable &= np.isfinite(recording.position_rad)
-        motion = motion_from_position(
-            filled(recording.position_rad),
-            None if speed is None else filled(speed),
-            rate,
-            smoothing,
-        )
-        channels |= {"position", "scale", "logged"}
-        kind = "joint"
-    elif recording.velocity_rad_s is not None:
-        usable &= np.isfinite(recording.velocity_rad_s)
-        motion = motion_from_velocity(filled(recording.velocity_rad_s), rate)
-        channels |= {"position", "scale", "logged"}
-        kind = "joint"
+    if logged:
+        motion, known = _logged_motion(recording, smoothing)
+        usable &= known
     elif phase_angle is not None:
-        period = cycle_length(phase_angle.velocity_rad_s, rate)
+        period = cycle_length(phase_angle.velocity_rad_s)
         if period is not None:
             phase_angle = without_slips(phase_angle, period, rate)
-        scale = 1.0
-        kind = "electrical"
-        if poles and ratio:
-            scale, kind = 1.0 / (poles * ratio), "joint"
-            channels |= {"scale"}
-        motion = _scaled(phase_angle, scale)
+        motion = _scaled(phase_angle, 1.0 if turns is None else 1.0 / turns)
         # Where there is too little current to tell an angle, the motion is a guess.
         usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear
-        channels |= {"position"}
     else:
         msg = "a recording needs a position, a velocity or three phase currents"
         raise ValueError(msg)
 
     electrical = None
     if phases is not None and phase_angle is not None:
-        if recording.position_rad is not None or recording.velocity_rad_s is not None:
-            known = poles * ratio if poles and ratio else None
+        electrical = phase_angle.angle_rad
+        if logged:
             electrical, lag_s = phase_angle.aligned_with(
-                motion.position_rad, motion.velocity, known, rate
+                motion.position_rad, motion.velocity, turns, rate
             )
             if abs(lag_s) * rate <= 1:
                 # Sensors' filters and channels read in turn come to this, no clock does.
                 motion = motion.later(lag_s, rate)
-        else:
-            electrical = phase_angle.angle_rad
         current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
             current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)
-        channels |= {"electrical"}
     elif recording.current_a is not None:
         usable &= np.isfinite(recording.current_a)
         current = filled(recording.current_a)
-        if poles and ratio:
-            electrical = poles * ratio * motion.position_rad
-            channels |= {"electrical"}
+        electrical = None if turns is None else turns * motion.position_rad
     else:
         msg = "a recording needs a signed current or three phase currents"
         raise ValueError(msg)
 
-    machine, angle_kind = motion.position_rad, kind
-    if kind == "joint" and ratio:
+    scaled = logged or turns is not None
+    machine, angle_kind = motion.position_rad, "joint" if scaled else "electrical"
+    if scaled and ratio:
         machine, angle_kind = ratio * motion.position_rad, "motor"
     elif electrical is not None and poles:
         machine, angle_kind = electrical / poles, "motor"
@@ -398,20 +356,21 @@ def _one(
     temperature = recording.temperature_c
     if temperature is not None and not np.isfinite(temperature).any():
         temperature = None
-    if temperature is not None:
-        channels |= {"temperature"}
     others = None
-    if beside and "logged" in channels:
-        channels |= {"others"}
-        paths = [recording.others_rad[axis] for axis in beside]
+    if beside and logged:
+        paths = [filled(recording.others_rad[axis]) for axis in beside]
         others = np.stack(
-            [
-                derivatives(filled(path), rate, motion.window, order)
-                for order in range(3)
-                for path in paths
-            ]
+            [derivatives(path, rate, motion.window, order) for order in range(3) for path in paths]
         ).T
-    n = motion.velocity.size
+    channels = {
+        "position": True,
+        "logged": logged,
+        "scale": scaled,
+        "phases": phases is not None,
+        "electrical": electrical is not None,
+        "temperature": temperature is not None,
+        "others": others is not None,
+    }
     moving = moving_samples(motion, usable)
     # Of vibration the window takes a little everywhere.
     uncertain = max(motion.taken_noise, LEAST_CORNER * float(np.std(motion.acceleration)))
@@ -437,16 +396,27 @@ def _one(
         load_a=np.zeros(n),
         model_a=np.zeros(n),
         joint=joint,
-        channels=frozenset(channels),
+        channels=frozenset(name for name, known in channels.items() if known),
         temperature_c=None if temperature is None else unstepped(filled(temperature)),
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,
-        quiet=motion.quiet,
         blur=motion.blur,
         others=others,
         other_axes=beside,
     )
+
+
+def _logged_motion(recording: Recording, smoothing: Smoothing | None) -> tuple[Motion, Bools]:
+    """Motion of a logged position or, without one, of a logged speed, and where that is known."""
+    position, speed = recording.position_rad, recording.velocity_rad_s
+    whole = None if speed is None else filled(speed)
+    if position is not None:
+        motion = motion_from_position(filled(position), whole, recording.rate_hz, smoothing)
+        return motion, np.isfinite(position)
+    assert speed is not None
+    assert whole is not None
+    return motion_from_velocity(whole, recording.rate_hz), np.isfinite(speed)
 
 
 def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:

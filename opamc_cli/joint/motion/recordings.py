@@ -18,9 +18,7 @@ ENOUGH_SAMPLES = 200_000
 def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
     """Lay recordings on one grid, in groups; None where too little moves to seal any off."""
     track = build_track(recordings, joint)
-    lengths = [
-        cycle_length(track.velocity[start:stop], track.rate_hz) for start, stop in track.bounds
-    ]
+    lengths = [cycle_length(track.velocity[start:stop]) for start, stop in track.bounds]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
     channels = track.channels | ({"revisits"} if _revisits(track) else set())

@@ -14,7 +14,6 @@ LONGEST_WINDOW = 15
 """Samples that a window may have however long they last: of a noisy position logged at 25 Hz, five
 samples leave a fifth of the speed as noise, and no direction is certain."""
 ALLOWED_NOISE_SHARE = 0.01
-QUIET_NOISE_SHARE = 0.0025
 OFF_GRID = 0.05
 """Share of a step by which a change may miss a multiple of it."""
 ROUNDING = 1e-12
@@ -125,24 +124,6 @@ def taken_noise_gain(rate_hz: float, window: int, derivative: int) -> float:
     twice = np.convolve(kernel, averaging_kernel(window, derivative)[::-1])
     half = (twice.size - kernel.size) // 2
     return float(np.linalg.norm(np.pad(kernel, half) - twice))
-
-
-def quiet_block(noise: float, scale: float, rate_hz: float, window: int, derivative: int) -> int:
-    """Count the samples per block over which a derivative's noise averages to almost nothing.
-
-    A regressor with noise invites every effect that is a smoother version of it. Blocks are long
-    enough when the noise that is left, of white noise in the path, is below 0.25 % of the
-    derivative's standard deviation, the `scale`; at most 0.2 s.
-    """
-    kernel = polynomial_weights(rate_hz, window, derivative)[::-1]
-    longest = max(int(LONGEST_WINDOW_S * rate_hz), 1)
-    block = 1
-    while block < longest:
-        left = float(np.linalg.norm(np.convolve(kernel, np.ones(block) / block)))
-        if noise * left <= QUIET_NOISE_SHARE * scale:
-            break
-        block += max(block // 4, 1)
-    return min(block, longest)
 
 
 def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> Floats:

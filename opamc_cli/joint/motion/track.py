@@ -1,14 +1,14 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Hashable
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import accumulate, pairwise
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.ndimage import convolve1d
 
 from opamc_cli.joint.least_squares import solve
 
@@ -103,8 +103,6 @@ class Track:
     """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
-    kept: dict[Hashable, Floats] | None = None
-    """Regressors of static terms that stay the same whatever is fitted, while a search goes on."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
     None."""
@@ -114,8 +112,6 @@ class Track:
     evenly_smooth: bool = False
     """True where position and speed have gone through it as well; otherwise the coarse grid puts
     them through it."""
-    quiet: int = 1
-    """Samples over which the acceleration's noise averages to almost nothing."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
     others: Floats | None = None
@@ -167,15 +163,8 @@ class Track:
     def static_columns(self) -> Floats:
         """Regressors of the static terms, shape (m, k), on the full rate's samples."""
         source = self.full or self
-        blocks = [self._regressors(term, source).T for term in self.static_terms]
+        blocks = [term.columns(source).T for term in self.static_terms]
         return np.concatenate([np.zeros((0, source.size)), *blocks]).T
-
-    def _regressors(self, term: "Regressors", source: "Track") -> Floats:
-        if self.kept is None or not term.is_constant:
-            return term.columns(source)
-        if term.key not in self.kept:
-            self.kept[term.key] = term.columns(source)
-        return self.kept[term.key]
 
     @cached_property
     def static_sums(self) -> Floats:
@@ -244,6 +233,11 @@ class Regressors(Protocol):
         ...
 
 
+def ranges(lengths: Iterable[int]) -> tuple[tuple[int, int], ...]:
+    """Half-open ranges of so many samples each, one after another."""
+    return tuple(pairwise(accumulate(lengths, initial=0)))
+
+
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
     """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
 
@@ -266,34 +260,10 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
     """Put signals through a moving average inside each recording; ends keep their last value."""
-    if kernel.size == 1:
-        return values
-    half = kernel.size // 2
     smooth = np.empty_like(values)
     for start, stop in bounds:
-        part = values[start:stop]
-        padding = [(half, half)] + [(0, 0)] * (part.ndim - 1)
-        padded = np.pad(part, padding, mode="edge")
-        length = next_fast_len(len(padded), real=True)
-        answer = rfft(kernel, length).reshape(-1, *(1,) * (part.ndim - 1))
-        # What wraps round lies before the first sample that all weights reach.
-        whole = irfft(rfft(padded, length, axis=0) * answer, length, axis=0)
-        smooth[start:stop] = whole[2 * half : 2 * half + stop - start]
+        smooth[start:stop] = convolve1d(values[start:stop], kernel, axis=0, mode="nearest")
     return smooth
-
-
-def averaged_blocks(
-    values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats, factor: int
-) -> Floats:
-    """Average blocks of what went through a moving average; one sum of products a block."""
-    weights = np.convolve(kernel, np.full(factor, 1.0 / factor))[::-1]
-    half = kernel.size // 2
-    parts = []
-    for start, stop in bounds:
-        wide = np.pad(values[start:stop].T, [(0, 0), (half, half)], mode="edge")
-        reached = sliding_window_view(wide, weights.size, axis=1)[:, ::factor]
-        parts.append(reached @ weights)
-    return np.concatenate(parts, axis=1).T
 
 
 def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> Track:
@@ -302,14 +272,11 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     Samples that are not `inside`, bool (n,), lose their group.
     """
     rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
-    stops = np.cumsum([stop - start for start, stop in spans])
-    lengths = [stop - start for start, stop in spans]
-    bounds = tuple((int(b) - n, int(b)) for b, n in zip(stops, lengths, strict=True))
     group = np.where(inside, track.group, -1)
     track = replace(track, group=group)
     sampled = {name: getattr(track, name) for name in SAMPLED}
     taken = {name: values[rows] for name, values in sampled.items() if values is not None}
-    return replace(track, bounds=bounds, **taken)
+    return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
 
 
 def coarsen(track: Track, factor: int) -> Track:
@@ -334,12 +301,6 @@ def coarsen(track: Track, factor: int) -> Track:
             full, position_rad=smooth(track.position_rad), velocity=smooth(track.velocity)
         )
 
-    bounds = []
-    offset = 0
-    for start, stop in track.bounds:
-        blocks = (stop - start) // factor
-        bounds.append((offset, offset + blocks))
-        offset += blocks
     group = mean(track.group.astype(float))
     clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
@@ -352,7 +313,7 @@ def coarsen(track: Track, factor: int) -> Track:
     return replace(
         track,
         rate_hz=track.rate_hz / factor,
-        bounds=tuple(bounds),
+        bounds=ranges((stop - start) // factor for start, stop in track.bounds),
         direction=np.sign(mean(track.direction)),
         moving=moving,
         clear=clear,

@@ -16,8 +16,8 @@ from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
 NARROW = 4
-"""Regressors of a guess up to which products are summed one by one, for all guesses at once; of a
-chain's terms, for all terms at once."""
+"""Regressors up to which a chain's terms are joined: a guess is gone through once for them all,
+which saves a twentieth of the time."""
 
 
 @dataclass(frozen=True)
@@ -61,25 +61,10 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
         count = len(members)
         blocks = [block for _, block in members]
         columns = blocks[0] if count == 1 else np.concatenate(blocks, axis=1)
-        own = _own_products(columns, parts, count, width)
+        own = np.stack([parts.products(block, block) for block in blocks], axis=1)
         moment = parts.products(columns, current)[:, :, 0].reshape(-1, count, width)
         batches.append(Batch([term for term, _ in members], columns, own, moment))
     return batches
-
-
-def _own_products(columns: Floats, parts: Parts, count: int, width: int) -> Floats:
-    """Products of each guess's regressors with one another over each part, shape (p, K, w, w)."""
-    if width > NARROW:
-        blocks = [columns[:, k * width : (k + 1) * width] for k in range(count)]
-        return np.stack([parts.products(block, block) for block in blocks], axis=1)
-    starts = [start for start, _ in parts.slices]
-    guesses = columns.reshape(-1, count, width)
-    own = np.empty((len(starts), count, width, width))
-    for i in range(width):
-        for j in range(i + 1):
-            own[:, :, i, j] = np.add.reduceat(guesses[:, :, i] * guesses[:, :, j], starts, axis=0)
-            own[:, :, j, i] = own[:, :, i, j]
-    return own
 
 
 def judged(term: Term, gain: float, width: int) -> Candidate:
@@ -126,7 +111,6 @@ class Beside:
             self.sums = dataset.sums_of(blocks, True) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         runs = [list(run) for _, run in groupby(self.blocks, lambda b: b.shape[1] <= NARROW)]
-        # Those of the declared model are a column each: a guess is gone through once for them all.
         self.joined = [
             block
             for run in runs

@@ -7,6 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Fit, Term, fit_terms
 from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.name.significance import paired
 
 Signature = frozenset[tuple[object, ...]]
 PRICE = 0.02
@@ -187,9 +188,8 @@ def line_of(term: Term, track: Track) -> float:
 
 
 def _gain(before: Floats, after: Floats) -> tuple[float, float]:
-    drop = before - after
-    spread = max(float(np.std(drop, ddof=1) * np.sqrt(drop.size)), 1e-300)
-    return float(drop.sum() / max(before.sum(), 1e-300)), float(drop.sum()) / spread
+    drop, error = paired(after, before)
+    return drop / max(float(before.sum()), 1e-300), drop / max(error, 1e-300)
 
 
 def price_of(term: Term, width: int) -> float:

@@ -1,7 +1,7 @@
 """Follow several chains of effects side by side, and keep the one that is worth its price."""
 
 from collections.abc import Collection, Hashable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -21,7 +21,7 @@ LEAST_SHARE = 0.05
 function without a name, scores that differ by less do not differ."""
 MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
-REFINED, TRIED = 6, 4
+TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
 PROMISING = 0.25
 """Share of the best candidate's fall in the score below which none is refined."""
@@ -61,7 +61,7 @@ class Pool:
 
 @dataclass(frozen=True)
 class Tried:
-    """What is told of a trial in the end, when its fit and its sums are gone."""
+    """What a trial said of an effect."""
 
     term: Term
     """The effect."""
@@ -70,39 +70,33 @@ class Tried:
     gain: float
     t_value: float
     p_value: float
-    """With `gain`, `t_value`: as of the trial."""
+    """With `gain`, `t_value`: share of the held-out error of all the others that it takes away,
+    over its standard error over parts of the data, and the probability of such a ratio by
+    chance."""
     why_not: str | None
     """None where the effect may be added."""
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A chain with one effect more, and why it is none, if it is not."""
+class Trial(Tried):
+    """A trial with its fits, which nobody needs in the end."""
 
     parent: Chain
     chain: Chain
     """With `parent`: without and with the effect."""
-    gain: float
-    t_value: float
-    """With `gain`: share of the parent's held-out error, and over its standard error."""
-    why_not: str | None
-    """None where the effect may be added."""
 
-    @property
-    def term(self) -> Term:
-        """The effect."""
-        return self.chain.fit.terms[-1]
-
-    @property
-    def p_value(self) -> float:
-        """Probability of such a t where the effect does nothing."""
-        return p_value(self.t_value, self.chain.error.size)
+    @classmethod
+    def of(cls, parent: Chain, chain: Chain, why_not: str | None = None) -> "Trial":
+        """Hold a chain against the one without its last effect."""
+        gain, t_value = chain.gain_over(parent)
+        chance = p_value(t_value, chain.error.size)
+        score = chain.score - parent.score
+        return cls(chain.fit.terms[-1], score, gain, t_value, chance, why_not, parent, chain)
 
     @property
     def told(self) -> Tried:
         """What is told of it in the end."""
-        score = self.chain.score - self.parent.score
-        return Tried(self.term, score, self.gain, self.t_value, self.p_value, self.why_not)
+        return Tried(**{one.name: getattr(self, one.name) for one in fields(Tried)})
 
 
 def guessed(effect: Effect, dataset: Dataset) -> list[Term]:
@@ -155,7 +149,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     ordered = sorted(found.values(), key=lambda candidate: candidate.score)
     least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
     better = []
-    for candidate in [one for one in ordered if one.score < least][:REFINED]:
+    for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
         term = refined(dataset, candidate.term, beside)
         (batch,) = batches_of(dataset, [term], beside.fine)
@@ -173,7 +167,7 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
     The chains that are `known` were tried; they are not tried again, and new ones are added.
     """
     tried = set() if known is None else known
-    ordered = [[candidate.term] for candidate in candidates(chain, pool)[:TRIED]]
+    ordered = [[candidate.term] for candidate in candidates(chain, pool)]
     ordered = [forms for forms in ordered if not forms[0].effect.follows_load]
     found = []
     for forms in (*ordered, *_by_load(chain, pool)):
@@ -186,8 +180,7 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         if child.gain_over(chain)[0] >= pool.least_share:
             others = (extended(chain, term) for term in forms[1:])
             child = min((child, *others), key=lambda one: one.score)
-        share, t_value = child.gain_over(chain)
-        found.append(Trial(chain, child, share, t_value, objection(child, chain, pool)))
+        found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found
 
 

@@ -103,13 +103,12 @@ def _rivals_of(term: Term, unnamed: Pool) -> Pool:
     A line that shakes the joint is in the measured acceleration, too: what looks at that, or
     filters it, is no rival.
     """
-    library = {name: one for name, one in unnamed.library.items() if not one.fast}
-    if term.effect.fast:
-        library = {
-            name: one
-            for name, one in library.items()
-            if one.domain != "acceleration" and not one.as_smoothing
-        }
+    library = {
+        name: one
+        for name, one in unnamed.library.items()
+        if not one.fast
+        and not (term.effect.fast and (one.domain == "acceleration" or one.as_smoothing))
+    }
     return replace(unnamed, library=library)
 
 
@@ -135,5 +134,4 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
 def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:
     """Judge an effect as if it were added last: the same chain in another order."""
     chain = extended(parent, term)
-    gain, t_value = chain.gain_over(parent)
-    return Trial(parent, chain, gain, t_value, objection(chain, parent, pool))
+    return Trial.of(parent, chain, objection(chain, parent, pool))

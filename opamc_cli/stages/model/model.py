@@ -126,7 +126,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
         ],
         "notes": laid.notes,
         "untestable": [
-            {"effect": one.effect, "why": one.why} for one in untestable(base, laid.library)
+            {"effect": name, "why": why} for name, why in untestable(base, laid.library).items()
         ],
     }
     return entry, [candidate_row(axis, 0, trial.told, False) for trial in tried]

@@ -134,9 +134,9 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
         "domain": step.term.effect.domain,
         "parameters": shown_parameters(step.term),
         "interpretation": step.interpretation,
-        "gain": step.gain,
-        "t_value": step.t_value,
-        "p_value": step.p_value,
+        "gain": step.trial.gain,
+        "t_value": step.trial.t_value,
+        "p_value": step.trial.p_value,
         "decoy_gain": step.decoy_gain,
         "ties": ties,
         "separating_experiment": step.experiment,
@@ -170,20 +170,24 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "explained_share": loop.explained_share,
         "rejected": [
             {
-                "effect": rejected.effect,
-                "domain": rejected.domain,
-                "parameters": rejected.parameters,
+                "effect": rejected.term.effect.name,
+                "domain": rejected.term.effect.domain,
+                "parameters": rejected.term.parameters,
                 "gain": rejected.gain,
                 "p_value": rejected.p_value,
-                "why": rejected.why,
+                "why": rejected.why_not,
             }
             for rejected in loop.rejected
         ],
-        "untestable": [{"effect": u.effect, "why": u.why} for u in loop.untestable],
+        "untestable": [{"effect": name, "why": why} for name, why in loop.untestable.items()],
         "verdict": loop.verdict,
         "domain": loop.remaining_domain,
         "remains": [
-            {"domain": step.term.effect.domain, "gain": step.gain, "t_value": step.t_value}
+            {
+                "domain": step.term.effect.domain,
+                "gain": step.trial.gain,
+                "t_value": step.trial.t_value,
+            }
             for step in loop.steps
             if not step.named
         ],

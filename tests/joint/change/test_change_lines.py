@@ -227,11 +227,17 @@ def test_the_resolution_is_that_of_the_long_strokes_and_orders_begin_at_two_of_i
     )
 
 
-def test_a_travel_of_more_bins_than_memory_allows_has_no_spectrum(units, monkeypatch):
-    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
-    assert order_spectra(units, white) is not None
-    monkeypatch.setattr("opamc_cli.joint.change.lines.MOST_BINS", 100)
-    assert order_spectra(units, white) is None
+def test_a_travel_of_more_bins_than_memory_allows_is_wound_up_by_whole_turns(units, monkeypatch):
+    tones = [
+        np.where(unit.fine_rows, np.cos(3 * unit.fine.machine_angle_rad), 0.0) for unit in units
+    ]
+    whole = order_spectra(units, tones)
+    monkeypatch.setattr("opamc_cli.joint.spectra.MOST_BINS", whole.orders.size // 8)
+    wound = order_spectra(units, tones)
+    assert wound.orders.size < whole.orders.size / 2
+    for spectra in (whole, wound):
+        peak = spectra.orders[np.argmax(spectra.before.mean(axis=0))]
+        assert peak == pytest.approx(3.0, abs=spectra.orders[1] - spectra.orders[0])
 
 
 def test_an_order_s_error_is_the_scatter_of_the_target_s_units():

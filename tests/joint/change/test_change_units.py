@@ -18,6 +18,10 @@ def units():
     return units_of(before=3, after=1, spread=0.0)
 
 
+def factor_of(unit):
+    return round(unit.fine.rate_hz / unit.coarse.rate_hz)
+
+
 def test_every_recording_that_moves_is_a_unit(units):
     assert [unit.after for unit in units] == [False, False, False, True]
     still = recordings(1)[0]
@@ -30,9 +34,9 @@ def test_a_unit_s_samples_move_and_are_clear(units):
     unit = units[0]
     assert np.array_equal(unit.fine_rows, unit.fine.moving & unit.fine.clear)
     # A coarse sample counts where all of its samples move.
-    whole = block_mean(unit.fine.moving.astype(float), unit.fine.bounds, unit.factor) == 1
+    whole = block_mean(unit.fine.moving.astype(float), unit.fine.bounds, factor_of(unit)) == 1
     assert np.array_equal(unit.coarse_rows, whole & unit.coarse.moving)
-    assert unit.coarse.size == unit.fine.size // unit.factor
+    assert unit.coarse.size == unit.fine.size // factor_of(unit)
     np.testing.assert_array_equal(unit.current_a(fine=True), unit.fine.current_a[unit.fine_rows])
     np.testing.assert_array_equal(unit.current_a(), unit.coarse.current_a[unit.coarse_rows])
 
@@ -41,8 +45,8 @@ def test_a_unit_s_samples_move_and_are_clear(units):
 def test_the_coarse_grid_has_a_hundred_hertz_or_what_smoothing_leaves(rate):
     (unit,) = read_side(recordings(1, rate=rate), JOINT, after=False, cycles=False)
     width = 1 / np.sum(unit.fine.kernel**2)
-    assert unit.factor == max(int(rate / 100.0), int(0.8 * width), unit.fine.quiet, 1)
-    assert unit.coarse.rate_hz == rate / unit.factor
+    factor = max(int(rate / 100.0), int(0.8 * width), 1)
+    assert unit.coarse.rate_hz == rate / factor
 
 
 def test_cycles_of_one_recording_are_units_that_share_no_sample():
@@ -80,7 +84,7 @@ def test_the_own_fit_finds_the_coefficients_and_leaves_the_noise(units):
         if fine:
             assert np.std(residual) == pytest.approx(0.02, rel=0.1)
         else:
-            assert np.std(residual) < 0.02 / np.sqrt(units[0].factor)
+            assert np.std(residual) < 0.02 / np.sqrt(factor_of(units[0]))
 
 
 def test_another_current_is_fitted_instead_and_the_blur_beside_it(units):
@@ -102,7 +106,7 @@ def test_a_model_puts_its_load_and_its_current_on_both_tracks(units):
     columns = np.concatenate([term.columns(unit.fine) for term in TERMS], axis=1)
     np.testing.assert_allclose(unit.fine.model_a, columns @ COEFFICIENTS)
     np.testing.assert_allclose(unit.fine.load_a, columns[:, :3] @ COEFFICIENTS[:3])
-    means = block_mean(unit.fine.model_a, unit.fine.bounds, unit.factor)
+    means = block_mean(unit.fine.model_a, unit.fine.bounds, factor_of(unit))
     np.testing.assert_allclose(unit.coarse.model_a, means)
 
 
@@ -134,7 +138,7 @@ def by_phases(unit, current=None):
     fine = replace(unit.fine, channels=unit.fine.channels - {"logged"})
     if current is not None:
         fine = replace(fine, current_a=current)
-    return replace(unit, fine=fine, coarse=coarsen(fine, unit.factor))
+    return replace(unit, fine=fine, coarse=coarsen(fine, factor_of(unit)))
 
 
 def test_where_motion_was_logged_nothing_is_left_out(units):

@@ -14,7 +14,7 @@ from track_of import track_of
 from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.effects.second_order import discrete
+from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
@@ -99,12 +99,16 @@ def test_dahl_state_solves_its_equation(places):
 
 
 @pytest.mark.parametrize("damping", [0.005, 0.1, 0.4])
-@pytest.mark.parametrize("above", [(-1.0, -0.5, 0.0), (0.0, 3.0, 0.0), (1.0, 2.0, 3.0)])
-def test_filters_of_second_order_become_discrete_as_scipy_makes_them(above, damping):
-    w = 2 * np.pi * 7.0
-    below = (1.0, 2 * damping * w, w * w)
-    expected = bilinear(above, below, 100.0)
-    np.testing.assert_allclose(discrete(above, below, 100.0), expected, rtol=1e-12, atol=1e-14)
+def test_filters_of_second_order_are_discrete_as_scipy_makes_them(damping):
+    signal = np.random.default_rng(0).normal(size=300)
+    signal[0] = 0.0
+    w = 2 * 100.0 * np.tan(2 * np.pi * 7.0 / 200.0)
+    expected = [
+        lfilter(*bilinear(above, (1.0, 2 * damping * w, w * w), 100.0), signal)
+        for above in ((0.0, 0.0, w * w), (0.0, w, 0.0))
+    ]
+    found = answers([signal], 2 * np.pi * 7.0, damping, 100.0, ((0, 300),))
+    np.testing.assert_allclose(found, expected, atol=1e-10)
 
 
 @pytest.mark.parametrize(("starts", "columns"), [((None, None), 4), ((0.0, 86_400.0), 2)])
@@ -159,7 +163,7 @@ def test_wind_up_on_the_coarse_grid_is_the_average_of_that_at_the_full_rate():
     acceleration = track.acceleration
     slow = []
     for above in ((-1.0, -2 * 0.05 * w, 0.0), (0.0, w, 0.0)):
-        zeros, poles = discrete(above, below, 500.0)
+        zeros, poles = bilinear(above, below, 500.0)
         # A long time at the first acceleration, instead of a state to begin with.
         settled = np.concatenate([np.full(20_000, acceleration[0]), acceleration])
         slow.append(lfilter(zeros, poles, settled)[20_000:])

@@ -32,7 +32,8 @@ def test_an_angle_line_has_both_phases_of_four_parts_side_by_side():
         direction=np.array([1.0, -1.0, 0.0]),
         model_a=np.array([5.0, 6.0, 7.0]),
     )
-    columns = AngleLine().columns(small, {"order": 2.0})
+    follows = {"speed": 1.0, "direction": 1.0, "current": 1.0}
+    columns = AngleLine().columns(small, {"order": 2.0, **follows})
     cosine, sine = np.array([1.0, 0.0, -1.0]), np.array([0.0, 1.0, 0.0])
     speed = np.array([0.0, 0.5, -0.5])
     for k, part in enumerate(([1, 1, 1], speed, small.direction, small.model_a)):
@@ -82,7 +83,7 @@ def test_a_line_over_time_is_sought_from_one_hertz_to_nearly_half_of_the_rate(
 
 
 def test_a_tone_is_cosine_and_sine_of_time():
-    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]))
+    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]), own_clocks_s=())
     columns = Tone().columns(small, {"frequency_hz": 2.0})
     np.testing.assert_allclose(columns, [[1, 0], [0, 1], [-1, 0]], atol=1e-12)
 

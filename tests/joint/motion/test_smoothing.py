@@ -12,7 +12,7 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import averaged, averaged_blocks, block_mean
+from opamc_cli.joint.motion.track import averaged
 
 
 def slow_derivative(path, rate, window, order):
@@ -45,18 +45,6 @@ def test_second_derivative_is_the_average_of_the_plain_one(window):
     smooth = averaged(plain, ((0, 400),), averaging_kernel(window, 2))
     inside = slice(window, -window)
     np.testing.assert_allclose(smooth[inside], derivatives(path, 1.0, window, 2)[inside])
-
-
-@pytest.mark.parametrize("factor", [1, 3, 16])
-@pytest.mark.parametrize("window", [1, 5, 51])
-def test_blocks_of_an_average_are_averaged_once(window, factor):
-    values = np.random.default_rng(3).normal(size=(500, 2))
-    bounds, kernel = ((0, 290), (290, 500)), np.hanning(window + 2)[1:-1] / (window + 1) * 2
-    np.testing.assert_allclose(
-        averaged_blocks(values, bounds, kernel, factor),
-        block_mean(averaged(values, bounds, kernel), bounds, factor),
-        atol=1e-12,
-    )
 
 
 def test_noise_of_a_quantised_ramp_is_about_the_quantum():

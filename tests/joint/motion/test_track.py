@@ -12,7 +12,6 @@ from opamc_cli.joint.motion.track import (
     Joint,
     Reference,
     averaged,
-    averaged_blocks,
     block_mean,
     coarsen,
     excerpt,
@@ -41,8 +40,7 @@ def test_blocks_end_with_their_recording():
 
 
 @pytest.mark.parametrize("width", [1, 3, 5])
-@pytest.mark.parametrize("factor", [1, 2, 4])
-def test_a_moving_average_keeps_the_last_value_at_both_ends(width, factor):
+def test_a_moving_average_keeps_the_last_value_at_both_ends(width):
     rng = np.random.default_rng(0)
     values = rng.normal(size=(18, 2))
     kernel = rng.random(width)
@@ -54,11 +52,6 @@ def test_a_moving_average_keeps_the_last_value_at_both_ends(width, factor):
             near = np.clip(np.arange(i - half, i + half + 1), start, stop - 1)
             slow[i] = kernel @ values[near]
     np.testing.assert_allclose(averaged(values, BOUNDS, kernel), slow, atol=1e-12)
-    np.testing.assert_allclose(
-        averaged_blocks(values, BOUNDS, kernel, factor),
-        block_mean(slow, BOUNDS, factor),
-        atol=1e-12,
-    )
 
 
 def test_a_reference_stands_for_what_moving_samples_reach():
@@ -105,25 +98,6 @@ def test_spans_become_recordings_of_their_own():
     np.testing.assert_array_equal(cut.current_a[:200], track.current_a[100:300])
     np.testing.assert_array_equal(cut.time_s[200:], track.time_s[1050:1200])
     assert cut.group[[0, 19, 20, 199, 200, 249, 250]].tolist() == [-1, -1, 0, 0, 1, 1, -1]
-
-
-def test_static_regressors_that_never_change_are_computed_once_where_they_are_kept():
-    asked = []
-
-    def columns(on):
-        asked.append(on.size)
-        return on.velocity[:, None]
-
-    constant, following = (
-        SimpleNamespace(columns=columns, key=name, is_constant=name == "constant")
-        for name in ("constant", "following")
-    )
-    for kept, times in (({}, 3), (None, 4)):
-        asked.clear()
-        track = replace(track_of(), static_terms=(constant, following), kept=kept)
-        later = track.with_model(2 * track.velocity, track.velocity, (following, constant))
-        np.testing.assert_array_equal(track.static_columns, later.static_columns)
-        assert len(asked) == times
 
 
 def test_the_static_terms_are_summed_from_zero_in_each_recording():

@@ -6,6 +6,7 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import averaged, block_mean
 from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
@@ -56,8 +57,9 @@ def slow_gain(chain, columns, fine):
     blocks = []
     for term, values in known:
         if term.effect.fast and not fine:
-            grids = dataset.fine.track, dataset.coarse.track
-            current = current - term.averaged(*grids, dataset.factor) @ values
+            on = dataset.fine.track
+            smooth = averaged(term.columns(on), on.bounds, on.kernel)
+            current = current - block_mean(smooth, on.bounds, dataset.factor) @ values
         else:
             blocks.append(dataset.columns(term, fine))
     base = np.concatenate(blocks, axis=1)[parts.rows]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.motion.phases.angle_filter import (
     acceleration_noise,
@@ -83,7 +84,7 @@ def _followed(
     strong = length > max(STRONG * noise, floor)
     rough, coherence = _turning(vector, rate_hz)
     sure = (coherence > 0.9) & strong
-    local = np.sqrt(np.maximum(_centred_mean(length**2 + 0j, 15).real, 1e-300))
+    local = np.sqrt(np.maximum(uniform_filter1d(length**2, 15, mode="constant"), 1e-300))
     spread = None
     if strong.any():
         spread = np.maximum(float(np.median(local[strong])) / local, 1.0) ** 2
@@ -109,7 +110,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     start = found.vector
     for _ in range(CLEANING_ROUNDS):
         before = found.vector
-        length = _centred_mean(np.abs(before) + 0j, 15).real
+        length = uniform_filter1d(np.abs(before), 15, mode="constant")
         cleaned = without_sensor_errors(before, found.angle, found.fast)
         if float(np.median(np.abs(cleaned - before))) <= found.noise:
             found = replace(found, vector=cleaned)
@@ -154,8 +155,8 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
 def _turning(vector: NDArray[np.complex128], rate_hz: float) -> tuple[Floats, Floats]:
     """Angular speed in rad/s from sample to sample, averaged, and how far neighbours agree."""
     turns = vector[1:] * np.conj(vector[:-1])
-    smooth = _centred_mean(turns, 15)
-    weight = _centred_mean(np.abs(turns).astype(np.complex128), 15).real
+    smooth = uniform_filter1d(turns, 15, mode="constant")
+    weight = uniform_filter1d(np.abs(turns), 15, mode="constant")
     coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
     speed: Floats = np.concatenate([[0.0], np.angle(smooth)]) * rate_hz
     return speed, np.concatenate([[0.0], coherence])
@@ -172,7 +173,8 @@ def averaged_angle(
     length = np.abs(vector)
     alone = length > max(STRONG * noise, floor)
     width = max(int(AVERAGE_S * rate_hz), 1) | 1
-    square = _centred_mean((vector * np.exp(-1j * angle_rad)) ** 2, width)
+    turned_back = vector * np.exp(-1j * angle_rad)
+    square = uniform_filter1d(turned_back**2, width, mode="constant")
     # Of noise alone the mean square is of this size.
     chance = noise**2 * np.sqrt(8 / width)
     together = np.abs(square) > max(UNLIKELY * chance, floor**2)
@@ -184,9 +186,3 @@ def _halved(angle_rad: Floats) -> Floats:
     """Angle modulo pi, between -pi/2 and pi/2."""
     halved: Floats = angle_rad - np.pi * np.round(angle_rad / np.pi)
     return halved
-
-
-def _centred_mean(values: NDArray[np.complex128], width: int) -> NDArray[np.complex128]:
-    sums = np.cumsum(np.concatenate([np.zeros(width // 2 + 1), values, np.zeros(width // 2)]))
-    means: NDArray[np.complex128] = (sums[width:] - sums[:-width]) / width
-    return means
