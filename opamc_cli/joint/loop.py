@@ -161,7 +161,7 @@ def _steps(
             Step(
                 trial=trial.told,
                 interpretation=term.effect.interpretation(term.parameters, track),
-                decoy_gain=decoy_gain(trial.parent, term, seed),
+                decoy_gain=decoy_gain(trial.parent.fit, term, seed),
                 ties=ties,
                 experiment=separating_experiment(term.effect.name, ties),
                 fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,

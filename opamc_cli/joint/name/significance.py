@@ -3,10 +3,9 @@
 import numpy as np
 from scipy.special import stdtr
 
-from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.joint.name.chain import Chain
 
 LEAST_T = 2.0
 """A difference over its standard error, over parts of the open data, that is none below it."""
@@ -26,15 +25,15 @@ def p_value(t_value: float, n_parts: int) -> float:
     return float(stdtr(max(n_parts - 1, 1), -t_value))
 
 
-def decoy_gain(chain: Chain, term: Term, seed: int) -> float:
-    """Largest held-out gain of an effect on a chain's residual with random signs of its units.
+def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
+    """Largest held-out gain of an effect on a fit's residual with random signs of its units.
 
     Share of the residual's sum of squares; mostly below 0.
     """
-    dataset = chain.fit.dataset
+    dataset = fit.dataset
     fine, _ = dataset.parts
     columns = fine.taken(dataset.columns(term, fine=True))
-    residual = fine.taken(chain.fit.residual_a)[:, None]
+    residual = fine.taken(fit.residual_a)[:, None]
     gram = fine.products(columns, columns)
     moment = fine.products(columns, residual)[:, :, 0]
     power = fine.products(residual, residual)[:, 0, 0]
