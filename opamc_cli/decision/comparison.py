@@ -376,7 +376,10 @@ def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
         if joints[axis].depends_on_conditions(voice):
             ratio -= CONDITIONS * unit.scale * joints[axis].unusual()
         scale = unit.scale * math.sqrt(shares[axis])
-        shifts[axis] = Shift(ratio, unit.scale, Spread(scale, unit.dof))
+        # the logarithm of a sum of squares has a light upper tail, which makes up for what the
+        # scale is not known by: see docs/decision.md
+        dof = math.inf if len(one.own) > 2 else unit.dof
+        shifts[axis] = Shift(ratio, unit.scale, Spread(scale, dof))
     return shifts
 
 
