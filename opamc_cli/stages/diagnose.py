@@ -175,7 +175,9 @@ def _diagnose(
                 causes[axis] = found
     # what both sides give alike is said once
     every_note = tuple(
-        dict.fromkeys((*left_out, *normal.notes, *other.notes, *scored.notes, *notes))
+        dict.fromkeys(
+            (*left_out, *normal.notes, *other.notes, *scored.notes, *decided.notes(), *notes)
+        )
     )
     sources = (*sides.baseline.sources, *sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]

@@ -5,27 +5,36 @@ import pytest
 
 from opamc_cli.decision.comparison import compare_sessions
 from opamc_cli.decision.significance.multiplicity import harmonic_mean
+from opamc_cli.decision.witnesses.patterns import Cell, PatternEvidence
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 
 BINS = 40
 
 
-def joint(seed: int, *, colder: float = 0.0, spectrum: float = 0.0, n_target: int = 1):
-    """Six nights that a hidden temperature moves, and the target's; the spectrum bends with it."""
+def joint(
+    seed: int, *, colder: float = 0.0, spectrum: float = 0.0, patterns: float = 0.0, n_target=1
+):
+    """Six nights that a hidden temperature moves, and the target's; the patterns bend with it."""
     rng = np.random.default_rng(seed)
     n = 6 + n_target
     cold = rng.normal(size=n)
     cold[6:] = colder
     is_target = (np.arange(n) >= 6)[:, np.newaxis]
     shapes = np.random.default_rng(1).normal(size=(3, BINS))
-    power = 0.1 * cold[:, np.newaxis] * shapes[0] + 0.02 * cold[:, np.newaxis] ** 2 * shapes[1]
+    power = 0.1 * cold[:, np.newaxis] * shapes[0]
     power = power + is_target * spectrum * shapes[2] + 0.05 * rng.normal(size=(n, BINS))
+    bent = 0.1 * cold[:, np.newaxis] * shapes[0] + 0.02 * cold[:, np.newaxis] ** 2 * shapes[1]
+    odds = np.exp((bent + is_target * patterns * shapes[2])[:, :24])
+    counts = rng.multinomial(16000, odds / odds.sum(axis=1, keepdims=True)).astype(float)
     session = np.repeat(np.arange(n), 4)
     course = 1 + 0.05 * cold[session, np.newaxis] * shapes[0][:20]
     course = course + 0.005 * rng.normal(size=course.shape)
     within = np.full(BINS, 4 * 0.05**2)
     return {
+        "patterns": PatternEvidence(
+            [Cell(0, 4, 1, counts[:6], counts[6:], counts[:6], counts[6:], 1.0)]
+        ),
         "spectrum": SpectrumEvidence(
             [SpectrumCell(0, power, np.full(n, 4.0), within, 4, 10, 1.0)], 6
         ),
@@ -40,8 +49,8 @@ def compared(joints, n_target: int = 1):
 
 def test_a_night_of_unusual_weather_is_excused_and_a_change_is_not():
     p = {}
-    for name, case in {"usual": {}, "cold": {"colder": 4.0}, "changed": {"spectrum": 0.3}}.items():
-        p[name] = [compared({1: joint(s, **case)})[1].witnesses["spectrum"] for s in range(20)]
+    for name, case in {"usual": {}, "cold": {"colder": 4.0}, "changed": {"patterns": 0.3}}.items():
+        p[name] = [compared({1: joint(s, **case)})[1].witnesses["patterns"] for s in range(20)]
     assert np.mean(np.array(p["usual"]) < 0.05) <= 0.15
     assert np.median(p["cold"]) > 0.05
     assert np.median(p["changed"]) < 1e-3
@@ -58,7 +67,8 @@ def test_unusual_weather_is_told():
 
 def test_the_witnesses_are_joined_by_the_harmonic_mean_of_their_voices():
     found = compared({1: joint(0, spectrum=0.3)})[1]
-    assert found.p_value <= 3 * min(found.witnesses.values())
+    # four voices: the profile has two
+    assert found.p_value <= 4 * min(found.witnesses.values())
     assert found.p_value >= harmonic_mean(list(found.witnesses.values())) / 3
 
 

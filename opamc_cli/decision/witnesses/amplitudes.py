@@ -49,6 +49,7 @@ class AmplitudeEvidence:
     healthy_spread: ClassVar[Spread] = Spread(1.0, 1.0)
     """Not asked: it has no distance beyond."""
     tells_conditions: ClassVar[bool] = False
+    depends_on_conditions: ClassVar[bool] = False
 
     def blocks(self) -> list[Block]:
         """Return the log amplitudes of each motion."""

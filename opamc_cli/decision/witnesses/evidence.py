@@ -30,6 +30,10 @@ class Evidence(Protocol):
         """Whether its distance along says how unusual the conditions of a session were."""
 
     @property
+    def depends_on_conditions(self) -> bool:
+        """Whether unusual conditions move its distance beyond by more than its error allows for."""
+
+    @property
     def cells(self) -> Sequence[object]:
         """What it rests on, one for each motion; nothing is known without any."""
 

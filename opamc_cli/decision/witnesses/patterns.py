@@ -89,6 +89,7 @@ class PatternEvidence:
     healthy_spread: ClassVar[Spread] = Spread(0.6, 4.0)
     """0.1, 0.5 and 1.0 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = False
+    depends_on_conditions: ClassVar[bool] = True
 
     def blocks(self) -> list[Block]:
         """Return the square roots of the probabilities of each motion and order.

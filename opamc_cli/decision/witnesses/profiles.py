@@ -92,6 +92,7 @@ class ProfileEvidence:
     healthy_spread: ClassVar[Spread] = Spread(0.65, 8.0)
     """0.47, 0.67 and 0.83 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = True
+    depends_on_conditions: ClassVar[bool] = False
 
     def blocks(self) -> list[Block]:
         """Return the mean current in each part of each motion."""

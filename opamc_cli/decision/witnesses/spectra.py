@@ -52,6 +52,7 @@ class SpectrumEvidence:
     healthy_spread: ClassVar[Spread] = Spread(0.15, 8.0)
     """0.06, 0.22 and 0.17 in the middle of joints of three simulators (18 to 100 robots each)."""
     tells_conditions: ClassVar[bool] = False
+    depends_on_conditions: ClassVar[bool] = False
 
     def blocks(self) -> list[Block]:
         """Return the log powers of each motion's frames and bins."""

@@ -38,7 +38,7 @@ REPEATS = 0.75
 """Share of a recording's motions that a cycle has to find again to be one: noise may hide some."""
 
 MOST_HELD = 16
-"""Recordings that a cycle without repetition is looked for in."""
+"""Recordings that a cycle is looked for in."""
 
 SAME_DURATION = 0.1
 """Relative difference of the durations of motions at the edges of recordings that begin and end
@@ -134,8 +134,8 @@ def run(
     reference
         Motion table whose reference cycles are taken; None: found in these segments.
     reference_run
-        Name of the run in which the reference cycle is looked for; None: the run with the most
-        repetitions.
+        Name of the run in which the reference cycle is looked for; None: of the runs with the
+        most repetitions the one whose cycle most runs hold.
     moved_to
         Folders of the runs, if they were moved.
     without
@@ -259,7 +259,7 @@ def _own_references(
     config: IdentifyConfig,
     reference_run: str | None,
 ) -> dict[int, _Reference]:
-    """Find the reference cycle of each axis: in the run that repeats itself most."""
+    """Find the reference cycle of each axis: in a run that repeats it most and others hold."""
     if reference_run is not None and all(p.source.name != reference_run for p in parts):
         names = ", ".join(sorted({p.source.name for p in parts}))
         msg = f"{path}: has no run {reference_run!r} to take the reference from; it has {names}"
@@ -287,11 +287,11 @@ def _own_references(
         repeats = count > 1 and np.mean(found >= 0) >= REPEATS
         if edges and not repeats and config.segments_per_cycle is None:
             start, stop, cycle, count = 0, len(features), features, 1
-        worth = count, 0
-        if count < 2 and not edges:
-            # where no recording shows that a cycle comes again, others have to
-            others = [p for p in parts if p.axis == part.axis][:MOST_HELD]
-            worth = count, sum(_holds(other, cycle, rule) for other in others)
+        # one recording may be odd, or show nothing twice: others tell whether it is the program
+        others = [p for p in parts if p.axis == part.axis][:MOST_HELD]
+        if part.axis in best and (count, len(others)) <= best[part.axis][0]:
+            continue
+        worth = count, sum(_holds(other, cycle, rule) for other in others)
         if part.axis not in best or worth > best[part.axis][0]:
             spans = tuple(_span(part.rows, i) for i in usable[start:stop].tolist())
             best[part.axis] = (

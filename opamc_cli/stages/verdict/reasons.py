@@ -266,8 +266,8 @@ def _conditions(judgement: Judgement) -> list[str]:
         return []
     return [
         "Conditions were unusual: along what healthy sessions differ by (temperature, say) it lies "
-        f"{math.exp(judgement.unusual_log_ratio):.3g} times as far as they do. What patterns and "
-        "fluctuations show was allowed for by as much, and so would be a fault that looks alike; "
+        f"{math.exp(judgement.unusual_log_ratio):.3g} times as far as they do. What patterns "
+        "show was allowed for by as much, and so would be a fault that looks alike; "
         "record under the baseline's conditions to be sure."
     ]
 

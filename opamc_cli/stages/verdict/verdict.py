@@ -59,6 +59,20 @@ class Decided:
             if judgement.state in ("changed", "fault") or is_excused(judgement, config)
         ]
 
+    def notes(self) -> list[str]:
+        """Say which axes were judged without some of the witnesses."""
+        lacking = {
+            axis: [name for name, p in judgement.witnesses.items() if math.isnan(p)]
+            for axis, judgement in self.judgements.items()
+            if math.isfinite(judgement.p_value)
+        }
+        return [
+            f"axis {axis}: judged without its {' and '.join(names)}: some session has no motion "
+            "whose samples are all known"
+            for axis, names in lacking.items()
+            if names
+        ]
+
 
 def decide(sides: Sides, config: Config) -> Decided:
     """Decide about every joint; of the options those of section `score` are used."""

@@ -1,4 +1,4 @@
-"""What an identified motion is synchronised by."""
+"""What motions are identified and synchronised by, and how a reported current is read."""
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -6,18 +6,20 @@ import pytest
 
 from opamc_cli.config import load_config
 from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.chain.witnesses import spectrum
 from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.schemas.tables import PLACE
 
 RATE_HZ = 250.0
 CYCLES, MOTION, REST = 4, 400, 150
 
 
-def save(path, delay, seed):
-    """Two motions back and forth; a current whose course comes later than the motion."""
+def save(path, delay, seed, back=MOTION):
+    """Two motions there and back; a current whose course comes later than the motion."""
     rng = np.random.default_rng(seed)
-    way = 0.5 - 0.5 * np.cos(np.pi * np.arange(MOTION) / MOTION)
+    way, home = (0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n) for n in (MOTION, back))
     still = np.zeros(REST)
-    cycle = np.concatenate([still, way, still + 1, 1 - way, still])
+    cycle = np.concatenate([still, way, still + 1, 1 - home, still])
     position = np.tile(cycle, CYCLES) + 1e-5 * rng.normal(size=CYCLES * cycle.size)
     speed = np.gradient(np.tile(cycle, CYCLES)) * RATE_HZ
     current = np.roll(np.sign(speed) + speed, delay) + 0.01 * rng.normal(size=speed.size)
@@ -42,3 +44,30 @@ def test_a_joint_whose_position_is_logged_is_synchronised_by_it(tmp_path, delay)
     ]
     assert len(starts[0]) == len(starts[1]) == 2 * CYCLES
     np.testing.assert_allclose(*starts, atol=2)
+
+
+def test_the_reference_is_the_cycle_that_most_recordings_hold(tmp_path):
+    """The first one is odd: its way back is half as long."""
+    for number in range(4):
+        save(tmp_path / f"runs/{number}.parquet", 0, number, MOTION if number else MOTION // 2)
+    done = run_chain([tmp_path / "runs"], load_config(), tmp_path / "out")
+    found = {
+        (row["run"], row["reference"])
+        for row in pq.read_table(done.motions).to_pylist()
+        if row["motion"] >= 0
+    }
+    assert {run for run, _ in found} == {"1", "2", "3"}
+    assert [run for run, is_reference in found if is_reference] == ["1"]
+
+
+def test_a_reported_current_keeps_its_sign_in_its_spectrum():
+    """Moved by a hundredth of an ampere it passes zero elsewhere, and that is no fluctuation."""
+    rng = np.random.default_rng(0)
+    current = np.cos(np.pi * np.arange(800) / 800) + 1e-3 * rng.normal(size=800)
+    place = dict.fromkeys(PLACE, 0)
+    config = load_config().patterns
+    power = [
+        np.array(spectrum.rows(place, current + offset, RATE_HZ, config)[0]["log_power"])
+        for offset in (0.0, 0.01)
+    ]
+    np.testing.assert_allclose(*power, atol=0.01)

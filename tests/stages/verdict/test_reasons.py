@@ -1,9 +1,11 @@
 """What a maintainer is told of a joint, where that is not the terminal's to test."""
 
+import math
 from dataclasses import replace
 
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.stages.verdict.reasons import reasons
+from opamc_cli.stages.verdict.verdict import Decided
 from tests.decision.fleet import Fleet, cells
 
 
@@ -24,3 +26,13 @@ def test_a_joint_that_unusual_conditions_excuse_is_told_so():
         text = " ".join(reasons(one, Bundle(own), entries, {"baseline": [], "target": []}))
         said[state, unusual] = "Conditions were unusual" in text
     assert said == {("healthy", 0.2): False, ("healthy", 2.0): True, ("fault", 2.0): False}
+
+
+def test_a_witness_that_could_not_be_heard_is_said():
+    own = cells(Fleet(n_axes=1), 0)[1]
+    whole = judge({1: Bundle(own)})[1]
+    part = replace(whole, witnesses={**whole.witnesses, "spectrum": math.nan})
+    unknown = replace(part, p_value=math.nan)
+    notes = Decided(None, {}, {1: whole, 2: part, 3: unknown}).notes()
+    assert len(notes) == 1
+    assert notes[0].startswith("axis 2: judged without its spectrum:")
