@@ -377,8 +377,8 @@ def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
             ratio -= CONDITIONS * unit.scale * joints[axis].unusual()
         scale = unit.scale * math.sqrt(shares[axis])
         # the logarithm of a sum of squares has a light upper tail, which makes up for what the
-        # scale is not known by: see docs/decision.md
-        dof = math.inf if len(one.own) > 2 else unit.dof
+        # scale is not known by, if not by three sessions: see docs/decision.md
+        dof = math.inf if len(one.own) > 3 else unit.dof
         shifts[axis] = Shift(ratio, unit.scale, Spread(scale, dof))
     return shifts
 
