@@ -189,7 +189,7 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
         interpretation += f" (order {measured:.4g} per motor turn if it has {poles:.0f} pole pairs)"
     evidence = _evidence(first, measured / poles, resolution)
     evidence["power_ratio"] = max(line.growth for line in lines)
-    return _read(lines, order / poles, evidence, interpretation, ties, mesh=True)
+    return _read(lines, order / poles, evidence, interpretation, ties, known=True, mesh=True)
 
 
 def _evidence(line: Line, order: float, resolution: float) -> Parameters:
@@ -207,6 +207,8 @@ def _read(
     evidence: Parameters,
     text: str,
     ties: tuple[str, ...],
+    *,
+    known: bool,
     effect: str = "ripple",
     mesh: bool = False,
 ) -> Reading:
@@ -219,7 +221,7 @@ def _read(
         evidence=evidence,
         lines=tuple(lines),
         fundamental=order,
-        known="unknown" not in text,
+        known=known,
         mesh=mesh,
     )
 
@@ -265,4 +267,5 @@ def _other(line: Line, track: Track, resolution: float) -> Reading:
                 effect, ties = name, ("ripple",)
                 text += " (the drive's current measurement, not the gear)"
     evidence = _evidence(line, line.order, resolution)
-    return _read([line], line.order, evidence, text, ties, effect)
+    known = "unknown" not in text
+    return _read([line], line.order, evidence, text, ties, known=known, effect=effect)

@@ -1,6 +1,6 @@
 """Which slow effects of the library acted in the target alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -105,7 +105,23 @@ def find_slow_causes(
         if cause.effect == "thermal_viscous":
             gone |= GREASE
         candidates = [term for term in candidates if term.effect.name not in gone]
-    return found
+    return _one_grease(ready, population, found)
+
+
+def _one_grease(
+    ready: list[Prepared], population: Population, found: list[SlowCause]
+) -> list[SlowCause]:
+    """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
+    names = [cause.effect for cause in found]
+    pair = {"thermal_viscous", "coulomb"}
+    if not pair <= set(names) or not _mostly_wet(*_relative(ready, population)):
+        return found
+    first, last = sorted(names.index(name) for name in pair)
+    one = [*found]
+    one[first] = replace(found[names.index("thermal_viscous")], shift=found[first].shift)
+    # Each cause's shift holds those before it: what comes before the later one takes it over.
+    one[last - 1] = replace(one[last - 1], shift=found[last].shift)
+    return [*one[:last], *one[last + 1 :]]
 
 
 def _next(
@@ -210,8 +226,7 @@ def _friction(
     if ready[0].unit.fine.temperature_c is not None:
         return cause  # as warm as ever
     dry, wet = _relative(ready, population)
-    as_cold = abs(wet) > 2 * abs(dry)
-    if as_cold and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
+    if _mostly_wet(dry, wet) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
         return _thermal(cause.shift, cause.p_value, ties, None)
     return cause
 
@@ -267,6 +282,11 @@ def _relative(ready: list[Prepared], population: Population) -> tuple[float, flo
         if name in changes and before != 0:
             changes[name] = float(after / before - 1)
     return changes["coulomb"], changes["viscous"]
+
+
+def _mostly_wet(dry: float, wet: float) -> bool:
+    """Tell whether friction changed as grease of another temperature changes it."""
+    return abs(wet) > 2 * abs(dry)
 
 
 def _contribution(ready: list[Prepared], shift: Shift) -> Floats:

@@ -121,6 +121,21 @@ def test_grease_of_another_temperature_is_stiffer_when_cold_and_not_by_more(
         assert "viscous" in cause.ties
 
 
+def test_cold_grease_that_stiffens_dry_friction_a_little_is_one_cause():
+    both = causes_of(lambda q, v, a, t: 0.25 * v + 0.18 * np.sign(v), colder=15.0, spread=0.0)
+    assert [cause.effect for cause in both] == ["thermal_viscous"]
+    names = [term.effect.name for term in both[0].shift.terms]
+    assert names == ["viscous", "coulomb"]
+    assert both[0].shift.coefficients == pytest.approx([0.25, 0.18], abs=0.03)
+    # Found before the dry friction, another payload keeps its place and holds both.
+    three = causes_of(
+        lambda q, v, a, t: 0.25 * v + 0.18 * np.sign(v) + payload(q, v, a, t), colder=15.0
+    )
+    assert [cause.effect for cause in three] == ["thermal_viscous", "payload_change"]
+    names = [[term.effect.name for term in cause.shift.terms] for cause in three]
+    assert names == [["viscous"], ["viscous", "payload_change", "coulomb"]]
+
+
 def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
     """Beside what sessions differ by it was sublinear, dry and quadratic friction."""
     assert causes_of(lambda q, v, a, t: 0.1 * np.cos(50 * q + 1)) == []

@@ -77,31 +77,83 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
     """Let the angle of a motion that repeats repeat.
 
     While the current is too small to be followed, the angle may slip by a multiple of pi. A stretch
-    of current has the angle that it had one cycle earlier. The angle stays as it was where there
-    are fewer than three cycles, or where a cycle ends elsewhere than it began by more than a tenth
-    of its travel: that is no slip.
+    of current has the angle that it had one cycle earlier; in the first cycle, the one that follows
+    from the median of all cycles' steps. The angle stays as it was where there are fewer than three
+    cycles, or where a cycle ends elsewhere than it began by more than a tenth of its travel: that
+    is no slip.
     """
-    path, strong = angle.angle_rad, angle.strong
-    twice = strong[period:] & strong[:-period]
-    if path.size // period < FEWEST_CYCLES or not twice.any():
+    path = angle.angle_rad
+    cycles = path.size // period
+    pieces = stretches(angle.strong, rate_hz)
+    if cycles < FEWEST_CYCLES or not pieces:
         return angle
-    drift = float(np.median((path[period:] - path[:-period])[twice]))
-    if abs(drift) > LARGEST_DRIFT * float(np.ptp(path[:period])):
+    course = _common_course(path, angle.strong, period, rate_hz)
+    if course is None:
         return angle
     repeated = path.copy()
     edges, slips = [0.0], [0.0]
-    slip = 0.0
-    for start, stop in stretches(strong, rate_hz):
+    slip, anchor = 0.0, None
+    for start, stop in pieces:
+        rest = path[start:stop] - course[np.arange(start, stop) % period]
+        # A cycle is no whole number of samples: the cycle before is nearer than the first.
         later = np.arange(max(start, period), max(stop, period))
-        later = later[strong[later - period]]
+        later = later[angle.strong[later - period]]
         if later.size:
             rest = path[later] - repeated[later - period]
             slip = np.pi * np.round(float(np.median(rest)) / np.pi)
+        elif np.isfinite(rest).any():
+            middle = float(np.nanmedian(rest))
+            anchor = middle if anchor is None else anchor
+            slip = np.pi * np.round((middle - anchor) / np.pi)
         repeated[start:] = path[start:] - slip
         edges += [float(start), float(stop)]
         slips += [slip, slip]
     correction = np.interp(np.arange(path.size), edges, slips)
     return replace(angle, angle_rad=path - correction)
+
+
+def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> Floats | None:
+    """One cycle of a path that repeats, NaN where few cycles have current.
+
+    From one stretch of current to the next the angle changes by what most cycles say; of a whole
+    cycle nothing may be left. None where that is no matter of a few turns in the longest gap.
+    """
+    cycles = path.size // period
+    folded = path[: cycles * period].reshape(cycles, period)
+    current = strong[: cycles * period].reshape(cycles, period)
+    common = np.mean(current, axis=0) > 0.5
+    anchors = stretches(common, rate_hz)
+    if not anchors:
+        return None
+    steps = []
+    places = [(start + stop) // 2 for start, stop in anchors]
+    for here, there in zip(places, [*places[1:], places[0] + period], strict=True):
+        known = np.flatnonzero(strong[here : path.size - there + here : period]) * period + here
+        known = known[strong[known + there - here]]
+        changes = path[known + there - here] - path[known] if known.size else np.zeros(1)
+        whole = np.round((changes - changes[0]) / np.pi)
+        values, counts = np.unique(whole, return_counts=True)
+        often = values[counts == counts.max()]
+        chosen = often[np.argmin(np.abs(often - np.median(whole)))]
+        steps.append(float(np.median(changes[whole == chosen])))
+    left = float(np.sum(steps))
+    heights = np.concatenate([[0.0], np.cumsum(steps)])
+    if abs(left) > LARGEST_DRIFT * float(np.ptp(heights)):
+        return None
+    turns = np.pi * np.round(left / np.pi)
+    if turns:
+        gaps = [
+            (start - stop) % period
+            for (_, stop), (start, _) in zip(anchors, [*anchors[1:], anchors[0]], strict=True)
+        ]
+        heights[int(np.argmax(gaps)) + 1 :] -= turns
+    course = np.full(period, np.nan)
+    for (start, stop), place, height in zip(anchors, places, heights, strict=False):
+        rows = np.flatnonzero(common[start:stop]) + start
+        about = np.where(current[:, [place]], folded - folded[:, [place]], np.nan)[:, rows]
+        inside = np.where(current[:, rows], about, np.nan)
+        course[rows] = height + np.nanmedian(inside, axis=0)
+    return course
 
 
 def lost(strong: Bools, rate_hz: float) -> Bools:

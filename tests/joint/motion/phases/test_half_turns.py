@@ -69,3 +69,19 @@ def test_a_joint_that_rests_without_current_has_not_turned():
     angle, _ = bridged(measured, strong, np.zeros(true.size), none, None, rate, 30.0)
     before, after = time_s < 1.7, time_s > 2.3
     assert abs(np.median((angle - true)[after]) - np.median((angle - true)[before])) < 0.1
+
+
+def test_a_cycle_of_gaps_is_counted_as_most_cycles_say():
+    rate, period, cycles = 500.0, 1000, 5
+    true = 200 * np.sin(2 * np.pi * np.arange(period * cycles + 300) / period)
+    strong = np.ones(true.size, dtype=bool)
+    path = true.copy()
+    for cycle in range(cycles):
+        start = cycle * period + 230
+        strong[start : start + 40] = False
+        # The first cycle is wrong: only the others tell.
+        path[start + 20 :] += np.pi * 3 * (cycle == 0)
+    speed, blur = np.gradient(path) * rate, np.zeros((true.size, 2))
+    angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
+    freed = without_slips(angle, period, rate).angle_rad
+    assert np.ptp((freed - true)[strong]) < 1e-6
