@@ -148,7 +148,7 @@ def compare_sessions(
             p_alone=p_alone,
             common_log_ratio=max(common, 0.0),
             witnesses={
-                name: _combined(p for voice, p in tails.items() if voice[0] == name)
+                name: joint.combined({v: p for v, p in tails.items() if v[0] == name})
                 for name in evidence[axis]
             },
             unusual_log_ratio=joint.unusual(),
@@ -222,6 +222,14 @@ class Joint:
         """Return the spread of healthy log distances that is expected of a voice."""
         return self._evidence[voice[0]].healthy_spread if voice[1] == "orthogonal" else ALONG_SPREAD
 
+    def weights(self, voices: Iterable[Voice]) -> list[float]:
+        """Return how much each voice counts for."""
+        return [self._evidence[name].weight for name, _ in voices]
+
+    def combined(self, tails: Mapping[Voice, float]) -> float:
+        """Combine the p-values of some voices; NaN without any."""
+        return harmonic_mean(list(tails.values()), self.weights(tails)) if tails else math.nan
+
     def depends_on_conditions(self, voice: Voice) -> bool:
         """Whether unusual conditions move a voice by more than its own error allows for."""
         return voice[1] == "orthogonal" and self._evidence[voice[0]].depends_on_conditions
@@ -255,7 +263,7 @@ class Joint:
         units = np.array([shifts[voice].unit for voice in self.voices])
         left = np.array([shifts[v].log_ratio - taken_off.get(v, 0.0) for v in self.voices])
         unit = float(1 / (1 / units).mean())
-        ratio = unit * float(soft_maximum(left / units))
+        ratio = unit * float(soft_maximum(left / units, self.weights(self.voices)))
         share = math.sqrt(1 / self.n_baseline + 1 / self.n_target)
         dof = min(shifts[voice].spread.dof for voice in self.voices)
         return Shift(ratio, unit, Spread(unit * share, dof))
@@ -270,7 +278,7 @@ class Joint:
         """Probability of such distances, after some of them is taken off; NaN if unknown."""
         if not self.voices:
             return math.nan
-        tail = _combined(self.tails(shifts, taken_off).values())
+        tail = self.combined(self.tails(shifts, taken_off))
         if self.n_target > 1:
             return self._p_by_exchange(tail, taken_off, exchange)
         places = self.places(scales, taken_off)
@@ -294,7 +302,7 @@ class Joint:
             each[-1] -= taken_off.get(voice, 0.0)
             standard = (each - middle) / scales[voice]
             rows.append(standard - unusual if self.depends_on_conditions(voice) else standard)
-        return soft_maximum(np.array(rows))
+        return soft_maximum(np.array(rows), self.weights(self.voices))
 
     def _p_by_exchange(
         self, tail: float, taken_off: Mapping[Voice, float], exchange: Exchange
@@ -308,7 +316,7 @@ class Joint:
             self._labelled = {
                 (name, kind): getattr(by_witness[name], kind) for name, kind in self.voices
             }
-        rows = []
+        rows = {}
         for voice in self.voices:
             logs = self._labelled[voice].copy()
             if not np.isfinite(logs).all():
@@ -316,10 +324,11 @@ class Joint:
             scale = MAD_TO_SIGMA * float(np.median(np.abs(logs - np.median(logs))))
             middle = np.median(logs)
             logs[0] -= taken_off.get(voice, 0.0)
-            rows.append((logs - middle) / max(scale, LEAST_SCALE))
+            rows[voice] = (logs - middle) / max(scale, LEAST_SCALE)
         if not rows:
             return 1.0
-        values = np.exp(np.clip(soft_maximum(np.array(rows)), -300, 300))
+        joined = soft_maximum(np.array(list(rows.values())), self.weights(rows))
+        values = np.exp(np.clip(joined, -300, 300))
         relabelled = relabelled_p_value(values, self.n_baseline + self.n_target)
         # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
         # observed one, the pairs' own tail may go below it, doubled for the second look.
@@ -345,11 +354,6 @@ def scales_of(joints: Iterable[Joint]) -> dict[Voice, float]:
         variance = (MAD_TO_SIGMA * float(np.median(deviations))) ** 2
         scales[voice] = moderated_spread(variance, dof, expected[voice]).scale
     return scales
-
-
-def _combined(tails: Iterable[float]) -> float:
-    known = list(tails)
-    return harmonic_mean(known) if known else math.nan
 
 
 def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:

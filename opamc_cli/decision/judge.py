@@ -116,8 +116,14 @@ class Judgement:
 
     @property
     def effect(self) -> float:
-        """The largest of the relative changes; NaN if none is known."""
-        return float(np.fmax.reduce(list(self.effects.values()), initial=math.nan))
+        """The largest of the relative changes; NaN if none is known.
+
+        One whose own witness places the target within the nearer half of healthy sessions is
+        chance, and counts only if all are.
+        """
+        known = self.effects.items()
+        heard = [size for name, size in known if not self.witnesses.get(name, 0.0) > 0.5]
+        return float(np.fmax.reduce(heard or list(self.effects.values()), initial=math.nan))
 
 
 def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int, Judgement]:

@@ -1,5 +1,7 @@
 """Corrections for having asked several joints, or several witnesses of one joint."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -30,19 +32,21 @@ def holm(p_values: ArrayLike) -> NDArray[np.float64]:
     return adjusted
 
 
-def harmonic_mean(p_values: ArrayLike) -> float:
+def harmonic_mean(p_values: ArrayLike, weights: Sequence[float] | None = None) -> float:
     """Combine p-values of one hypothesis that may depend on each other.
 
     Parameters
     ----------
     p_values : array_like, shape (N,)
         Without NaN.
+    weights : sequence of float, shape (N,), optional
+        Positive; all alike by default.
 
     Returns
     -------
     float
-        Between the least of them, if all agree, and N times that (Bonferroni), if one alone is
-        small.
+        Between the least of them, if all agree, and that over its share of the weights (of equal
+        ones N times: Bonferroni), if one alone is small.
 
     Notes
     -----
@@ -51,4 +55,5 @@ def harmonic_mean(p_values: ArrayLike) -> float:
     """
     # a tail too small for a floating point number is zero
     p = np.maximum(np.asarray(p_values, dtype=np.float64), np.finfo(np.float64).tiny)
-    return float(p.size / np.sum(1 / p))
+    least = p.min()
+    return float(least / np.average(least / p, weights=weights))

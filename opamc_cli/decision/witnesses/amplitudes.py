@@ -48,6 +48,7 @@ class AmplitudeEvidence:
     kinds: ClassVar[Sequence[Kind]] = ("score",)
     healthy_spread: ClassVar[Spread] = Spread(1.0, 1.0)
     """Not asked: it has no distance beyond."""
+    weight: ClassVar[float] = 1.0
     tells_conditions: ClassVar[bool] = False
     depends_on_conditions: ClassVar[bool] = False
 

@@ -26,6 +26,10 @@ class Evidence(Protocol):
         """Expected spread of a healthy session's log distance beyond."""
 
     @property
+    def weight(self) -> float:
+        """How much each of its distances counts for among all witnesses'."""
+
+    @property
     def tells_conditions(self) -> bool:
         """Whether its distance along says how unusual the conditions of a session were."""
 
@@ -128,13 +132,15 @@ def labelled_distances(evidence: Evidence, is_target: NDArray[np.bool_]) -> Dist
     return distances(evidence.blocks(), is_target, ~is_target, everyone)
 
 
-def soft_maximum(values: FloatArray) -> FloatArray:
-    """Log of the mean of exponentials.
+def soft_maximum(values: FloatArray, weights: Sequence[float]) -> FloatArray:
+    """Log of the weighted mean of exponentials.
 
     Parameters
     ----------
     values : ndarray, shape (V, ...)
-        Standardised, one row for each witness.
+        Standardised, one row for each voice.
+    weights : sequence of float, shape (V,)
+        Positive.
 
     Returns
     -------
@@ -143,4 +149,5 @@ def soft_maximum(values: FloatArray) -> FloatArray:
         do not see it, and what several see counts for more.
     """
     largest = values.max(axis=0)
-    return np.asarray(largest + np.log(np.exp(values - largest).mean(axis=0)))
+    mean = np.average(np.exp(values - largest), axis=0, weights=weights)
+    return np.asarray(largest + np.log(mean))

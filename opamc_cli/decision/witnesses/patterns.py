@@ -88,6 +88,7 @@ class PatternEvidence:
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal",)
     healthy_spread: ClassVar[Spread] = Spread(0.6, 4.0)
     """0.1, 0.5 and 1.0 in the middle of joints of three simulators (18 to 100 robots each)."""
+    weight: ClassVar[float] = 1.0
     tells_conditions: ClassVar[bool] = False
     depends_on_conditions: ClassVar[bool] = True
 

@@ -91,6 +91,7 @@ class ProfileEvidence:
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal", "score")
     healthy_spread: ClassVar[Spread] = Spread(0.65, 8.0)
     """0.47, 0.67 and 0.83 in the middle of joints of three simulators (18 to 100 robots each)."""
+    weight: ClassVar[float] = 1.0
     tells_conditions: ClassVar[bool] = True
     depends_on_conditions: ClassVar[bool] = False
 

@@ -33,3 +33,9 @@ def test_two_witnesses_together_keep_the_level_and_lie_between_the_least_and_its
     assert (together <= 2 * least).all()
     assert np.mean(together <= 0.01) == pytest.approx(0.0103, abs=0.0012)
     assert harmonic_mean([0.0, 0.5]) < 1e-300
+
+
+def test_a_lone_small_p_value_pays_for_its_share_of_the_weights():
+    assert harmonic_mean([1e-6, 1.0, 1.0], [2, 1, 1]) == pytest.approx(2e-6, rel=1e-5)
+    assert harmonic_mean([1.0, 1e-6, 1.0], [2, 1, 1]) == pytest.approx(4e-6, rel=1e-5)
+    assert harmonic_mean([0.0] * 5, [1, 3, 1, 1, 1]) < 1e-300

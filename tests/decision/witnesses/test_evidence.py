@@ -140,5 +140,7 @@ def test_a_ratio_is_of_geometric_means_beyond_and_of_arithmetic_ones_along():
 
 def test_a_soft_maximum_lies_between_the_mean_and_the_largest():
     values = np.array([[0.0, 5.0], [0.0, 0.0], [0.0, 0.0]])
-    found = soft_maximum(values)
+    found = soft_maximum(values, [1, 1, 1])
     np.testing.assert_allclose(found, [0.0, np.log((np.exp(5.0) + 2) / 3)])
+    heard = soft_maximum(values, [2, 1, 1])
+    np.testing.assert_allclose(heard, [0.0, np.log((2 * np.exp(5.0) + 2) / 4)])
