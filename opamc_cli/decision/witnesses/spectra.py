@@ -52,7 +52,7 @@ class SpectrumEvidence:
     healthy_spread: ClassVar[Spread] = Spread(0.15, 4.0)
     """0.06, 0.10, 0.22 and, of nights of sixteen files, 0.33 in the middle of joints of three
     simulators: worth four degrees of freedom only."""
-    weight: ClassVar[float] = 3.0
+    weight: ClassVar[float] = 5.0
     """It finds damage of the teeth long before the others do: see docs/decision.md."""
     tells_conditions: ClassVar[bool] = False
     depends_on_conditions: ClassVar[bool] = False
