@@ -118,7 +118,7 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
 
 
 def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
-    """Find pairs of joints of a run whose sizes, or those of their currents, are each the other's."""
+    """Find pairs of joints of a run whose sizes, or currents' sizes, are each the other's."""
     found = []
     for one, other in combinations(measured, 2):
         if one.run != other.run:

@@ -198,7 +198,7 @@ def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> li
 
 
 def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> dict[str, float]:
-    """Return how a reported current leans with the speed, has the rarer sign, and how large it is."""
+    """Return how a reported current leans with the speed, its rarer sign's share, and its size."""
     values = np.concatenate([look[current] for look in looks])
     speeds = [
         look[motion]
