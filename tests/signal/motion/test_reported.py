@@ -127,6 +127,14 @@ def test_short_rests_are_bridged_between_motions_of_one_direction():
     assert spans(joined) == [(0, 360, 1)]
 
 
+def test_swings_that_settle_a_motion_are_none():
+    settling = ((0, 20), (-0.1, 80), (0, 20), (0.06, 60))  # 4 % and 2 % of the way
+    assert spans(steps((1, 200), *settling, (0, 100), (-1, 200))) == [(0, 200, 1), (480, 680, -1)]
+    # after a rest, or over a longer way, it is a motion
+    assert len(spans(steps((1, 200), (0, 60), (-0.1, 80)))) == 2
+    assert len(spans(steps((1, 200), (0, 20), (-0.1, 101)))) == 2
+
+
 def test_short_motions_are_dropped():
     velocity = steps((1, 200), (0, 100), (1, 49), (0, 100), (1, 50))
     assert spans(velocity, least_s=0.05) == [(0, 200, 1), (449, 499, 1)]
