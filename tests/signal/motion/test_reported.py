@@ -128,11 +128,13 @@ def test_short_rests_are_bridged_between_motions_of_one_direction():
 
 
 def test_swings_that_settle_a_motion_are_none():
-    settling = ((0, 20), (-0.08, 120), (0, 20), (0.07, 110))  # 4.8 % and 3.9 %
-    assert spans(steps((1, 200), *settling, (0, 100), (-1, 200))) == [(0, 200, 1), (570, 770, -1)]
+    moved = ((0, 3000), (1, 200))
+    settling = ((0, 20), (-0.08, 120), (0, 20), (0.07, 110))  # 4.8 % and 3.9 % of the way
+    found = spans(steps(*moved, *settling, (0, 100), (-1, 200)))
+    assert found == [(3000, 3200, 1), (3570, 3770, -1)]
     # after a rest, or over a longer way, it is a motion
-    assert len(spans(steps((1, 200), (0, 60), (-0.08, 120)))) == 2
-    assert len(spans(steps((1, 200), (0, 20), (-0.1, 101)))) == 2
+    assert len(spans(steps(*moved, (0, 60), (-0.08, 120)))) == 2
+    assert len(spans(steps(*moved, (0, 20), (-0.08, 126)))) == 2
 
 
 def test_short_motions_are_dropped():
