@@ -254,7 +254,7 @@ def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:
 
 def _reason(why: str) -> str:
     """Return a reason as one line that every terminal can show."""
-    from opamc_cli.commands.terminal.tables import printable
+    from opamc_cli.commands.terminal.streams import printable
 
     told = printable(" ".join(why.split()))
     if not told:

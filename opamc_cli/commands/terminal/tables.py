@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from opamc_cli.commands.terminal.fitted import FittedTable
+from opamc_cli.commands.terminal.streams import printable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -129,11 +130,6 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
             *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
     return table
-
-
-def printable(text: str) -> str:
-    """Return text from a file without the control characters that steer a terminal."""
-    return "".join(c if c.isprintable() else "�" for c in text)
 
 
 def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":
