@@ -12,7 +12,7 @@ from opamc_cli.signal.motion.segmentation import hysteresis
 
 ON_SHARE = 0.05  # of the largest speed
 OFF_SHARE = 0.02
-SETTLING_SHARE = 0.05
+SETTLING_SHARE = 0.02
 """Of the way of a motion: what swings back by less at once after it is its settling, which is there
 in one recording and not in the next."""
 
@@ -129,7 +129,7 @@ def find_joint_motions(
 
     A motion reaches 5 % of the largest speed of the recording and lasts while the speed stays
     above 2 % of it, or above four standard deviations of the velocity's noise if that is more. What
-    follows it before a standstill and goes 5 % of its way at most is its settling, and no motion.
+    follows it before a standstill and goes 2 % of its way at most is its settling, and no motion.
 
     Parameters
     ----------

@@ -129,12 +129,12 @@ def test_short_rests_are_bridged_between_motions_of_one_direction():
 
 def test_swings_that_settle_a_motion_are_none():
     moved = ((0, 3000), (1, 200))
-    settling = ((0, 20), (-0.08, 120), (0, 20), (0.07, 110))  # 4.8 % and 3.9 % of the way
+    settling = ((0, 20), (-0.08, 48), (0, 20), (0.07, 40))  # 1.9 % and 1.4 % of the way
     found = spans(steps(*moved, *settling, (0, 100), (-1, 200)))
-    assert found == [(3000, 3200, 1), (3570, 3770, -1)]
+    assert found == [(3000, 3200, 1), (3428, 3628, -1)]
     # after a rest, or over a longer way, it is a motion
     assert len(spans(steps(*moved, (0, 60), (-0.08, 120)))) == 2
-    assert len(spans(steps(*moved, (0, 20), (-0.08, 126)))) == 2
+    assert len(spans(steps(*moved, (0, 20), (-0.08, 51)))) == 2
 
 
 def test_short_motions_are_dropped():
