@@ -85,7 +85,36 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
+    _have_caches()
     look_for_garbage_seldom()
+
+
+def _have_caches() -> None:
+    """Give the compiled loops and the fonts a place of this process where they have none to stay.
+
+    A service without a home, whose installation is not its own, cannot keep them: numba then
+    refuses to load.
+    """
+    home = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")  # noqa: PTH111
+    while not os.path.lexists(home) and home != os.path.dirname(home):  # noqa: PTH120
+        home = os.path.dirname(home)  # noqa: PTH120
+    if os.access(home, os.W_OK):
+        return
+    wanted = {"NUMBA_CACHE_DIR": os.path.dirname(__file__), "MPLCONFIGDIR": home}  # noqa: PTH120
+    missing = [
+        name
+        for name, own in wanted.items()
+        if name not in os.environ and not os.access(own, os.W_OK)
+    ]
+    if not missing:
+        return
+    import atexit
+    import shutil
+    import tempfile
+
+    folder = tempfile.mkdtemp(prefix="opamc-")
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    os.environ.update(dict.fromkeys(missing, folder))
 
 
 def _tell(message: str, code: int, given: Sequence[str]) -> None:

@@ -202,10 +202,13 @@ def find_reference(
     n = min(n, len(segments))
     starts = range(len(segments) - n + 1)[: max(n, 1)]
     # the first of the shifts that yield the most cycles; of equal ones, the one after the
-    # longest pause: a program waits between its cycles, if anywhere
-    counts = [
-        int(identify(segments.part(s, s + n), segments, rule).cycle.max(initial=-1)) for s in starts
-    ]
+    # longest pause: a program waits between its cycles, if anywhere. Where motions are alike, the
+    # series may hold more cycles beside a shift than at it: that one would not know itself again
+    counts = []
+    for start in starts:
+        found = identify(segments.part(start, start + n), segments, rule)
+        itself = np.array_equal(found.motion[start : start + n], np.arange(n))
+        counts.append(int(found.cycle.max(initial=-1)) if itself else UNIDENTIFIED)
     most = [s for s, count in zip(starts, counts, strict=True) if count == max(counts)]
     pauses = [_median_pause(segments.pause_s[s::n]) for s in most]
     start = most[int(np.argmax(pauses))] if _clearly_longer(pauses) else most[0]

@@ -171,7 +171,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Declared:
-    """What a user said: a baseline from a night on, or an alarm that is known."""
+    """What a user said: a baseline from a night on, or not after all, or an alarm that is known."""
 
     time: str
     robot: str
@@ -194,6 +194,17 @@ class AlarmRow:
     acknowledged: str | None
     text: str
     trend: str
+
+
+def begun_anew(declared: Iterable[Declared]) -> list[tuple[str, str]]:
+    """Return robot and first night of the baselines that were declared and not taken back."""
+    begun: dict[tuple[str, str], None] = {}
+    for one in declared:
+        if one.kind == "rebaselined":
+            begun[one.robot, one.night] = None
+        elif one.kind == "taken-back":
+            begun.pop((one.robot, one.night), None)
+    return sorted(begun)
 
 
 Row = TypeVar("Row")

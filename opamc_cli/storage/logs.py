@@ -28,7 +28,12 @@ from opamc_cli.storage.runs import Run, RunInfo
 BLOCK_BYTES = 1 << 22
 
 NO_TEXT = "\ufffd"
-"""In the place of a byte of a name that is no text."""
+"""In the place of a sign of a name that is no text."""
+
+NOT_IN_A_LINE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+"""Signs that break or turn a line, and bytes that are none."""
+
+NAMELESS = "its name holds control characters or is not UTF-8; rename it"
 
 A_NIGHT = r"\d{4}[-_.]?\d{1,2}[-_.]?\d{1,2}"
 """What stands for {night}, or is meant to; other names beside the nights are no logs."""
@@ -125,7 +130,7 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
             continue
         named = fits.groupdict()
         robot, night = named.get("robot") or "", named.get("night")
-        path, robot = _as_text(path), _as_text(robot)
+        path, robot = (NOT_IN_A_LINE.sub(NO_TEXT, text) for text in (path, robot))
         if robots is not None and robot and robot not in robots:
             continue
         night = _as_night(night)
@@ -148,7 +153,7 @@ def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
     """
     digest = hashlib.sha256()
     if NO_TEXT in log.path:
-        return digest.hexdigest(), Facts(error=f"{log.path}: its name is not UTF-8; rename it")
+        return digest.hexdigest(), Facts(error=f"{log.path}: {NAMELESS}")
     try:
         with at.open("rb") as file:
             while block := file.read(BLOCK_BYTES):
@@ -250,13 +255,6 @@ def _as_night(text: str | None) -> str | None:
         return None if text is None else date.fromisoformat(text).isoformat()
     except ValueError:
         return None
-
-
-def _as_text(name: str) -> str:
-    """Return a name with a sign in the place of bytes that are no text."""
-    if name.isascii():
-        return name
-    return "".join(NO_TEXT if "\ud800" <= sign <= "\udfff" else sign for sign in name)
 
 
 def _first_line(error: Exception) -> str:

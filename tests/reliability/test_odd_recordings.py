@@ -15,6 +15,7 @@ import pyarrow.parquet as pq
 import pytest
 from recordings import columns, record
 
+from opamc_cli.__main__ import _have_caches
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.recordings.axis_recording import read_recording
 from opamc_cli.storage.runs import Run
@@ -132,6 +133,42 @@ def test_an_environment_that_libraries_stumble_over(diagnosed, tmp_path):
         check=False,
     )
     assert ended.returncode == 0, ended.stderr
+
+
+def test_a_service_without_a_home_has_a_place_for_its_compiled_loops(monkeypatch):
+    """Numba refuses to load where it can write neither beside the loops nor at home."""
+    places = ("NUMBA_CACHE_DIR", "MPLCONFIGDIR")
+    for name in (*places, "XDG_CACHE_HOME"):
+        monkeypatch.setenv(name, "")  # restored at the end
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("HOME", "/nonexistent")
+    installed = Path(_have_caches.__code__.co_filename).parent
+    denied = {"/", str(installed)}
+    monkeypatch.setattr(os, "access", lambda path, _: str(path) not in denied)
+    _have_caches()
+    made = {Path(os.environ[name]) for name in places}
+    assert len(made) == 1
+    assert next(iter(made)).is_dir()
+    # what the user has set, or can write, is kept
+    before = dict(os.environ)
+    denied.clear()
+    _have_caches()
+    assert dict(os.environ) == before
+    shutil.rmtree(next(iter(made)))
+
+
+def test_names_that_are_no_text_are_one_line_each(opamc, tmp_path):
+    folder = tmp_path / "logs"
+    folder.mkdir()
+    for name in ("a.csv", os.fsdecode(b"b\xff\n.csv"), "c\nd\x1b[31m.csv"):
+        (folder / name).write_text("t,cur_1\n0,1\n")
+    ended = opamc("ingest", folder, "--map", "ur_rtde", "--out", tmp_path / "out")
+    assert ended.code == ExitCode.BAD_INPUT
+    lines = ended.err.splitlines()
+    assert len(lines) == 3
+    assert all(line.startswith("opamc: ") and line.isprintable() for line in lines)
+    assert sum("its name is not UTF-8; rename it" in line for line in lines) == 1
+    assert opamc("ingest", folder / "a.csv", "--guess").err == ""
 
 
 # -- what is not ours is not replaced --------------------------------------------------------

@@ -216,6 +216,19 @@ def test_a_reported_joint_that_cannot_be_judged(opamc, tmp_path, wrong):
     assert REPORTED[wrong] in " ".join(second["reasons"])
 
 
+def test_a_load_that_takes_one_sign_of_the_current_away_is_judged(opamc, tmp_path):
+    def loaded(columns):
+        columns["axis2_current"] += 1.1 * np.abs(columns["axis2_current"]).max()
+
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
+    target = record(tmp_path / "tonight.parquet", 9, loaded, made=recordings.reported)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.UNHEALTHY
+    assert "Axis 2" in ended.out
+    assert "sign" not in ended.out
+
+
 def test_reported_joints_that_are_healthy(opamc, tmp_path):
     for seed in range(3):
         record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
@@ -339,6 +352,27 @@ def test_joints_in_step_that_are_exchanged_are_known_by_their_size(
     ended = diagnose(opamc, *arguments)
     assert ended.code == ExitCode.NOT_ENOUGH_DATA
     assert "are the two exchanged?" in ended.err
+
+
+def test_currents_exchanged_beside_their_own_positions_are_known(opamc, tmp_path, monkeypatch):
+    monkeypatch.setitem(recordings.MOTIONS, 2, recordings.MOTIONS[1])
+
+    def doubled(columns):
+        for name in columns:
+            if name.startswith("axis2"):
+                columns[name] *= 2
+
+    def exchange(columns):
+        doubled(columns)
+        one, other = "axis1_current", "axis2_current"
+        columns[one], columns[other] = columns[other], columns[one]
+
+    for seed in range(3):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed, doubled, recordings.reported)
+    target = record(tmp_path / "tonight.parquet", 9, exchange, recordings.reported)
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert "the currents of axes 1 and 2 each look like the other" in ended.err
 
 
 @pytest.mark.long

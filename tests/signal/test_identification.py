@@ -92,6 +92,22 @@ def test_a_recording_that_starts_inside_a_cycle():
     assert found.cycle.tolist() == [-1, -1, *np.repeat(range(3), 4).tolist()]
 
 
+def test_a_reference_cycle_is_found_again_where_it_was_taken():
+    """More cycles fit beside a shift than at it where both halves of the program are alike."""
+    segments = SegmentFeatures(
+        np.tile([0.57, 0.87, 0.47, 0.5], 4),
+        np.tile([1.58, 1.25, 1.26, 1.53], 4),
+        np.full(16, 20.0),
+        np.tile([-1, 1], 8),
+        np.tile([0.3, 0.8, 0.9, 0.4], 4),
+    )
+    segments.pause_s[2::4] = 2.0  # the longest pause lies within the cycle
+    start, stop = find_reference(segments, RULE)
+    found = identify(segments.part(start, stop), segments, RULE)
+    assert (start, found.cycle.max()) == (0, 3)
+    assert found.similarity == pytest.approx(np.ones(16))
+
+
 def test_another_program_is_never_forced():
     other = [(1.0, 2.5, 120.0, 1, 0.3), (8.0, 0.2, 200.0, -1, 0.3)] * 6
     found = identify(series(CYCLE, noise=0), series(other), RULE)

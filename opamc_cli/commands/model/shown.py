@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from opamc_cli.commands.terminal.tables import printable
+from opamc_cli.commands.terminal.streams import printable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType

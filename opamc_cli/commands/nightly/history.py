@@ -73,7 +73,7 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
-    from opamc_cli.commands.terminal.tables import printable
+    from opamc_cli.commands.terminal.streams import printable
     from opamc_cli.stages.report.wording import number, p_value
 
     names = ("time", "robot", "axis", "kind", "text") if events else SHOWN

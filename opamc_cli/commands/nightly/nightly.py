@@ -191,12 +191,15 @@ def rebaseline(
         str, typer.Option("--from", metavar="DATE", help="First night of the new baseline.")
     ],
     why: Why,
+    undo: Annotated[
+        bool, typer.Option("--undo", help="Take the new baseline of that date back.")
+    ] = False,
     cell: Cell = DEFAULT_CELL,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
     """Begin a new baseline for a robot, such as after maintenance."""
-    from opamc_cli.storage.history import Declared
+    from opamc_cli.storage.history import Declared, begun_anew
 
     night = as_night(begin)
     assert night is not None
@@ -209,6 +212,14 @@ def rebaseline(
             has = f"it has {', '.join(sorted(known)[:8])}" if known else "no night is known yet"
             msg = f"{robot} is none of the cell's robots; {has}"
             raise UsageError(msg)
+        begun = [of for name, of in begun_anew(history.declared()) if name == robot]
+        if undo and night not in begun:
+            has = f"there are {', '.join(begun)}" if begun else "there is none"
+            msg = f"--from {night}: no baseline of {robot} was begun then by `rebaseline`; {has}"
+            raise UsageError(msg)
+        if undo:
+            text = f"new baseline from {night} on taken back: {why}"
+            return Declared(_now(), robot, None, "taken-back", night, why), text
         last = max([_now()[:10], *(of for _, of in history.nights())])
         if date.fromisoformat(night) > date.fromisoformat(last) + timedelta(AHEAD_DAYS):
             msg = f"--from {night}: lies more than a month ahead; check the year"
@@ -243,7 +254,7 @@ def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:
 
 def _reason(why: str) -> str:
     """Return a reason as one line that every terminal can show."""
-    from opamc_cli.commands.terminal.tables import printable
+    from opamc_cli.commands.terminal.streams import printable
 
     told = printable(" ".join(why.split()))
     if not told:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from io import StringIO
 from typing import TYPE_CHECKING, Any
 
-from opamc_cli.commands.terminal.streams import complain, say
+from opamc_cli.commands.terminal.streams import complain, printable, say
 from opamc_cli.errors import ExitCode
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ class Output:
     def note(self, text: str) -> None:
         """Print something worth knowing that is not the result."""
         if not self.quiet:
-            say(f"{text}\n", sys.stderr)
+            say(f"{printable(text)}\n", sys.stderr)
 
     def notes(self, texts: Sequence[str], verbose: bool = False) -> None:
         """Print notes, those that differ in nothing but the recording and numbers as one."""

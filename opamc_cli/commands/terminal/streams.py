@@ -48,12 +48,17 @@ LONGEST_WORD = 300
 
 
 def complain(text: str) -> None:
-    """Write an error, of whatever it quotes no more than a person would read."""
+    """Write an error on one line, of whatever it quotes no more than a person would read."""
     words = (
         word if len(word) <= LONGEST_WORD else f"{word[:150]}…{word[-100:]}"
-        for word in text.split(" ")
+        for word in printable(text).split(" ")
     )
     say(f"opamc: {' '.join(words)}\n", sys.stderr)
+
+
+def printable(text: str) -> str:
+    """Return text from a file without the control characters that steer a terminal."""
+    return "".join(c if c.isprintable() else "�" for c in text)
 
 
 def finish() -> None:

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from opamc_cli.commands.terminal.fitted import FittedTable
+from opamc_cli.commands.terminal.streams import printable
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -11,6 +12,9 @@ if TYPE_CHECKING:
     from rich.text import Text
 
     from opamc_cli.stages.report.results.inputs import ReportInputs
+
+ENOUGH_SESSIONS = 4
+"""Of the baseline: with fewer, limits are so wide that the reasons of each joint say so."""
 
 STYLES = {"healthy": "green", "changed": "yellow", "fault": "bold red", "unknown": "dim"}
 
@@ -77,7 +81,8 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     Returns
     -------
     list of Text
-        One line if all is well; a faulty joint has five at most.
+        One line if all is well, and one more of few baseline sessions; a faulty joint has five at
+        most.
     """
     from rich.text import Text
 
@@ -109,6 +114,11 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
         lines.append(Text(printable(f"  do first: {known['inspect']}")))
         lines += [Text(printable(f"  seen: {text}")) for text in known["evidence"]]
         lines.append(Text(printable(f"  against: {known['against']}")))
+    sessions = (verdict.get("baseline") or {}).get("sessions")
+    if healthy and isinstance(sessions, int) and sessions < ENOUGH_SESSIONS:
+        text = "1 baseline session says" if sessions == 1 else f"{sessions} baseline sessions say"
+        text += " little of how much healthy ones vary, and damage may not show: record more, "
+        lines.append(Text(f"{text}on other days", style="dim"))
     return lines
 
 
@@ -129,11 +139,6 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
             *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
     return table
-
-
-def printable(text: str) -> str:
-    """Return text from a file without the control characters that steer a terminal."""
-    return "".join(c if c.isprintable() else "�" for c in text)
 
 
 def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":

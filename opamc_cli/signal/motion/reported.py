@@ -1,5 +1,6 @@
 """Motions told from a joint's velocity, where the drive reports torque current only."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,10 @@ from opamc_cli.signal.motion.segmentation import hysteresis
 
 ON_SHARE = 0.05  # of the largest speed
 OFF_SHARE = 0.02
+SETTLING_SHARE = 0.02
+"""Of the way of a motion: what swings back by less at once after it is its settling, which is there
+in one recording and not in the next."""
+
 MOVING_SHARE = 0.3  # of the largest speed: clearly on its way
 PROBE = 1 << 20
 
@@ -123,7 +128,8 @@ def find_joint_motions(
     """Motions of a joint from its velocity, by hysteresis on each sign by itself.
 
     A motion reaches 5 % of the largest speed of the recording and lasts while the speed stays
-    above 2 % of it, or above four standard deviations of the velocity's noise if that is more.
+    above 2 % of it, or above four standard deviations of the velocity's noise if that is more. What
+    follows it before a standstill and goes 2 % of its way at most is its settling, and no motion.
 
     Parameters
     ----------
@@ -165,9 +171,21 @@ def find_joint_motions(
             joined.append((start, stop, sign))
     return [
         JointMotion(a, b, sign, float(np.quantile(np.abs(velocity[a:b]), 0.99)))
-        for a, b, sign in joined
+        for a, b, sign in _without_settling(joined, velocity, min_still_s * fs_hz)
         if b - a >= max(min_motion_s * fs_hz, FEWEST_SAMPLES)
     ]
+
+
+def _without_settling(
+    swings: list[tuple[int, int, int]], velocity: NDArray[np.float64], still: float
+) -> Iterator[tuple[int, int, int]]:
+    way = last = 0.0
+    for start, stop, sign in swings:
+        own = float(np.abs(velocity[start:stop]).sum())
+        if start - last >= still or own > SETTLING_SHARE * way:
+            way = own
+            yield start, stop, sign
+        last = stop
 
 
 def _probe(velocity: NDArray[np.float64]) -> NDArray[np.float64]:

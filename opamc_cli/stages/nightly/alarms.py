@@ -16,7 +16,7 @@ from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 from opamc_cli.decision.trend.chart import control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
-from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow
+from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow, begun_anew
 
 LIMIT = 4.0
 """Standard deviations of the chart's average that count as a signal. On six virtual robots over
@@ -226,8 +226,7 @@ def _after_maintenance(
     alarm: AlarmRow, nights: Sequence[NightRow], declared: Sequence[Declared]
 ) -> str:
     """Return the first night of a baseline that was declared after an alarm; empty without one."""
-    begun = [one.night for one in declared if one.kind == "rebaselined"]
-    after = [night for night in begun if night > alarm.raised]
+    after = [night for _, night in begun_anew(declared) if night > alarm.raised]
     if alarm.cleared is not None or not after:
         return ""
     # a date that is still to come, or was mistyped, silences nothing
@@ -238,8 +237,12 @@ def _not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int)
     for unjudged, part in groupby(rows, key=lambda row: row["state"] not in JUDGED):
         streak = list(part)
         if unjudged:
-            first = streak[0]
-            text = f"{name}: not judged since {first['night']}: {streak[-1]['reason']}"
+            first, last = streak[0], streak[-1]
+            span = f"since {first['night']}"
+            if last is not rows[-1]:  # it was judged again
+                span = f"from {first['night']} to {last['night']}"
+                span = first["night"] if first is last else span
+            text = f"{name}: not judged {span}: {last['reason']}"
             for night in _said(streak, remind_after):
                 yield Event(night, first["robot"], first["axis"], "not-judged", text)
 

@@ -39,6 +39,7 @@ from opamc_cli.storage.history import (
     NightRow,
     VerdictRow,
     as_notes,
+    begun_anew,
 )
 from opamc_cli.storage.logs import copy_name
 from opamc_cli.storage.schemas import files
@@ -206,10 +207,9 @@ class _Past:
         self.pinned: dict[str, dict[tuple[str, str, str], list[str]]] = {}
         for (robot, *key), nights in history.baselines().items():
             self.pinned.setdefault(robot, {})[key[0], key[1], key[2]] = nights
-        self.begun: dict[str, set[str]] = {}
-        for one in history.declared():
-            if one.kind == "rebaselined":
-                self.begun.setdefault(one.robot, set()).add(one.night)
+        self.begun: dict[str, list[str]] = {}
+        for robot, night in begun_anew(history.declared()):
+            self.begun.setdefault(robot, []).append(night)
 
 
 def _robot_plan(
@@ -220,7 +220,7 @@ def _robot_plan(
     situation = Situation(
         baseline=cell.baseline,
         fixed=recordings.baseline_by_robot[robot],
-        begun=sorted(past.begun.get(robot, ())),
+        begun=past.begun.get(robot, ()),
         pinned=past.pinned.get(robot, {}),
         recorded=past.recorded.get(robot, {}),
         config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),

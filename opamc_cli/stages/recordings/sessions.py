@@ -19,6 +19,8 @@ class Sessions:
     """Session by run name."""
     told_by: tuple[str, ...]
     """How they were told apart, by preference: "session", "night", "folder", "file"."""
+    wrong_clocks: int = 0
+    """Recordings whose `started_at` is more than a day off the date of their folder."""
 
     def __len__(self) -> int:
         """Return the number of sessions."""
@@ -43,13 +45,20 @@ def sessions_of(
     Returns
     -------
     Sessions
-        By metadata `session`, else the day of `started_at`, else the folder, else the file.
+        By metadata `session`, else the day of `started_at`, else the folder, else the file. A
+        folder whose name is a date more than a day off comes before `started_at`: a clock that was
+        never set would make one session of all.
     """
     told: dict[str, tuple[str, str]] = {}
+    wrong_clocks = 0
     for source in sources:
         night = night_of(source.info.started_at, day_starts_at_h)
+        named = _date_of(source.path.parent.name)
         if source.info.session is not None:
             told[source.name] = (BY_SESSION, source.info.session)
+        elif night and named and abs((night - named).days) > 1:
+            wrong_clocks += 1
+            told[source.name] = (BY_FOLDER, source.path.parent.as_posix())
         elif night is not None:
             told[source.name] = (BY_NIGHT, night.isoformat())
         elif by_folder:
@@ -61,7 +70,15 @@ def sessions_of(
         # a night and a folder may have the same name and are not the same session
         {run: name if len(kinds) == 1 else f"{kind} {name}" for run, (kind, name) in told.items()},
         tuple(kind for kind in (BY_SESSION, BY_NIGHT, BY_FOLDER, BY_FILE) if kind in kinds),
+        wrong_clocks,
     )
+
+
+def _date_of(name: str) -> date | None:
+    try:
+        return date.fromisoformat(name)
+    except ValueError:
+        return None
 
 
 def lie_in_folders(baseline: "Sequence[RunSource]") -> bool:
@@ -107,6 +124,11 @@ def in_words(baseline: Sessions, target: Sessions) -> list[str]:
             notes.append(
                 f"{name}: {len(side.of_run)} runs are {len(side)} "
                 f"session{'' if len(side) == 1 else 's'}, told apart by {' and '.join(kinds)}"
+            )
+        if side.wrong_clocks:
+            notes.append(
+                f"{name}: started_at of {side.wrong_clocks} of {len(side.of_run)} runs is more "
+                "than a day off the date of their folder, which counts; set the logger's clock"
             )
     alone = sum(len(side) for side in (baseline, target) if BY_FILE in side.told_by)
     if alone > 2:

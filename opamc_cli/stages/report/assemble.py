@@ -94,7 +94,8 @@ def render(
             with undocumented():
                 from opamc_cli.stages.report.figures.shown import EVIDENCE
 
-            evidence = _draw(EVIDENCE, lambda draw: draw(drawn, focus))
+            looked_at = choose_focus(drawn)  # the worst of all may be a healthy one
+            evidence = _draw(EVIDENCE, lambda draw: draw(drawn, looked_at))
         views = {axis: axis_view(inputs, axis, focus) for axis in by_severity(inputs)}
     else:
         evidence, views = Section((), ()), {}

@@ -97,15 +97,15 @@ def run(
         inputs=[table_input(motions)],
     )
     order, gamma = _best(known)
-    few = {
-        each: fewest
-        for each in sorted(set(orders))
-        if (fewest := min(r["patterns_per_cell"] for r in rated if r["order"] == each)) < 1
-    }
+    few: dict[int, tuple[float, float]] = {}  # the smallest γ of an order with too few
+    for row in rated:
+        if row["patterns_per_cell"] < 1:
+            own = row["gamma"], row["patterns_per_cell"]
+            few[row["order"]] = min(own, few.get(row["order"], own))
     warnings = tuple(
-        f"order {each}: {fewest:.2g} patterns for each possible one in the shortest motion; its "
-        "divergence is mostly chance"
-        for each, fewest in few.items()
+        f"order {each}, gamma {scale:g} and more: {least:.2g} patterns for each possible one in "
+        "the shortest motion; its divergence is mostly chance"
+        for each, (scale, least) in sorted(few.items())
     )
     return SelectionOutcome(out / files.SELECTION, table, order, gamma, warnings, outcome.errors)
 

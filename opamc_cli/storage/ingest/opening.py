@@ -39,6 +39,9 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
     InputError
         If it is missing, damaged or not of its format, or a library to read it is not installed.
     """
+    if any("\ud800" <= sign <= "\udfff" for sign in str(path)):
+        msg = f"{str(path)!r}: its name is not UTF-8; rename it"
+        raise InputError(msg)
     if path.is_dir() and not is_ros2_bag(path):
         msg = f"{path}: is a folder where a recording is needed; name the files in it"
         raise InputError(msg)

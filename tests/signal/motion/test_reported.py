@@ -127,6 +127,16 @@ def test_short_rests_are_bridged_between_motions_of_one_direction():
     assert spans(joined) == [(0, 360, 1)]
 
 
+def test_swings_that_settle_a_motion_are_none():
+    moved = ((0, 3000), (1, 200))
+    settling = ((0, 20), (-0.08, 48), (0, 20), (0.07, 40))  # 1.9 % and 1.4 % of the way
+    found = spans(steps(*moved, *settling, (0, 100), (-1, 200)))
+    assert found == [(3000, 3200, 1), (3428, 3628, -1)]
+    # after a rest, or over a longer way, it is a motion
+    assert len(spans(steps(*moved, (0, 60), (-0.08, 120)))) == 2
+    assert len(spans(steps(*moved, (0, 20), (-0.08, 51)))) == 2
+
+
 def test_short_motions_are_dropped():
     velocity = steps((1, 200), (0, 100), (1, 49), (0, 100), (1, 50))
     assert spans(velocity, least_s=0.05) == [(0, 200, 1), (449, 499, 1)]

@@ -125,6 +125,14 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     )
     assert rows(cell, "SELECT cleared FROM alarm") == [(NIGHTS[4],)]
 
+    # a mistake is taken back: all is as it was
+    assert opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[4], "--undo", *at).code == 0
+    assert states(json.loads(opamc("nightly", cell, "--json").out)["robots"])["r2"] == "known"
+    assert rows(cell, "SELECT cleared FROM alarm") == [(None,)]
+    twice = opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[4], "--undo", *at)
+    assert twice.code == ExitCode.USAGE
+    assert "no baseline of r2 was begun then by `rebaseline`; there is none" in twice.err
+
     # a new gear, a new baseline: two nights are not enough for it yet
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[3], "--why", "new gear", "--cell", cell)
     after = opamc("nightly", cell, "--json")

@@ -67,11 +67,17 @@ def test_names_that_are_no_text_are_their_robots_line(small, opamc):
     logs = small.parent / "logs"
     (logs / "r1").rename(logs / "Röbot 1")
     shutil.copytree(logs / "Röbot 1", logs / os.fsdecode(b"\xff2"))
+    shutil.copytree(logs / "Röbot 1", logs / "a\nb\x1b[31m")
     ended = opamc("nightly", small, "--json")
     assert ended.code == ExitCode.PARTIAL
     robots = json.loads(ended.out)["robots"]
     assert robots["Röbot 1"]["failed"] == []
-    assert "its name is not UTF-8; rename it" in robots["\ufffd2"]["failed"][0]["why"]
+    for name in ("\ufffd2", "a\ufffdb\ufffd[31m"):
+        why = robots[name]["failed"][0]["why"]
+        assert why.endswith("its name holds control characters or is not UTF-8; rename it")
+        assert why.isprintable()
+    again = opamc("nightly", small)
+    assert all(line.isprintable() for line in again.out.splitlines())
 
 
 def test_joints_that_are_not_there_stay_a_failure(cell, opamc):

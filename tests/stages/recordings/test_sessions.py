@@ -59,3 +59,17 @@ def test_many_files_of_one_night_are_said_to_be_one_session():
     found = sessions_of(runs, 12.0)
     assert len(found) == 1
     assert "3 runs are 1 session, told apart by night" in in_words(found, found)[0]
+
+
+def test_a_clock_that_was_never_set_does_not_make_one_session_of_dated_folders():
+    never = "1970-01-01T00:00:40Z"
+    runs = [source(f"2026-03-0{k}/{k}.parquet", started_at=never) for k in (1, 2, 3)]
+    found = sessions_of(runs, 12.0, lie_in_folders(runs))
+    assert (len(found), found.told_by, found.wrong_clocks) == (3, ("folder",), 3)
+    assert "more than a day off the date of their folder" in " ".join(in_words(found, found))
+    # a folder of the next morning is the same night
+    near = [
+        source("2026-03-01/1.parquet", started_at="2026-03-01T22:00:00Z"),
+        source("2026-03-02/2.parquet", started_at="2026-03-02T03:00:00Z"),
+    ]
+    assert len(sessions_of(near, 12.0, lie_in_folders(near))) == 1

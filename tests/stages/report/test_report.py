@@ -290,3 +290,12 @@ def test_a_loop_alone_makes_a_report(tmp_path: Path) -> None:
     assert "Model of axis 3: closed, 2 effects added" in page.words()
     assert "To tell ripple from elasticity: move at two more speeds" in page.words()
     assert outcome.omitted == ("diagnosis: scores.parquet is absent; `opamc diagnose` writes it",)
+
+
+def test_figures_without_healthy_joints_show_one_that_is_not(folder: Path) -> None:
+    verdict = json.loads((folder / "verdict.json").read_text())
+    for entry in verdict["axes"]:  # a healthy joint is the worst of those that were judged
+        entry["state"] = "healthy" if entry["axis"] == 3 else "insufficient-data"
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+    made = report.run(folder, figures_of_healthy=False)
+    assert "envelopes" in _Page(made.path.read_text()).figures()

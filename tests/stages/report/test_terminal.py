@@ -200,3 +200,11 @@ def test_what_is_not_judged_says_why_in_a_line() -> None:
     verdict = {"axes": [axis(1, "healthy"), axis(2, "insufficient-data", reasons=["too short"])]}
     lines = [line.plain for line in verdict_lines(verdict)]
     assert lines == ["Axis 2 not judged for want of data; axis 1 healthy", "axis 2: too short"]
+
+
+def test_few_baseline_sessions_are_no_proof_of_health() -> None:
+    for n, said in ((1, "1 baseline session says"), (3, "3 baseline sessions say"), (4, "")):
+        verdict = {"axes": [axis(1, "healthy")], "baseline": {"sessions": n}}
+        lines = [line.plain for line in verdict_lines(verdict)]
+        assert len(lines) == 1 + bool(said)
+        assert lines[-1].startswith(said)

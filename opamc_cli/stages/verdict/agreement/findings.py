@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from statistics import median_low
@@ -67,6 +67,7 @@ class Reference:
     clipped: Mapping[int, float]
     leaning: Mapping[int, float]
     reversing: Mapping[int, float]
+    level: Mapping[int, float]
     changing: Mapping[int, float]
 
 
@@ -90,6 +91,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([_most_clipped(own)[1] for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
     )
 
@@ -97,45 +99,54 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
 def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
     """Return what forbids the comparison of an axis of a run with the baseline.
 
-    The first rule that applies names the reason.
+    Joints that are exchanged first: the signs and sizes of each are wrong besides. Else the first
+    rule that applies names the reason.
     """
-    found = []
-    for own in measured:
-        if own.axis in reference.signal:
-            rules = RULES if own.moves else RULES_AT_REST
-            why = next((why for rule in rules if (why := rule(own, reference))), None)
-            if why is not None:
-                found.append(Finding(own.run, own.axis, why))
-            elif not own.moves:
-                found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
-    known = {(finding.run, finding.axis) for finding in found}
-    left = [own for own in measured if own.moves and (own.run, own.axis) not in known]
-    return found + _exchanged(left, reference)
+    known = [own for own in measured if own.axis in reference.signal]
+    found = _exchanged([own for own in known if own.moves], reference)
+    told = {(finding.run, finding.axis) for finding in found}
+    for own in known:
+        if (own.run, own.axis) in told:
+            continue
+        rules = RULES if own.moves else RULES_AT_REST
+        why = next((why for rule in rules if (why := rule(own, reference))), None)
+        if why is not None:
+            found.append(Finding(own.run, own.axis, why))
+        elif not own.moves:
+            found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
+    return found
 
 
 def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
-    """Find pairs of joints of a run whose sizes are each the other's."""
+    """Find pairs of joints of a run whose sizes, or currents' sizes, are each the other's."""
     found = []
     for one, other in combinations(measured, 2):
         if one.run != other.run:
             continue
-        own = min(_away(each, each.axis, reference) for each in (one, other))
-        across = max(_away(one, other.axis, reference), _away(other, one.axis, reference))
-        if across <= math.log(ALIKE) and own >= math.log(UNLIKE):
-            why = (
-                f"axes {one.axis} and {other.axis} each look like the other: are the two exchanged?"
+        for kinds, what in ((one.size.keys(), "axes"), (("current",), "the currents of axes")):
+            own = min(_away(each, each.axis, reference, kinds) for each in (one, other))
+            across = max(
+                _away(one, other.axis, reference, kinds), _away(other, one.axis, reference, kinds)
             )
-            found += [Finding(each.run, each.axis, why) for each in (one, other)]
+            if across <= math.log(ALIKE) and own >= math.log(UNLIKE):
+                why = (
+                    f"{what} {one.axis} and {other.axis} each look like the other: are the two "
+                    "exchanged?"
+                )
+                found += [Finding(each.run, each.axis, why) for each in (one, other)]
+                break
     return found
 
 
-def _away(own: Measured, axis: int, reference: Reference) -> float:
+def _away(own: Measured, axis: int, reference: Reference, kinds: Iterable[str]) -> float:
     """Return by how much, as a logarithm, the sizes of an axis are not those of one's baseline."""
-    usual = {kind: reference.size.get((axis, kind), 0.0) for kind in own.size}
-    pairs = [(own.size[kind], usual[kind]) for kind in usual]
-    if not all(size > 0 and known > 0 for size, known in pairs):
-        return math.inf if axis != own.axis else 0.0
-    return max(abs(math.log(size / known)) for size, known in pairs)
+    return max(
+        _away_by(own.size.get(kind, 0.0), reference.size.get((axis, kind), 0.0)) for kind in kinds
+    )
+
+
+def _away_by(size: float, usual: float) -> float:
+    return abs(math.log(size / usual)) if size > 0 and usual > 0 else math.inf
 
 
 def _other_signal(own: Measured, reference: Reference) -> str | None:
@@ -168,9 +179,10 @@ def _other_unit(own: Measured, reference: Reference) -> str | None:
                 )
             times = f"{size / usual:.3g}" if usual > 0 else "infinitely many"
             unit = {"current": "mA for A", "position": "degrees", "velocity": "degrees or rpm"}
+            little = ", or hardly any of the program's motion" if size < usual else ""
             return (
                 f"the {kind} of axis {own.axis} is {times} times the baseline's: another unit "
-                f"({unit[kind]})? Check the map of `opamc ingest`, and the sensor"
+                f"({unit[kind]}){little}? Check the map of `opamc ingest`, and the sensor"
             )
     return None
 
@@ -206,9 +218,11 @@ def _clipped(own: Measured, reference: Reference) -> str | None:
 
 def _other_sign(own: Measured, reference: Reference) -> str | None:
     usual = reference.leaning[own.axis], reference.reversing[own.axis]
-    if own.leaning is None or own.reversing is None:
+    if own.leaning is None or own.reversing is None or own.level is None:
         return None
-    if own.reversing == 0 and usual[1] >= REVERSING:
+    # a load that is always there takes one sign away, too, but adds to the current
+    as_large = _away_by(own.level, reference.level[own.axis]) <= math.log(ALIKE)
+    if own.reversing == 0 and usual[1] >= REVERSING and as_large:
         return f"the current of axis {own.axis} has lost its sign; log it with its sign"
     if own.leaning * usual[0] < 0 and min(abs(own.leaning), abs(usual[0])) >= TURNED:
         return (

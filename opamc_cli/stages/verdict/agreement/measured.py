@@ -58,6 +58,8 @@ class Measured:
     None without one."""
     reversing: float | None = None
     """Of a reported current: share of the samples that have the rarer of both signs."""
+    level: float | None = None
+    """Of a reported current: root mean square with its mean, which no sign changes."""
 
 
 @dataclass(frozen=True)
@@ -196,7 +198,7 @@ def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> li
 
 
 def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> dict[str, float]:
-    """Return how a reported current leans with the speed, and how often it has the rarer sign."""
+    """Return how a reported current leans with the speed, its rarer sign's share, and its size."""
     values = np.concatenate([look[current] for look in looks])
     speeds = [
         look[motion]
@@ -209,6 +211,7 @@ def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> 
     return {
         "leaning": float(drawn / size) if size else 0.0,
         "reversing": min(signed) / max(sum(signed), 1),
+        "level": _rms([values]),
     }
 
 

@@ -5,13 +5,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.storage.ingest.map.axes import has_placeholder
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion
 from opamc_cli.storage.ingest.source import Listed, Name
 from opamc_cli.storage.schemas.channels import LOGGED
 
 WORDS = {
     **{name: channel.words for name, channel in reversed(LOGGED.items()) if not channel.vague},
     "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
-    "current": ("cur", "curr", "current", "currents", "iq", "amp", "amps", "ampere"),
+    "current": ("cur", "curr", "current", "currents", "iq", "amp", "amps", "ampere", "strom"),
     **{name: channel.words for name, channel in LOGGED.items() if channel.vague},
     "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit"),
 }
@@ -41,6 +42,9 @@ PHASES = {"a": "a", "b": "b", "c": "c", "u": "a", "v": "b", "w": "c"}
 PHASE_NAME = re.compile(r"(?:^|.*[^a-z])(?:i|ia|cur|current|phase|ph|is)[ _.\-]?([abcuvw])$", re.I)
 """Such as `I_u`, `phase_b`, `axis1_current_c`, once the axis' number is taken out."""
 
+
+UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
+"""Such as `Current J1 [mA]`, `time (ms)`."""
 
 AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
 
@@ -79,26 +83,35 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
         if isinstance(channel.name, int):
             continue
         name = str(channel.name)
+        bare, unit = _without_unit(name)
+        unit = channel.unit or unit
         if channel.width is not None:
-            quantity = _quantity(name)
+            quantity = _quantity(bare)
             if quantity and quantity != "time":
                 found += [
-                    Meant(quantity, k, name, name, k, _is_measured(name), channel.unit)
+                    Meant(quantity, k, name, name, k, _is_measured(name), unit)
                     for k in range(channel.width)
                 ]
             continue
         number, pattern = _numbered(name) if counted else (None, name)
-        quantity = "time" if channel.dates else _quantity(pattern)
+        quantity = "time" if channel.dates else _quantity(_without_unit(pattern)[0])
         if quantity is None or has_placeholder(name):
             continue
         measured = _is_measured(pattern)
-        found.append(Meant(quantity, number, pattern, name, None, measured, channel.unit))
+        found.append(Meant(quantity, number, pattern, name, None, measured, unit))
     if {"a", "b", "c"} <= {each.quantity for each in found}:
         return found
     # what ends in `_a` and has no `_b` and `_c` beside it is in ampere
     return [
         replace(each, quantity="current") if each.quantity in PHASES else each for each in found
     ]
+
+
+def _without_unit(name: str) -> tuple[str, str | None]:
+    """Return a name without the unit in brackets at its end, and that unit."""
+    found = UNIT.search(name)
+    known = found is not None and any(conversion(found[1], quantity) for quantity in CONVERSIONS)
+    return (name[: found.start()], found[1]) if found is not None and known else (name, None)
 
 
 def _quantity(pattern: str) -> str | None:

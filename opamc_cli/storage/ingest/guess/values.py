@@ -135,6 +135,8 @@ def _steps_over_speed(positions: Mapping[int, Float], speeds: Mapping[int, Float
         position, speed = positions[axis], speeds[axis]
         # central differences: a speed that is filtered lags by half a step and no more
         step = (position[2:] - position[:-2]) / 2
+        if not np.isfinite(step).any():
+            continue
         middle = speed[1:-1]
         jump = np.abs(step) > 10 * np.nanmedian(np.abs(step)) + 1e-12
         known = np.isfinite(step) & np.isfinite(middle) & ~(jump & (np.abs(step) > 1))

@@ -71,7 +71,7 @@ def guess_map(paths: Sequence[Path]) -> str:
         If a recording cannot be read, or nothing in it looks like a current.
     """
     look = _look(paths[0])
-    if not look.choices:
+    if not any(kind in look.choices for kind in CURRENTS):
         msg = (
             f"{paths[0]}: no channel looks like a motor current or torque "
             f"({', '.join(look.unused[:12]) or 'no names'}); write the map by hand, see "

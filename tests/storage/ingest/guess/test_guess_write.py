@@ -169,3 +169,8 @@ def test_three_columns_without_names_are_phases_if_they_behave_so(tmp_path):
         np.savetxt(path, others, delimiter=",")
         with pytest.raises(InputError, match="no channel looks like a motor current"):
             guess_map([path])
+
+
+def test_positions_without_a_current_are_answered_with_what_is_there(tmp_path):
+    with pytest.raises(InputError, match=r"no channel looks like a motor current .*q_#.*by hand"):
+        guess_map([table(tmp_path / "a.csv", {"t": T, "q_1": SPEED, "q_2": SPEED})])

@@ -6,7 +6,7 @@ from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.source import Listed
 
 KNOWN = {
-    "current": "cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1",
+    "current": "cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1 A1_Strom_1",
     "torque": "torque_1 torques_1 effort_1 tau_1 moment_1 JointTrq1",
     "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1",
     "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1",
@@ -77,3 +77,14 @@ def test_columns_of_one_channel_are_axes_and_dates_are_time():
         Meant("time", None, "when", "when", None, True, None),
     ]
     assert meanings([Listed("time", width=2), Listed("tcp_pose", width=6)]) == []
+
+
+def test_a_unit_in_brackets_at_the_end_of_a_name_is_its_unit_and_no_word_of_it():
+    found = [only(n) for n in ("J1 Current [mA]", "q_1 (°)", "A1 Strom (A)", "time [ms]")]
+    assert [(each.quantity, each.number, each.unit) for each in found] == [
+        ("current", 1, "mA"),
+        ("position", 1, "°"),
+        ("current", 1, "A"),
+        ("time", None, "ms"),
+    ]
+    assert only("current [1]").unit is None
