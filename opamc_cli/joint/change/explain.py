@@ -4,14 +4,15 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import energy_of, rest_growth, shift_power
+from opamc_cli.joint.change.energy import energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Finding, Reading
 from opamc_cli.joint.change.search import SlowCause, find_slow_causes
-from opamc_cli.joint.change.slow import learn
-from opamc_cli.joint.change.units import Follow, follow, followed, read_side, usable_terms
+from opamc_cli.joint.change.slow import learn, shift_power, with_model
+from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 
@@ -116,32 +117,35 @@ def explain_change(
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS
-    before = read_side(baseline, joint, after=False, cycles=cycles, follow=follow)
-    after = read_side(target, joint, after=True, cycles=cycles)
+    before = read_side(baseline, joint, cycles, follow)
+    after = read_side(target, joint, cycles)
     if not before or not after:
         side = "target" if before else "baseline"
         return Change((), 0.0, False, why_not=f"too little motion in the {side}")
-    terms = usable_terms(before + after, [effect_named(library, name) for name in DECLARED])
-    before, after = followed(before, after, terms)
-    if len(before) < 2 or not after:
+    compared = side_by_side(before, after)
+    declared = [effect_named(library, name) for name in DECLARED]
+    terms = tuple(Term(one, {}) for one in declared if one.untestable(compared.track) is None)
+    compared = followed(compared, terms)
+    late = compared.after
+    if np.count_nonzero(~late) < 2 or not late.any():
         why = "too few cycles or recordings whose torque axis can be followed"
         return Change((), 0.0, False, why_not=why)
-    if not any(unit.current_a().any() for unit in before):
+    if not compared.sums(()).power[~late].any():
         return Change((), 0.0, False, why_not="no current in the baseline")
-    population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
-    units = [unit.with_model(terms, population.mean) for unit in before + after]
+    population = learn(compared, terms, SESSIONS_DIFFER if cycles else 0.0)
+    compared = with_model(compared, population)
 
-    slow = find_slow_causes(units, population, library)
-    residuals = fast_residuals(units, terms, slow[-1].shift if slow else None)
-    periodic = find_periodic(units, residuals, LINES_DIFFER if cycles else 0.0)
+    slow = find_slow_causes(compared, population, library)
+    residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
+    periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
     held = 0.0 if periodic is None else periodic.power
 
-    energy = energy_of(units, population, slow_found=bool(slow))
+    energy = energy_of(compared, population, slow_found=bool(slow))
     # What each slow cause takes from the change's mean square, in their order.
-    rests = [energy_of(units, population, True, found.shift).total for found in slow]
+    rests = [energy_of(compared, population, True, found.shift).total for found in slow]
     # A line stands out of the spectrum before it stands out of the whole mean square.
     moved, gains = energy.slow, -np.diff(np.minimum.accumulate([energy.total, *rests]))
-    powers = [shift_power(units, found.shift) for found in slow]
+    powers = [shift_power(compared, found.shift) for found in slow]
     friction = powers and {found.effect for found in slow} <= HIDDEN
     if friction and energy.slow < VISIBLE * powers[-1]:
         # The mean square hardly shows the change: its own power is what there is of it.
@@ -164,16 +168,16 @@ def explain_change(
     others = [cause for cause in causes if cause.origin != "environment"]
     excused = len(others) < len(causes) and not serious
     shift = slow[-1].shift if slow else None
-    if excused and rest_growth(units, population, shift) >= GROWTH:
+    if excused and rest_growth(compared, population, shift) >= GROWTH:
         causes = others
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(
         causes=tuple(causes),
         explained_share=min(sum(cause.share for cause in causes), 1.0),
         harmless=harmless >= HARMLESS_SHARE and not serious,
-        units=(len(before), len(after)),
+        units=(int(np.count_nonzero(~late)), int(np.count_nonzero(late))),
         sessions=not cycles,
-        angle=units[0].fine.angle_kind,
+        angle=compared.track.angle_kind,
     )
 
 

@@ -132,6 +132,13 @@ def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
     return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged))
 
 
+def whole_parts(groups: Sequence[Ints]) -> Parts:
+    """Take groups of samples, given by their places, as one part each."""
+    numbers = np.arange(len(groups))
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *groups])
+    return Parts(rows, ranges(map(len, groups)), numbers, numbers >= 0)
+
+
 @dataclass(frozen=True)
 class Sums:
     """Products of regressors with themselves and with the current, over each part."""
@@ -198,9 +205,10 @@ class Sums:
 
     def held_out(self) -> Floats:
         """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
-        if self.moment.shape[1] == 0:
-            return self.power
-        coefficients = self.coefficients[self.parts.unit]
+        return self.left(self.coefficients[self.parts.unit])
+
+    def left(self, coefficients: Floats) -> Floats:
+        """Sum of squared errors of each part, (p,), with given coefficients, (k,) or (p, k)."""
         predicted = (self.gram @ coefficients[..., None])[..., 0]
         square = np.sum(coefficients * (predicted - 2 * self.moment), axis=-1)
         error: Floats = np.maximum(self.power + square, 0.0)

@@ -30,7 +30,12 @@ class Grouping:
     sealed: tuple[int, ...]
     """Groups that nothing looks at before the end."""
     kind: str
-    """"""
+    """"cycles", "recordings" or "blocks"."""
+
+    @property
+    def open(self) -> tuple[int, ...]:
+        """Groups that may be looked at before the end."""
+        return tuple(g for g in range(len(self.names)) if g not in self.sealed)
 
 
 def cycle_length(path: Floats) -> int | None:

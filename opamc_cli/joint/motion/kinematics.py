@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track, ranges
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
 
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
@@ -263,20 +262,11 @@ def build_track(
             clock = max(recording.started_s - first, clock)
         times.append(clock + piece.time_s)
         clock += piece.size / rate
-    joined: dict[str, Any] = {}
-    for name in SAMPLED:
-        values = [getattr(piece, name) for piece in pieces]
-        known = all(value is not None for value in values)
-        joined[name] = np.concatenate(values) if known else None
     alone = len(recordings) == 1
     common = all(recording.started_s is not None for recording in recordings)
     return replace(
-        pieces[0],
-        **joined | {"time_s": np.concatenate(times)},
-        bounds=ranges(piece.size for piece in pieces),
-        channels=frozenset.intersection(*(piece.channels for piece in pieces)),
-        kernel=max((piece.kernel for piece in pieces), key=len),
-        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+        joined(pieces),
+        time_s=np.concatenate(times),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 

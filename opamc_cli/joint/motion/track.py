@@ -1,6 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -277,6 +277,23 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     sampled = {name: getattr(track, name) for name in SAMPLED}
     taken = {name: values[rows] for name, values in sampled.items() if values is not None}
     return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
+
+
+def joined(pieces: Sequence[Track]) -> Track:
+    """Lay tracks of one joint at one rate one after another; what one of them lacks, none has."""
+    sampled: dict[str, Any] = {}
+    for name in SAMPLED:
+        values = [getattr(piece, name) for piece in pieces]
+        known = all(value is not None for value in values)
+        sampled[name] = np.concatenate(values) if known else None
+    return replace(
+        pieces[0],
+        **sampled,
+        bounds=ranges(piece.size for piece in pieces),
+        channels=frozenset.intersection(*(piece.channels for piece in pieces)),
+        kernel=max((piece.kernel for piece in pieces), key=len),
+        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+    )
 
 
 def coarsen(track: Track, factor: int) -> Track:

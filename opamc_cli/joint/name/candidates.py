@@ -108,7 +108,7 @@ class Beside:
         else:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             follows = not all(term.is_constant for term in chain.fit.terms)
-            self.sums = dataset.sums_of(blocks, True) if follows else chain.fit.sums
+            self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         runs = [list(run) for _, run in groupby(self.blocks, lambda b: b.shape[1] <= NARROW)]
         self.joined = [

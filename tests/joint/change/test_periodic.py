@@ -1,10 +1,8 @@
 """Which periodic effect grew: over the angle, over time, or in the frame of the phases."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-from sessions import units_of
+from sessions import units_of, with_track
 
 from opamc_cli.joint.change.periodic import find_periodic
 
@@ -17,27 +15,20 @@ def units():
     return units_of(before=3, after=2, rate=500.0)
 
 
-def residuals(units, wave):
-    rng = np.random.default_rng(0)
-    return [
-        np.where(
-            unit.fine_rows,
-            0.02 * rng.normal(size=unit.fine.size) + unit.after * SIZE * wave(unit.fine),
-            0.0,
-        )
-        for unit in units
-    ]
+def residual(units, wave, everywhere=False):
+    track = units.track
+    noise = 0.02 * np.random.default_rng(0).normal(size=track.size)
+    new = np.append(units.after | everywhere, False)[track.group]
+    return np.where(units.dataset.fine.fit, noise + new * SIZE * wave(track), 0.0)
 
 
-def found(units, wave, between=0.0):
-    return find_periodic(units, residuals(units, wave), between)
+def found(units, wave, between=0.0, everywhere=False):
+    return find_periodic(units, residual(units, wave, everywhere), between)
 
 
 def test_noise_and_what_the_baseline_has_as_well_are_nothing(units):
     assert found(units, lambda track: 0.0) is None
-    both = [np.where(unit.fine_rows, np.cos(3 * unit.fine.machine_angle_rad), 0) for unit in units]
-    noise = residuals(units, lambda track: 0.0)
-    assert find_periodic(units, [a + b for a, b in zip(both, noise, strict=True)]) is None
+    assert found(units, lambda track: np.cos(3 * track.machine_angle_rad), 0.0, True) is None
 
 
 def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
@@ -81,12 +72,9 @@ def test_any_other_frequency_is_nobody_s(units):
 
 
 def from_phases(units):
-    made = []
-    for unit in units:
-        field = POLES * RATIO * unit.fine.position_rad
-        channels = unit.fine.channels | {"phases"}
-        made.append(replace(unit, fine=replace(unit.fine, electrical_rad=field, channels=channels)))
-    return made
+    track = units.track
+    field = POLES * RATIO * track.position_rad
+    return with_track(units, electrical_rad=field, channels=track.channels | {"phases"})
 
 
 def test_hum_of_one_phase_stands_still_in_the_phases_frame(units):
@@ -111,13 +99,7 @@ def test_a_ripple_is_no_hum_in_the_phases_frame(units):
 
 
 def test_strokes_that_are_too_short_tell_nothing(units):
-    short = [
-        replace(
-            unit,
-            fine=replace(unit.fine, machine_angle_rad=0.01 * unit.fine.machine_angle_rad),
-        )
-        for unit in units
-    ]
+    short = with_track(units, machine_angle_rad=0.01 * units.track.machine_angle_rad)
     assert found(short, lambda track: np.cos(3 * track.machine_angle_rad)) is None
 
 

@@ -87,11 +87,12 @@ def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(mo
 
 def test_groups_come_one_after_the_other():
     dataset = dataset_from(joint_of("cyclic", None, rate=250.0))
-    group = dataset.fine.track.group
-    assert [set(group[rows].tolist()) for rows in dataset.fine.rows] == [
-        {number} for number in dataset.fit_groups
-    ]
-    assert sum(rows.size for rows in dataset.fine.rows) == np.count_nonzero(dataset.fine.fit)
+    parts, group = dataset.fine.parts, dataset.fine.track.group
+    owners = [set(group[parts.rows[start:stop]].tolist()) for start, stop in parts.slices]
+    assert [min(owner) for owner in owners] == sorted(min(owner) for owner in owners)
+    assert all(len(owner) == 1 for owner in owners)
+    assert set.union(*owners) == set(dataset.grouping.open)
+    assert sorted(parts.rows) == np.flatnonzero(dataset.fine.fit).tolist()
 
 
 def test_what_is_not_clear_is_fitted_and_not_looked_at():

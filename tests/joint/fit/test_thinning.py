@@ -41,7 +41,7 @@ def test_cycles_are_taken_whole_and_begin_at_the_same_place(low_limit):
     dataset = dataset_of(track, grouping)
     taken = np.unique(dataset.fine.track.group[dataset.fine.fit])
     assert grouping.kind == "cycles"
-    assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.fit_groups)
+    assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.grouping.open)
     for group in taken:
         there = np.count_nonzero(dataset.fine.fit & (dataset.fine.track.group == group))
         assert there == np.count_nonzero(track.moving & (grouping.group == group))
@@ -56,7 +56,7 @@ def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
     dataset = dataset_of(replace(track, period_samples=None), blocks)
     fine = dataset.fine
     assert np.count_nonzero(fine.fit) == pytest.approx(LIMIT * 0.75, rel=0.02)
-    for group in dataset.fit_groups:
+    for group in dataset.grouping.open:
         whole = track.time_s[track.moving & (blocks.group == group)]
         part = fine.track.time_s[fine.fit & (fine.track.group == group)]
         assert part[0] == whole[0]
