@@ -154,11 +154,11 @@ def explain_change(
     causes = [
         _slow_cause(found, gain / whole, library) for found, gain in zip(slow, gains, strict=True)
     ]
-    if periodic is not None and periodic.reading.effect in library:
+    if periodic is not None and periodic.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
-        if periodic.reading.known or carries:
+        if periodic.known or carries:
             loaded = any(cause.origin == "load" for cause in causes)
-            causes.append(_periodic_cause(periodic.reading, held / whole, library, loaded))
+            causes.append(_periodic_cause(periodic, held / whole, library, loaded))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),

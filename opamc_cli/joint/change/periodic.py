@@ -1,6 +1,6 @@
 """Which periodic effect grew: over the motor angle, over time, or in the frame of the phases."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from opamc_cli.joint.change.energy import comb_energy
 from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra
@@ -14,17 +14,7 @@ STANDING = 0.7
 phase picks up has as much in that frame as in either of its two lines over the motor angle."""
 
 
-@dataclass(frozen=True)
-class Periodic:
-    """A periodic effect that grew."""
-
-    reading: Reading
-    """What it means."""
-    power: float
-    """Mean square that it holds more in the target than in the baseline, A^2."""
-
-
-def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Periodic | None:
+def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Reading | None:
     """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
     spectra = order_spectra(compared, residual)
     lines = [] if spectra is None else grown_lines(spectra, between)
@@ -43,15 +33,18 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
         beats = grown_lines(clock, between) if clock is not None else []
         if clock is not None and beats and beats[0].excess > lines[0].excess:
             at = read_frequency(beats[0], clock.resolution)
-            if at is None:
-                return None
-            return Periodic(at, comb_energy(timed, residual, at.fundamental))
-    return Periodic(reading, comb_energy(compared, residual, reading.fundamental))
+            return None if at is None else _with_power(at, timed, residual)
+    return _with_power(reading, compared, residual)
+
+
+def _with_power(reading: Reading, compared: Compared, *residuals: Floats) -> Reading:
+    held = [comb_energy(compared, one, reading.fundamental) for one in residuals]
+    return replace(reading, power=sum(held))
 
 
 def _picked_up(
     timed: Compared, residual: Floats, strongest: Line, between: float
-) -> Periodic | None:
+) -> Reading | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
     turned = [signals for turning, signals in standing_views(timed.track, residual) if turning]
     sides = turned[0] if turned else []
@@ -66,5 +59,4 @@ def _picked_up(
     if reading is None:
         return None
     # Half of it is there; the other half turns twice as fast as the field.
-    held = 2 * sum(comb_energy(timed, side, reading.fundamental) for side in sides)
-    return Periodic(reading, held)
+    return _with_power(reading, timed, *sides, *sides)

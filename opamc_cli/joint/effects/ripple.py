@@ -1,6 +1,7 @@
 """Torque that repeats with the angle of a rotating part."""
 
 import math
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -148,7 +149,7 @@ class Ripple(Effect):
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""
-        return read_order(parameters["order"], track, compared=False)
+        return read_order(parameters["order"], track, compared=False).text
 
 
 def _answering(track: Track, parameters: Parameters) -> list[float]:
@@ -241,22 +242,30 @@ def order_ties(order: float, track: Track) -> list[str]:
     return [name for _, name in sorted(close, key=lambda line: abs(line[0] - order))[1:]]
 
 
-def read_order(order: float, track: Track, compared: bool = True) -> str:
+@dataclass(frozen=True)
+class OrderMeaning:
+    """What an order of a ripple means."""
+
+    kind: str
+    """"tooth", "rotor", "generator", "1p", "2p", "6p" (of the electrical angle), "cogging" or
+    "unknown"."""
+    text: str
+    """To a maintainer."""
+
+
+def read_order(order: float, track: Track, compared: bool = True) -> OrderMeaning:
     """Read an order, per revolution of the track's machine angle, by the table of orders.
 
-    "unknown periodic source" where none fits. Many healthy gears have one of the gear's lines:
-    where it was not `compared` with an earlier recording nothing is to be inspected.
+    Many healthy gears have one of the gear's lines: where it was not `compared` with an earlier
+    recording nothing is to be inspected.
     """
-    if track.angle_kind == "joint":
-        return (
-            f"unknown periodic source, order {order:.5g} per joint revolution "
-            "(gear ratio unknown, so it cannot be counted per motor revolution)"
+    if track.angle_kind != "motor":
+        lacking = "gear ratio" if track.angle_kind == "joint" else "pole pairs"
+        text = (
+            f"order {order:.5g} per {track.angle_kind} revolution ({lacking} unknown, so it cannot "
+            "be counted per motor revolution)"
         )
-    if track.angle_kind == "electrical":
-        return (
-            f"order {order:.4g} per electrical revolution (pole pairs unknown, so it cannot be "
-            "counted per motor revolution)"
-        )
+        return OrderMeaning("unknown", f"unknown periodic source, {text}")
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
     width = min(0.35 * order_resolution(track), 0.25)
     if ratio:
@@ -269,27 +278,34 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
                 "growth since an earlier recording tells tooth damage"
             )
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
-                return damage
+                return OrderMeaning("tooth", damage)
             for sideband in (-2, -1, 1, 2):
                 beside = abs(order - tooth - sideband / ratio) < min(width, 0.35 / ratio)
                 if harmonic == 1 and beside and abs(order - 2.0) >= 0.35 / ratio:
-                    return f"sideband of {formula}, {damage}"
+                    return OrderMeaning("tooth", f"sideband of {formula}, {damage}")
     healthy = "many healthy gears have it, compare with an earlier recording"
     rotor = "check rotor and wave generator" if compared else healthy
     generator = "check the wave generator" if compared else healthy
     known = [
-        (1, f"eccentricity, once per motor revolution: {rotor}"),
-        (2, f"kinematic error, twice per wave generator turn: {generator}"),
-        (4, f"kinematic error, four times per wave generator turn: {generator}"),
+        (1, "rotor", f"eccentricity, once per motor revolution: {rotor}"),
+        (2, "generator", f"kinematic error, twice per wave generator turn: {generator}"),
+        (4, "generator", f"kinematic error, four times per wave generator turn: {generator}"),
     ]
     if poles:
         known += [
-            (k * poles, f"electrical, {k}p per motor revolution: check drive and sensors")
+            (k * poles, f"{k}p", f"electrical, {k}p per motor revolution: check drive and sensors")
             for k in (1, 2, 6)
         ]
         known += [
-            (math.lcm(slots, 2 * poles), f"cogging of {slots} slots and {2 * poles} poles")
+            (
+                math.lcm(slots, 2 * poles),
+                "cogging",
+                f"cogging of {slots} slots and {2 * poles} poles",
+            )
             for slots in (6, 9, 12, 15, 18, 24, 27, 36)
         ]
+    for meant, kind, text in known:
+        if abs(order - meant) < width:
+            return OrderMeaning(kind, text)
     unknown = f"unknown periodic source, order {order:.5g} per motor revolution"
-    return next((text for meant, text in known if abs(order - meant) < width), unknown)
+    return OrderMeaning("unknown", unknown)

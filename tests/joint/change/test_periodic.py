@@ -34,8 +34,8 @@ def test_noise_and_what_the_baseline_has_as_well_are_nothing(units):
 def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
     order = 2 * (RATIO + 1) / RATIO
     periodic = found(units, lambda track: np.cos(order * track.machine_angle_rad))
-    assert periodic.reading.effect == "ripple"
-    assert periodic.reading.mesh
+    assert periodic.effect == "ripple"
+    assert periodic.mesh
     assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
     # With an allowance for what sessions differ by it is there, too, if it is large.
     assert found(units, lambda track: np.cos(order * track.machine_angle_rad), 0.09) is not None
@@ -43,8 +43,8 @@ def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
 
 def test_a_line_that_no_part_has_is_a_ripple_without_a_meaning(units):
     periodic = found(units, lambda track: np.cos(3.37 * track.machine_angle_rad))
-    assert (periodic.reading.effect, periodic.reading.known) == ("ripple", False)
-    assert periodic.reading.parameters["order"] == pytest.approx(3.37, abs=0.05)
+    assert (periodic.effect, periodic.known) == ("ripple", False)
+    assert periodic.parameters["order"] == pytest.approx(3.37, abs=0.05)
     assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
 
 
@@ -62,8 +62,8 @@ def test_a_line_that_no_part_has_is_a_ripple_without_a_meaning(units):
 )
 def test_a_line_that_keeps_its_frequency_is_hum(units, mains_hz):
     periodic = found(units, lambda track: np.cos(2 * np.pi * mains_hz * track.run_time_s))
-    assert periodic.reading.effect == "mains_hum"
-    assert periodic.reading.parameters == {"frequency_hz": mains_hz}
+    assert periodic.effect == "mains_hum"
+    assert periodic.parameters == {"frequency_hz": mains_hz}
     assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
 
 
@@ -83,19 +83,19 @@ def test_hum_of_one_phase_stands_still_in_the_phases_frame(units):
         return np.cos(2 * np.pi * 50.0 * track.run_time_s) * np.cos(field)
 
     periodic = found(from_phases(units), picked_up)
-    assert periodic.reading.effect == "mains_hum"
-    assert periodic.reading.parameters == {"frequency_hz": 50.0}
+    assert periodic.effect == "mains_hum"
+    assert periodic.parameters == {"frequency_hz": 50.0}
     # Half of the square of one cosine, and half of the other's.
     assert periodic.power == pytest.approx(SIZE**2 / 4, rel=0.3)
     # Where the phases are not logged, nobody can turn it back.
     alone = found(units, picked_up)
-    assert alone is None or alone.reading.effect != "mains_hum"
+    assert alone is None or alone.effect != "mains_hum"
 
 
 def test_a_ripple_is_no_hum_in_the_phases_frame(units):
     order = 2 * (RATIO + 1) / RATIO
     wave = lambda track: np.cos(order * track.machine_angle_rad)  # noqa: E731
-    assert found(from_phases(units), wave).reading.effect == "ripple"
+    assert found(from_phases(units), wave).effect == "ripple"
 
 
 def test_strokes_that_are_too_short_tell_nothing(units):
@@ -109,7 +109,7 @@ def test_another_frequency_of_one_phase_is_no_hum(units):
         return np.cos(2 * np.pi * 72.0 * track.run_time_s) * np.cos(field)
 
     other = found(from_phases(units), picked_up)
-    assert other is None or other.reading.effect != "mains_hum"
+    assert other is None or other.effect != "mains_hum"
 
 
 def test_hum_that_is_weaker_than_a_ripple_is_not_named_first(units):
@@ -118,4 +118,4 @@ def test_hum_that_is_weaker_than_a_ripple_is_not_named_first(units):
         hum = np.cos(2 * np.pi * 50.0 * track.run_time_s) * np.cos(field)
         return 0.3 * hum + np.cos(2.04 * track.machine_angle_rad)
 
-    assert found(from_phases(units), both).reading.effect == "ripple"
+    assert found(from_phases(units), both).effect == "ripple"
