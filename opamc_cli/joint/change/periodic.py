@@ -59,4 +59,5 @@ def _picked_up(
     if reading is None:
         return None
     # Half of it is there; the other half turns twice as fast as the field.
-    return _with_power(reading, timed, *sides, *sides)
+    held = _with_power(reading, timed, *sides)
+    return replace(held, power=2 * held.power)

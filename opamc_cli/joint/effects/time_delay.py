@@ -91,29 +91,19 @@ def late_means(
     no more than there are blocks; between samples it is what a straight line between them gives.
     `wanted` is a bool array of shape (n // factor per recording,).
     """
-    sizes = np.array([stop - start for start, stop in bounds])
-    blocks = sizes // factor
-    number = np.repeat(np.arange(sizes.size), blocks)
-    # Edge j of a recording is where its block j begins; the last one is where the last block ends.
-    begins = np.zeros(int(blocks.sum()) + sizes.size, dtype=bool)
-    begins[np.flatnonzero(wanted) + number[wanted]] = True
-    needed = np.flatnonzero(begins | np.concatenate([[False], begins[:-1]]))
-    counts = blocks + 1
-    recording = np.repeat(np.arange(sizes.size), counts)[needed]
-    edges = factor * (needed - (np.cumsum(counts) - counts)[recording]) - samples
-    size = sizes[recording]
-    inside = np.clip(edges, 0.0, size)
-    whole = np.minimum(inside.astype(np.int64), size - 1)
-    share = (inside - whole)[:, None]
-    whole += (np.cumsum(sizes + 1) - sizes - 1)[recording]
-    at_edges = sums[whole]
-    steps = sums[whole + 1] - at_edges
-    at_edges += share * steps
-    outside = np.flatnonzero((edges < 0) | (edges > size))
-    # Before the beginning and after the end the nearest step goes on.
-    at_edges[outside] += (edges - inside)[outside, None] * steps[outside]
-    means: Floats = np.diff(at_edges, axis=0)[begins[needed][:-1]] / factor
-    return means
+    means, block = [], 0
+    for number, (start, stop) in enumerate(bounds):
+        size, count = stop - start, (stop - start) // factor
+        chosen = np.flatnonzero(wanted[block : block + count])
+        own = sums[start + number : stop + number + 1]
+        # The edges of blocks, each between a whole sample and the next one; beyond the ends the
+        # nearest step goes on.
+        edges = factor * np.stack([chosen, chosen + 1]) - samples
+        whole = np.clip(edges.astype(np.int64), 0, size - 1)
+        at = own[whole] + (edges - whole)[..., None] * (own[whole + 1] - own[whole])
+        means.append((at[1] - at[0]) / factor)
+        block += count
+    return np.concatenate(means)
 
 
 def lagging(columns: Floats, samples: float) -> Floats:

@@ -43,7 +43,6 @@ def best_fit(
     ways = [] if "windows" in without_rules else smoothings(recordings)
     smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
     if smoothing is not None:
-        smoothing = replace(smoothing, blurred=True)
         track = _judged_alike(build_track(recordings, joint, smoothing), track)
         dataset = dataset_of(track, grouping)
     return declared_fit(dataset, model)

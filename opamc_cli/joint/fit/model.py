@@ -269,8 +269,25 @@ class Fit:
         """Root mean square residual on the open or on the sealed samples."""
         fit = self.opened if sealed else self
         grid = fit.dataset.sharp
-        values = fit.residual_a[grid.sealed if sealed else grid.fit]
-        return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+        return rmse_of(fit.residual_a[grid.sealed if sealed else grid.fit])
+
+    @property
+    def sealed_r2(self) -> float:
+        """Share of the current's variance on the sealed samples that the fit predicts."""
+        fit = self.opened
+        grid = fit.dataset.sharp
+        return r2_of(grid.track.current_a[grid.sealed], fit.residual_a[grid.sealed])
+
+
+def rmse_of(residual: Floats) -> float:
+    """Root mean square, 0 of nothing."""
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else 0.0
+
+
+def r2_of(current: Floats, residual: Floats) -> float:
+    """Share of a current's variance, (n,), that is not in the residual; below 0 if that adds."""
+    variance = float(np.var(current)) if current.size else 0.0
+    return 1.0 - rmse_of(residual) ** 2 / variance if variance > 0 else 0.0
 
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:

@@ -87,8 +87,6 @@ class Smoothing:
 
     window_s: float
     from_velocity: bool
-    blurred: bool = False
-    """Whether it is laid beside other windows: not while it competes with them."""
 
 
 def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
@@ -152,15 +150,14 @@ def motion_from_position(
         window = smoothing_window(position_rad, rate_hz, derivative=2)
     else:
         window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
-    beside = smoothing is None or smoothing.blurred
-    motion = _smoothed(position_rad, rate_hz, window, 2, beside)
+    motion = _smoothed(position_rad, rate_hz, window, 2)
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         size = float(np.sqrt(np.mean(motion.velocity**2)))
         agrees = size > 0 and float(np.std(velocity_rad_s - motion.velocity)) < 0.1 * size
         own = window if asked else smoothing_window(velocity_rad_s, rate_hz, derivative=1)
         if agrees and (asked or own < window):
-            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1, beside)
+            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1)
             return replace(cleaner, position_rad=motion.position_rad)
     return motion
 
@@ -173,9 +170,7 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     return replace(motion, position_rad=np.concatenate([[0.0], np.cumsum(steps)]))
 
 
-def _smoothed(
-    path: Floats, rate_hz: float, window: int, derivative: int, beside: bool = True
-) -> Motion:
+def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
     noise = measurement_noise(path)
@@ -186,7 +181,7 @@ def _smoothed(
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        blur=blurred(path, rate_hz, window, derivative) if beside else None,
+        blur=blurred(path, rate_hz, window, derivative),
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import groupby
 
 import numpy as np
 
@@ -15,9 +14,6 @@ from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
-NARROW = 4
-"""Regressors up to which a chain's terms are joined: a guess is gone through once for them all,
-which saves a twentieth of the time."""
 
 
 @dataclass(frozen=True)
@@ -110,12 +106,6 @@ class Beside:
             follows = not all(term.is_constant for term in chain.fit.terms)
             self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
-        runs = [list(run) for _, run in groupby(self.blocks, lambda b: b.shape[1] <= NARROW)]
-        self.joined = [
-            block
-            for run in runs
-            for block in ([np.concatenate(run, axis=1)] if run[0].shape[1] <= NARROW else run)
-        ]
         current = dataset.grid_of(self.fine).track.current_a
         self.current = self.parts.taken(current)
         if self.fast_part is not None:
@@ -126,7 +116,7 @@ class Beside:
     def products(self, columns: Floats) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
-        return np.concatenate([none, *(self.parts.products(b, columns) for b in self.joined)], 1)
+        return np.concatenate([none, *self.parts.products_of(self.blocks, columns)], axis=1)
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
