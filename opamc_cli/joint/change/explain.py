@@ -1,14 +1,14 @@
 """What changed between two sets of recordings of one joint, as effects of the library."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opamc_cli.joint.change.energy import energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
-from opamc_cli.joint.change.reading import Finding, Reading
-from opamc_cli.joint.change.search import SlowCause, find_slow_causes
+from opamc_cli.joint.change.reading import Cause
+from opamc_cli.joint.change.search import find_slow_causes
 from opamc_cli.joint.change.slow import learn, shift_power, with_model
 from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
@@ -47,27 +47,6 @@ has to grow tenfold in power. Nothing else does that to it: such a ripple is cle
 grease let what no effect holds grow fourfold: on eight joints like those of
 `benchmarks/closed_loop.py` 0.5 to 1.2 times where they were 20 degrees colder, up to 45 with play.
 """
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cause(Finding):
-    """A finding with its weight."""
-
-    domain: str
-    share: float
-    """Share of the change of the current's mean square beyond the sessions' own differences that it
-    explains, 0 to 1."""
-    origin: str
-    """The effect's: "joint", or "environment", "load", "measurement", which are no fault of it."""
-    serious: bool
-    """True where it is the joint's and large enough to be called a fault whatever else changed."""
-    clear: bool = False
-    """True where nothing that all joints have in common could look like it."""
-
-    @property
-    def harmless(self) -> bool:
-        """Whether the joint is no worse for it."""
-        return self.origin != "joint"
 
 
 @dataclass(frozen=True)
@@ -152,13 +131,19 @@ def explain_change(
         moved, gains = powers[-1], np.diff(powers, prepend=0.0)
     whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
     causes = [
-        _slow_cause(found, gain / whole, library) for found, gain in zip(slow, gains, strict=True)
+        _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)
+        for found, gain in zip(slow, gains, strict=True)
     ]
     if periodic is not None and periodic.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
         if periodic.known or carries:
+            ratio, share = periodic.evidence["power_ratio"], held / whole
+            grown, doubled = ratio >= CLEAR_GROWTH, periodic.mesh and ratio >= GROWTH
             loaded = any(cause.origin == "load" for cause in causes)
-            causes.append(_periodic_cause(periodic, held / whole, library, loaded))
+            clear = periodic.mesh and grown
+            enough = share >= FAULT_SHARE and (grown or not loaded)
+            serious = clear or enough or (doubled and not loaded)
+            causes.append(_weighed(periodic, share, library, serious, clear))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -181,28 +166,15 @@ def explain_change(
     )
 
 
-def _slow_cause(found: SlowCause, unclipped: float, library: Library) -> Cause:
-    share = float(np.clip(unclipped, 0.0, 1.0))
-    return _weighed(found, share, library, serious=share >= FAULT_SHARE)
-
-
-def _periodic_cause(reading: Reading, share: float, library: Library, loaded: bool) -> Cause:
-    ratio = reading.evidence["power_ratio"]
-    grown, doubled = ratio >= CLEAR_GROWTH, reading.mesh and ratio >= GROWTH
-    enough = share >= FAULT_SHARE and grown if loaded else share >= FAULT_SHARE or doubled
-    clear = reading.mesh and grown
-    return _weighed(reading, share, library, serious=clear or enough, clear=clear)
-
-
 def _weighed(
-    found: Finding, share: float, library: Library, serious: bool, clear: bool = False
+    found: Cause, share: float, library: Library, serious: bool, clear: bool = False
 ) -> Cause:
     effect = library[found.effect]
-    return Cause(
-        **{one.name: getattr(found, one.name) for one in fields(Finding)},
+    return replace(
+        found,
         domain=effect.domain,
-        share=share,
         origin=effect.origin,
+        share=float(np.clip(share, 0.0, 1.0)),
         serious=serious and not effect.harmless,
         clear=clear,
     )

@@ -43,7 +43,7 @@ FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Cause:
     """An effect that the target has and the baseline has not, or has less of."""
 
     effect: str
@@ -58,10 +58,26 @@ class Finding:
     """Effects or readings that explain the change as well."""
     evidence: Parameters = field(default_factory=dict)
     """What was measured, by name."""
+    domain: str = ""
+    origin: str = "joint"
+    """With `domain`: the effect's. "joint", or "environment", "load", "measurement", which are no
+    fault of it."""
+    share: float = 0.0
+    """Share of the change of the current's mean square beyond the sessions' own differences that it
+    explains, 0 to 1."""
+    serious: bool = False
+    """True where it is the joint's and large enough to be called a fault whatever else changed."""
+    clear: bool = False
+    """True where nothing that all joints have in common could look like it."""
+
+    @property
+    def harmless(self) -> bool:
+        """Whether the joint is no worse for it."""
+        return self.origin != "joint"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading(Finding):
+class Reading(Cause):
     """What the lines say."""
 
     lines: tuple[Line, ...]

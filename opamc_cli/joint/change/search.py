@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.change.reading import Finding
+from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.slow import (
     Population,
     Shift,
@@ -64,11 +64,83 @@ LARGEST_COLD_FACTOR = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class SlowCause(Finding):
+class SlowCause(Cause):
     """A slow effect that changed; for the temperature its parameters say how much warmer it was."""
 
     shift: Shift
     """Jointly with the causes before it."""
+
+
+@dataclass(frozen=True)
+class Grease:
+    """How friction has changed, beside the temperature."""
+
+    logged: bool
+    """Whether there is a temperature."""
+    warmer_c: float | None
+    """How much warmer the target was, where that lies outside the baseline's own range."""
+    dry: float
+    wet: float
+    """With `dry`: relative changes of dry and of viscous friction."""
+
+    @classmethod
+    def of(cls, compared: Compared, population: Population) -> "Grease":
+        """Compare both sides' friction and temperatures."""
+        late, degrees = compared.after, compared.track.temperature_c
+        warmer = None
+        if degrees is not None:
+            parts = compared.dataset.fine.parts
+            warmth = degrees[parts.rows]
+            means = np.array([warmth[start:stop].mean() for start, stop in parts.slices])
+            difference = float(means[late].mean() - means[~late].mean())
+            usual = max(2 * float(np.std(means[~late], ddof=1)), SMALLEST_WARMTH_C)
+            warmer = difference if abs(difference) > usual else None
+        mean = own_fit(compared, population.terms)[0][late].mean(axis=0)
+        changes = {"coulomb": 0.0, "viscous": 0.0}
+        for name, before, after in zip(population.names, population.mean, mean, strict=True):
+            if name in changes and before != 0:
+                changes[name] = float(after / before - 1)
+        return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"])
+
+    @property
+    def mostly_wet(self) -> bool:
+        """Whether friction changed as grease of another temperature changes it."""
+        return abs(self.wet) > 2 * abs(self.dry)
+
+    @property
+    def plausible(self) -> bool:
+        """Whether another temperature explains it: stiffer when colder, by no more than grease is.
+
+        Where none is logged, mostly viscous friction by no more than a factor of two.
+        """
+        if self.warmer_c is not None:
+            stiffer = abs(np.log(max(1 + self.wet, 1e-3)))
+            return self.wet * self.warmer_c < 0 and stiffer < STEEPEST_PER_C * abs(self.warmer_c)
+        little = 1 / LARGEST_COLD_FACTOR < 1 + self.wet < LARGEST_COLD_FACTOR
+        return not self.logged and self.mostly_wet and little
+
+    def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
+        """Name it."""
+        parameters: Parameters = {}
+        meaning = (
+            "colder or warmer grease: friction that grows with the speed has changed (no "
+            "temperature was logged: compare at equal temperature, and look at the grease if it "
+            "remains)"
+        )
+        if self.warmer_c is not None:
+            parameters = {"warmer_c": self.warmer_c}
+            word = f"{'warmer' if self.warmer_c > 0 else 'colder'} grease"
+            meaning = (
+                f"{word} (by {abs(self.warmer_c):.0f} °C; it is stiffer when cold), not a fault"
+            )
+        return SlowCause(
+            effect="thermal_viscous",
+            parameters=parameters,
+            interpretation=meaning,
+            shift=shift,
+            p_value=p_value,
+            ties=ties,
+        )
 
 
 def find_slow_causes(
@@ -90,11 +162,12 @@ def find_slow_causes(
         # Without a scale of the joint angle a payload is inertia.
         shown = None if "scale" in channels else (2,)
         candidates.append(Term(payload, {"since_s": -1.0}, shown))
+    grease = Grease.of(compared, population)
     found: list[SlowCause] = []
     gone: set[str] = set()
     for _ in range(MOST_CAUSES):
         before = found[-1].shift if found else None
-        cause = _next(compared, population, before, candidates, library)
+        cause = _next(compared, population, before, candidates, library, grease)
         if cause is None:
             break
         found.append(cause)
@@ -102,16 +175,14 @@ def find_slow_causes(
         if cause.effect == "thermal_viscous":
             gone |= GREASE
         candidates = [term for term in candidates if term.effect.name not in gone]
-    return _one_grease(compared, population, found)
+    return _one_grease(found, grease)
 
 
-def _one_grease(
-    compared: Compared, population: Population, found: list[SlowCause]
-) -> list[SlowCause]:
+def _one_grease(found: list[SlowCause], grease: Grease) -> list[SlowCause]:
     """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
     names = [cause.effect for cause in found]
     pair = {"thermal_viscous", "coulomb"}
-    if not pair <= set(names) or not _mostly_wet(*_relative(compared, population)):
+    if not pair <= set(names) or not grease.mostly_wet:
         return found
     first, last = sorted(names.index(name) for name in pair)
     one = [*found]
@@ -127,6 +198,7 @@ def _next(
     before: Shift | None,
     candidates: list[Term],
     library: Library,
+    grease: Grease,
 ) -> SlowCause | None:
     chosen = before.terms if before is not None else ()
     guesses: dict[str, int] = {}
@@ -142,9 +214,12 @@ def _next(
             best[name] = (p_value, shift)
     if not best:
         return None
-    expected = None if chosen else _expected(compared, population, best)
-    if expected is not None:
-        return expected
+    if not chosen and "viscous" in best and grease.warmer_c is not None and grease.plausible:
+        # What is expected of another temperature needs less proof than what is not.
+        shift = best["viscous"][1]
+        other = min((p for name, (p, _) in best.items() if name not in FRICTION), default=1.0)
+        if shift.p_value <= PLANNED_P and other >= min(shift.p_value, LARGEST_P):
+            return grease.cause(shift, shift.p_value, ("viscous",))
     sure = {name: entry for name, entry in best.items() if entry[0] <= LARGEST_P}
     if not sure:
         return None
@@ -174,16 +249,17 @@ def _next(
     )
     if first == "spring" and "payload_change" in ties:
         # Over a short travel another weight looks like a spring, and is what changes.
-        first, ties = (
-            "payload_change",
-            ("spring", *(tie for tie in ties if tie != "payload_change")),
-        )
+        ties = ("spring", *(tie for tie in ties if tie != "payload_change"))
+        first = "payload_change"
     p_value, shift = sure[first]
     parameters = dict(shift.terms[-1].parameters)
     meaning = library[first].interpretation(parameters, compared.track)
     if first == "payload_change":
         parameters, meaning = {}, "another payload (check the tool, not the gear)"
-    cause = SlowCause(
+    names = (first, *ties)
+    if not GREASE.isdisjoint(names) and "thermal_viscous" in library and grease.plausible:
+        return grease.cause(shift, p_value, names)
+    return SlowCause(
         effect=first,
         parameters=parameters,
         interpretation=meaning,
@@ -191,102 +267,6 @@ def _next(
         p_value=p_value,
         ties=ties,
     )
-    if {first, *ties} & GREASE:
-        return _friction(compared, population, cause, library)
-    return cause
-
-
-def _expected(
-    compared: Compared, population: Population, best: dict[str, tuple[float, Shift]]
-) -> SlowCause | None:
-    """Grease of another temperature, where the logged one has left the baseline's range."""
-    warmer = _warmer(compared)
-    if warmer is None or "viscous" not in best:
-        return None
-    _, shift = best["viscous"]
-    if shift.p_value > PLANNED_P or not _plausible(compared, population, shift, warmer):
-        return None
-    others = [p for name, (p, _) in best.items() if name not in FRICTION]
-    if min(others, default=1.0) < min(shift.p_value, LARGEST_P):
-        return None
-    return _thermal(shift, shift.p_value, ("viscous",), warmer)
-
-
-def _friction(
-    compared: Compared, population: Population, cause: SlowCause, library: Library
-) -> SlowCause:
-    """Where grease of another temperature explains a change of friction, it is no fault."""
-    if "thermal_viscous" not in library:
-        return cause
-    ties = (cause.effect, *cause.ties)
-    warmer = _warmer(compared)
-    if warmer is not None:
-        if _plausible(compared, population, cause.shift, warmer):
-            return _thermal(cause.shift, cause.p_value, ties, warmer)
-        return cause
-    if compared.track.temperature_c is not None:
-        return cause  # as warm as ever
-    dry, wet = _relative(compared, population)
-    if _mostly_wet(dry, wet) and 1 / LARGEST_COLD_FACTOR < 1 + wet < LARGEST_COLD_FACTOR:
-        return _thermal(cause.shift, cause.p_value, ties, None)
-    return cause
-
-
-def _thermal(
-    shift: Shift, p_value: float, ties: tuple[str, ...], warmer: float | None
-) -> SlowCause:
-    parameters: Parameters = {}
-    meaning = (
-        "colder or warmer grease: friction that grows with the speed has changed (no temperature "
-        "was logged: compare at equal temperature, and look at the grease if it remains)"
-    )
-    if warmer is not None:
-        parameters = {"warmer_c": warmer}
-        word = "warmer" if warmer > 0 else "colder"
-        meaning = f"{word} grease (by {abs(warmer):.0f} °C; it is stiffer when cold), not a fault"
-    return SlowCause(
-        effect="thermal_viscous",
-        parameters=parameters,
-        interpretation=meaning,
-        shift=shift,
-        p_value=p_value,
-        ties=ties,
-    )
-
-
-def _warmer(compared: Compared) -> float | None:
-    """How much warmer the target was, where that lies outside the baseline's own range."""
-    degrees = compared.track.temperature_c
-    if degrees is None:
-        return None
-    parts = compared.dataset.fine.parts
-    warmth = degrees[parts.rows]
-    means = np.array([warmth[start:stop].mean() for start, stop in parts.slices])
-    before, later = means[~compared.after], means[compared.after]
-    difference = float(later.mean() - before.mean())
-    usual = max(2 * float(np.std(before, ddof=1)), SMALLEST_WARMTH_C)
-    return difference if abs(difference) > usual else None
-
-
-def _plausible(compared: Compared, population: Population, shift: Shift, warmer: float) -> bool:
-    """Stiffer when colder, and by no more than grease is."""
-    _, wet = _relative(compared, population)
-    return wet * warmer < 0 and abs(np.log(max(1 + wet, 1e-3))) < STEEPEST_PER_C * abs(warmer)
-
-
-def _relative(compared: Compared, population: Population) -> tuple[float, float]:
-    """Relative changes of dry and of viscous friction."""
-    mean = own_fit(compared, population.terms)[0][compared.after].mean(axis=0)
-    changes = {"coulomb": 0.0, "viscous": 0.0}
-    for name, before, after in zip(population.names, population.mean, mean, strict=True):
-        if name in changes and before != 0:
-            changes[name] = float(after / before - 1)
-    return changes["coulomb"], changes["viscous"]
-
-
-def _mostly_wet(dry: float, wet: float) -> bool:
-    """Tell whether friction changed as grease of another temperature changes it."""
-    return abs(wet) > 2 * abs(dry)
 
 
 def _likeness(compared: Compared, one: Shift, other: Shift) -> float:

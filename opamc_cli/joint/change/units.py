@@ -88,11 +88,8 @@ def read_side(
             at = track.position_rad[track.moving]
             middle = 0.5 * float(np.min(at) + np.max(at))
             track = replace(track, position_rad=track.position_rad - middle)
-        # Halves of a cycle, if it was halved, do not hold the same motion.
-        names = [name.rpartition(":")[2].partition(".")[0] for name in grouping.names]
-        wholes = list(dict.fromkeys(names))
-        unit = np.array([wholes.index(name) if cycles else 0 for name in names] + [-1])
-        tracks.append(replace(track, group=unit[grouping.group]))
+        group = grouping.group if cycles else np.minimum(grouping.group, 0)
+        tracks.append(replace(track, group=group))
     return tracks
 
 

@@ -16,7 +16,6 @@ SEALED_BLOCKS = (2, 5, 9)
 run three times, every fourth block is the same motion, which nothing open would have shown."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
-FEWEST_FIT_GROUPS = 4
 
 
 @dataclass(frozen=True)
@@ -99,22 +98,11 @@ def group_samples(
     pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
     if len(pieces) < 2:
         return _blocks(moving, run_names)
-    sealed_pieces = _sealed_pieces(pieces)
-    fit = [i for i in range(len(pieces)) if i not in sealed_pieces]
-    parts = -(-FEWEST_FIT_GROUPS // len(fit)) if len(fit) < FEWEST_FIT_GROUPS else 1
-    names: list[str] = []
-    sealed: list[int] = []
-    for i, (_, start, stop, name) in enumerate(pieces):
-        cuts = 1 if i in sealed_pieces else parts
-        indices = np.flatnonzero(moving[start:stop]) + start
-        edges = [start, *(int(part[0]) for part in np.array_split(indices, cuts)[1:]), stop]
-        for j in range(cuts):
-            group[edges[j] : edges[j + 1]] = len(names)
-            if i in sealed_pieces:
-                sealed.append(len(names))
-            names.append(name if cuts == 1 else f"{name}.{j}")
+    for number, (_, start, stop, _) in enumerate(pieces):
+        group[start:stop] = number
     kind = "cycles" if period is not None else "recordings"
-    return Grouping(group, tuple(names), tuple(sealed), kind)
+    names = tuple(name for *_, name in pieces)
+    return Grouping(group, names, tuple(sorted(_sealed_pieces(pieces))), kind)
 
 
 def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:

@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
+from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
-from opamc_cli.joint.least_squares import SINGULAR_BELOW, inverse
-from opamc_cli.joint.motion.track import Floats, Ints
+from opamc_cli.joint.least_squares import SINGULAR_BELOW
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 LEAST_LEFT = 1e-6
@@ -106,11 +105,6 @@ class Beside:
             follows = not all(term.is_constant for term in chain.fit.terms)
             self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
-        current = dataset.grid_of(self.fine).track.current_a
-        self.current = self.parts.taken(current)
-        if self.fast_part is not None:
-            self.current = self.current - self.fast_part
-        self.step = max(self.current.size // COARSE_SAMPLES, 1)
         self.before = self.sums.held_out()
 
     def products(self, columns: Floats) -> Floats:
@@ -161,32 +155,3 @@ class Beside:
         after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
         gain: Floats = 1.0 - (after / max(before, 1e-300)) ** 2
         return gain
-
-    @cached_property
-    def refined_rows(self) -> Ints:
-        """Every so-many-th of the parts' rows, for `fitted_drop`."""
-        return self.parts.rows[:: self.step]
-
-    def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
-        """Sum of squares that columns on the refined rows take away beside the chain, when fitted.
-
-        Smooth in the effect's parameters, so that these can be refined; by as many rows as the
-        coarse grid has, which tell a parameter as well as all. Those of a `whole` effect are not
-        fitted: they are one.
-        """
-        beside, gram, moment, current = self._refining
-        cross = beside.T @ columns
-        projected = gram @ cross
-        left = columns.T @ columns - cross.T @ projected
-        left += SINGULAR_BELOW * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
-        asked = columns.T @ current - projected.T @ moment
-        if whole:
-            return float(2 * asked.sum() - left.sum())
-        return float(asked @ np.linalg.solve(left, asked))
-
-    @cached_property
-    def _refining(self) -> tuple[Floats, Floats, Floats, Floats]:
-        current = self.current[:: self.step]
-        blocks = [block[:: self.step] for block in self.blocks]
-        beside = np.concatenate([np.zeros((current.size, 0)), *blocks], axis=1)
-        return beside, inverse((beside.T @ beside)[None])[0], beside.T @ current, current

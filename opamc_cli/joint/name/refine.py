@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.fit.model import SETTLED, Dataset, Term
 from opamc_cli.joint.motion.track import Floats
-from opamc_cli.joint.name.candidates import Beside
+from opamc_cli.joint.name.candidates import Beside, batches_of
 
 ROUNDS = 4
 """Of three trials of each parameter, a quarter as far apart every time: the last step is a
@@ -35,8 +35,7 @@ def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
 
     def lost(values: Floats) -> float:
         trial = Term(term.effect, outwards(values), term.keep)
-        columns = dataset.computed(trial, beside.fine, beside.refined_rows)
-        return -beside.fitted_drop(columns, whole=term.effect.whole)
+        return -float(beside.gains(batches_of(dataset, [trial], beside.fine)[0])[0])
 
     start, step = np.empty((2, len(names)))
     for i, (name, log) in enumerate(zip(names, logs, strict=True)):
