@@ -1,7 +1,5 @@
 """How much of the current changed beyond what sessions differ by, and how much causes explain."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from opamc_cli.joint.change.lines import strokes
@@ -19,29 +17,18 @@ CLEAR = 2.5
 """Baseline standard deviations by which a mean square must differ to count as changed."""
 
 
-@dataclass(frozen=True)
-class Energy:
-    """Change of the mean square residual, A^2."""
-
-    slow: float
-    """In the declared effects' coefficients: what the baseline's mean model leaves more in the
-    target than a unit's own fit, less the same in the baseline."""
-    fast: float
-    """In the residual of every unit's own fit."""
-
-    @property
-    def total(self) -> float:
-        """Both together."""
-        return self.slow + self.fast
-
-
 def energy_of(
-    compared: Compared, population: Population, slow_found: bool, shift: Shift | None = None
-) -> Energy:
-    """Change of the mean square residual, after a shift is taken from the target if one is given.
+    compared: Compared, population: Population, shift: Shift | None = None
+) -> tuple[float, float]:
+    """Change of the mean square residual, after a shift, if given, is taken from the target.
 
-    Without `slow_found` the coefficients do not lie outside the baseline's: their difference is
-    that of healthy sessions and counts as nothing.
+    Returns
+    -------
+    slow : float
+        In the declared effects' coefficients: what the baseline's mean model leaves more in the
+        target than a unit's own fit, less the same in the baseline, A^2.
+    fast : float
+        In the residual of every unit's own fit, A^2.
     """
     after = compared.after
     sums = compared.sums(population.terms, True, shift_current(compared, shift))
@@ -53,11 +40,11 @@ def energy_of(
     n = int(np.count_nonzero(~after))
     # A baseline unit is a part of the mean that it is compared with.
     fair = (n + 1) / max(n - 1, 1)
-    slow = float(np.mean(moved[after]) - fair * np.mean(moved[~after])) if slow_found else 0.0
+    slow = float(np.mean(moved[after]) - fair * np.mean(moved[~after]))
     spread = max(float(np.std(left[~after], ddof=1)), 0.05 * float(np.median(left[~after])))
     fast = float(np.median(left[after]) - np.median(left[~after]))
     clear = fast > CLEAR * spread * np.sqrt(1 / n + 1 / np.count_nonzero(after))
-    return Energy(max(slow, 0.0), fast if clear else 0.0)
+    return max(slow, 0.0), fast if clear else 0.0
 
 
 def rest_growth(compared: Compared, population: Population, shift: Shift | None) -> float:

@@ -119,23 +119,25 @@ def explain_change(
     periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
     held = 0.0 if periodic is None else periodic.power
 
-    energy = energy_of(compared, population, slow_found=bool(slow))
+    spread, fast = energy_of(compared, population)
     # What each slow cause takes from the change's mean square, in their order.
-    rests = [energy_of(compared, population, True, found.shift).total for found in slow]
+    rests = [sum(energy_of(compared, population, found.shift)) for found in slow]
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    moved, gains = energy.slow, -np.diff(np.minimum.accumulate([energy.total, *rests]))
+    # Coefficients that do not lie outside the baseline's differ as healthy sessions' do.
+    moved = spread if slow else 0.0
+    gains = -np.diff(np.minimum.accumulate([spread + fast, *rests]))
     powers = [shift_power(compared, found.shift) for found in slow]
     friction = powers and {found.effect for found in slow} <= HIDDEN
-    if friction and energy.slow < VISIBLE * powers[-1]:
+    if friction and spread < VISIBLE * powers[-1]:
         # The mean square hardly shows the change: its own power is what there is of it.
         moved, gains = powers[-1], np.diff(powers, prepend=0.0)
-    whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
+    whole = max(moved + max(fast, held), SMALLEST_POWER)
     causes = [
         _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)
         for found, gain in zip(slow, gains, strict=True)
     ]
     if periodic is not None and periodic.effect in library:
-        carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
+        carries = held >= SMALLEST_LINE_SHARE * max(fast, held)
         if periodic.known or carries:
             ratio, share = periodic.evidence["power_ratio"], held / whole
             grown, doubled = ratio >= CLEAR_GROWTH, periodic.mesh and ratio >= GROWTH
@@ -175,6 +177,6 @@ def _weighed(
         domain=effect.domain,
         origin=effect.origin,
         share=float(np.clip(share, 0.0, 1.0)),
-        serious=serious and not effect.harmless,
+        serious=serious and effect.origin == "joint",
         clear=clear,
     )

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from opamc_cli.joint.change.moderated import moderated_t
 from opamc_cli.joint.change.slow import Shift, shift_current
@@ -107,14 +107,15 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     return found
 
 
-def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra | None:
-    """Spectra of all units on one grid of orders; None where no stroke is long enough."""
+def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra:
+    """Spectra of all units on one grid of orders; of none where too few strokes are long enough."""
     track, after = compared.track, compared.after
     pieces = strokes(track, residual != 0)
     travels = [float(np.ptp(track.machine_angle_rad[start:stop])) for start, stop in pieces]
     top = highest_order(track)
+    none = OrderSpectra(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.inf)
     if not pieces or top <= 0:
-        return None
+        return none
     bins = AngleBins.of(max(travels), top)
     # long strokes carry the energy: their resolution is what the sum has
     resolution = 2 * np.pi / float(np.average(travels, weights=travels))
@@ -128,7 +129,7 @@ def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra | None:
     rows = power[:, first:] / np.maximum(samples, 1.0)[:, None]
     before, later = rows[~after & (samples > 0)], rows[after & (samples > 0)]
     if len(before) < 2 or not len(later):
-        return None
+        return none
     return OrderSpectra(bins.orders[first:], before, later, resolution)
 
 
@@ -150,8 +151,10 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
     growth = after.mean(axis=0) - before.mean(axis=0)
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * spectra.resolution / spacing), OVERSAMPLING)
+    around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
     excess = np.exp(after.mean(axis=0)) - np.exp(before.mean(axis=0))
-    possible = (p_values < LARGEST_P) & (growth > np.log(SMALLEST_RATIO))
+    doubled = np.minimum(growth, growth - median_filter(growth, around)) > np.log(SMALLEST_RATIO)
+    possible = (p_values < LARGEST_P) & doubled
     found: list[Line] = []
     while len(found) < most and possible.any():
         peak = int(np.argmax(np.where(possible, excess, -np.inf)))
@@ -159,16 +162,7 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         # a finite stroke smears a line: its side lobes are no lines of their own
         lobes = excess[peak] * SIDE_LOBES / (np.pi * np.maximum(away, 1.0)) ** 2
         possible &= (away > 1.5) & (excess > lobes)
-        reach = int(NEIGHBOURHOOD * spectra.resolution / spacing)
-        around = np.r_[
-            max(peak - reach, 0) : max(peak - guard, 0), peak + guard + 1 : peak + reach + 1
-        ]
-        around = around[around < orders.size]
-        if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
-            continue
-        line = _line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak])
-        if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
-            found.append(line)
+        found.append(_line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak]))
     return found
 
 

@@ -17,21 +17,19 @@ phase picks up has as much in that frame as in either of its two lines over the 
 def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Reading | None:
     """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
     spectra = order_spectra(compared, residual)
-    lines = [] if spectra is None else grown_lines(spectra, between)
-    if spectra is None or not lines:
+    lines = grown_lines(spectra, between)
+    if not lines:
         return None
     timed = clocked(compared)
     hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
     reading = read_lines(lines, compared.track, spectra.resolution)
-    if reading is None:
-        return None
     if not reading.known:
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)
-        beats = grown_lines(clock, between) if clock is not None else []
-        if clock is not None and beats and beats[0].excess > lines[0].excess:
+        beats = grown_lines(clock, between)
+        if beats and beats[0].excess > lines[0].excess:
             at = read_frequency(beats[0], clock.resolution)
             return None if at is None else _with_power(at, timed, residual)
     return _with_power(reading, compared, residual)
@@ -46,11 +44,15 @@ def _picked_up(
     timed: Compared, residual: Floats, strongest: Line, between: float
 ) -> Reading | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
-    turned = [signals for turning, signals in standing_views(timed.track, residual) if turning]
-    sides = turned[0] if turned else []
-    one, other = (order_spectra(timed, side) for side in sides) if sides else (None, None)
-    if one is None or other is None:
+    sides = [
+        side
+        for turning, signals in standing_views(timed.track, residual)
+        if turning
+        for side in signals
+    ]
+    if not sides:
         return None
+    one, other = (order_spectra(timed, side) for side in sides)
     spectra = replace(one, before=one.before + other.before, after=one.after + other.after)
     beats = grown_lines(spectra, between)
     if not beats or beats[0].excess < STANDING * strongest.excess:

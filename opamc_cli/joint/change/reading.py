@@ -101,10 +101,8 @@ class Reading(Cause):
         return self.kind == "mesh"
 
 
-def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:
+def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
-    if not lines:
-        return None
     other = _other(lines[0], track, resolution)
     if other.kind in OF_A_SENSOR:
         return other

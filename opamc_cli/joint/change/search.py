@@ -11,12 +11,12 @@ from opamc_cli.joint.change.slow import (
     left_by,
     shift_power,
     shifts,
-    slow_candidates,
 )
 from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.name.search import guessed
 
 NO_CAUSE_OF_CHANGE = frozenset(
     {"inertia", "gravity", "elasticity", "time_delay", "thermal_viscous", "warmup", "stribeck"}
@@ -51,7 +51,6 @@ SMALLEST_GAIN = 0.03
 """What explains less of the slow change is not worth a maintainer's time."""
 
 AS_GOOD, NEARLY_AS_GOOD = 0.95, 0.85
-COLLINEAR = 0.6
 SMALLEST_SHIFT = 0.01
 """A shift below this share of the slow current's root mean square is of no interest."""
 
@@ -147,16 +146,18 @@ def find_slow_causes(
     compared: Compared, population: Population, library: Library
 ) -> list[SlowCause]:
     """Add effects one by one while the target lies outside what the baseline's units show."""
-    channels = compared.track.channels
-    effects = [
-        effect
+    dataset, channels = compared.dataset, compared.track.channels
+    candidates = [
+        term
         for name, effect in library.items()
         if not effect.fast
         and name not in NO_CAUSE_OF_CHANGE
         and name != "payload_change"
         and ("logged" in channels or name not in PLACE_BOUND)
+        and effect.untestable(dataset.coarse.track) is None
+        for term in guessed(effect, dataset)
+        if term.keep is None
     ]
-    candidates = slow_candidates(compared, effects)
     payload = library.get("payload_change")
     if payload is not None:
         # Without a scale of the joint angle a payload is inertia.
@@ -238,14 +239,11 @@ def _next(
             return None
         gains, most = {surest: 0.0}, 0.0
     # Among those that explain the change equally well, the simplest is named.
-    as_good = [name for name, gain in gains.items() if gain >= AS_GOOD * most]
-    first = min(as_good, key=lambda name: (sure[name][1].width, _rank(name), sure[name][0]))
+    rank = dict(zip(EXPECTED, range(len(EXPECTED)), strict=True))
+    ordered = sorted(gains, key=lambda one: (sure[one][1].width, rank.get(one, 9), sure[one][0]))
+    first = next(name for name in ordered if gains[name] >= AS_GOOD * most)
     ties = tuple(
-        name
-        for name in gains
-        if name != first
-        and gains[name] >= NEARLY_AS_GOOD * gains[first]
-        and _likeness(compared, sure[first][1], sure[name][1]) > COLLINEAR
+        name for name in gains if name != first and gains[name] >= NEARLY_AS_GOOD * gains[first]
     )
     if first == "spring" and "payload_change" in ties:
         # Over a short travel another weight looks like a spring, and is what changes.
@@ -267,19 +265,3 @@ def _next(
         p_value=p_value,
         ties=ties,
     )
-
-
-def _likeness(compared: Compared, one: Shift, other: Shift) -> float:
-    """Correlation of two shifts' last terms in the target, from -1 to 1."""
-    parts = one.last, other.last
-    sums = compared.sums([part.terms[0] for part in parts])
-    both = np.zeros((sums.moment.shape[1], 2))
-    both[: one.width, 0], both[one.width :, 1] = (part.coefficients for part in parts)
-    products = both.T @ sums.gram[compared.after].sum(axis=0) @ both
-    size = float(np.sqrt(products[0, 0] * products[1, 1]))
-    return float(products[0, 1]) / size if size > 0 else 0.0
-
-
-def _rank(name: str) -> int:
-    names = tuple(EXPECTED)
-    return names.index(name) if name in names else len(names)

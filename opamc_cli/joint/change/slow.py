@@ -12,7 +12,6 @@ import numpy as np
 
 from opamc_cli.joint.change.moderated import moderated_covariance, shift_p
 from opamc_cli.joint.change.units import Compared, own_fit
-from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import Term, currents
 from opamc_cli.joint.fit.parts import Sums
 from opamc_cli.joint.motion.track import Floats
@@ -155,17 +154,6 @@ def _spread_ratio(sample: Floats, information: Floats) -> float:
     centred = sample - sample.mean(axis=0)
     square = float(np.einsum("ni,ij,nj->", centred, information.mean(axis=0), centred))
     return square / float(max((len(sample) - 1) * sample.shape[1], 1))
-
-
-def slow_candidates(compared: Compared, effects: list[Effect]) -> list[Term]:
-    """Every effect with every guess of its parameters, where all units can show it."""
-    track = compared.dataset.coarse.track
-    return [
-        Term(effect, guess)
-        for effect in effects
-        if effect.untestable(track) is None
-        for guess in effect.guesses(track, np.zeros(track.size))
-    ]
 
 
 def left_by(compared: Compared, population: Population, shift: Shift | None = None) -> Floats:

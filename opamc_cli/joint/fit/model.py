@@ -132,10 +132,6 @@ class Dataset:
         blocks = [*(self.columns(term, fine) for term in terms), *beside]
         return self.cache.sums(blocks, grid.track.current_a, grid.parts, fine)
 
-    def computed(self, term: Term, fine: bool, rows: Ints) -> Floats:
-        """Regressors of a guess at some samples; nobody will ask for them again."""
-        return term.columns_at(self.grid_of(fine).track, rows)
-
     def grid_of(self, fine: bool) -> Grid:
         """Return the fine or the coarse grid."""
         return self.fine if fine else self.coarse
@@ -229,13 +225,9 @@ class Fit:
     @cached_property
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
-        parts, track = self.dataset.parts[0], self.dataset.fine.track
-        shared = self.dataset.cache.shared
-        if "ones" not in shared:
-            shared["ones"] = np.ones((track.size, 1))
-            shared["stretches"] = parts.stretches(track.direction)
-        sums = self.dataset.sums(self.terms, True, shared["ones"])
-        return sums.without_drift(shared["stretches"]).held_out()
+        grid = self.dataset.fine
+        sums = self.dataset.sums(self.terms, True, np.ones((grid.track.size, 1)))
+        return sums.without_drift(grid.parts.stretches(grid.track.direction)).held_out()
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
@@ -249,7 +241,6 @@ class Fit:
         self.dataset.fine.track.forget()
         self.dataset.coarse.track.forget()
         self.__dict__.pop("coarse_sums", None)
-        self.sums.forget()
 
     @cached_property
     def opened(self) -> "Fit":

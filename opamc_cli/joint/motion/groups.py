@@ -102,21 +102,16 @@ def group_samples(
         group[start:stop] = number
     kind = "cycles" if period is not None else "recordings"
     names = tuple(name for *_, name in pieces)
-    return Grouping(group, names, tuple(sorted(_sealed_pieces(pieces))), kind)
+    return Grouping(group, names, _sealed([run for run, *_ in pieces]), kind)
 
 
-def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
-    by_run: dict[int, list[int]] = {}
-    for i, piece in enumerate(pieces):
-        by_run.setdefault(piece[0], []).append(i)
-    if all(len(members) >= 4 for members in by_run.values()):
-        batches = list(by_run.values())
-    else:
-        batches = [list(range(len(pieces)))]
-    sealed: set[int] = set()
-    for members in batches:
-        sealed.update(members[-max(round(SEALED_SHARE * len(members)), 1) :])
-    return sealed
+def _sealed(runs: list[int]) -> tuple[int, ...]:
+    """Which pieces are sealed: the last of each run, if each has four or more, else of all."""
+    batches = [np.flatnonzero(np.equal(runs, run)) for run in dict.fromkeys(runs)]
+    if min(batch.size for batch in batches) < 4:
+        batches = [np.arange(len(runs))]
+    last = [batch[-max(round(SEALED_SHARE * batch.size), 1) :] for batch in batches]
+    return tuple(np.sort(np.concatenate(last)).tolist())
 
 
 def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:

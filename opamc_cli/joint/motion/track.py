@@ -99,8 +99,6 @@ class Track:
     temperature_c: Floats | None = None
     electrical_rad: Floats | None = None
     """With `temperature_c`: where known; (n,) or None."""
-    period_samples: int | None = None
-    """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None
@@ -139,6 +137,11 @@ class Track:
             return self.reference.speed
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
+
+    @property
+    def travel_rad(self) -> float:
+        """Way from the lowest to the highest position of the moving samples."""
+        return float(np.ptp(self.position_rad[self.moving]))
 
     @cached_property
     def middle_temperature_c(self) -> float:
@@ -322,7 +325,6 @@ def coarsen(track: Track, factor: int) -> Track:
     clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
     moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
-    period = track.period_samples
     sampled = {name: getattr(full, name) for name in SAMPLED if name not in NOT_AVERAGED}
     means: dict[str, Any] = {
         name: mean(values) for name, values in sampled.items() if values is not None
@@ -338,5 +340,4 @@ def coarsen(track: Track, factor: int) -> Track:
         blur=None,
         **means,
         full=full,
-        period_samples=None if period is None else round(period / factor),
     )

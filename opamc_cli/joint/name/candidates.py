@@ -46,10 +46,10 @@ class Batch:
 def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batch]:
     """Compute the regressors of guesses and their products, by width."""
     parts = dataset.parts[0 if fine else 1]
-    current = parts.taken(dataset.grid_of(fine).track.current_a)[:, None]
+    current = (dataset.grid_of(fine).track.current_a)[parts.rows][:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = dataset.computed(term, fine, parts.rows)
+        columns = term.columns_at(dataset.grid_of(fine).track, parts.rows)
         alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
     for (width, _), members in alike.items():
@@ -99,13 +99,13 @@ class Beside:
         self.fast_part: Floats | None = None
         if not self.fine:
             self.sums, blocks, fast = chain.fit.coarse_sums
-            self.fast_part = self.parts.taken(fast)
+            self.fast_part = fast[self.parts.rows]
         else:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             follows = not all(term.is_constant for term in chain.fit.terms)
             self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
-        self.before = self.sums.held_out()
+        self.before, self.inverses = self.sums.held_out(), self.sums.inverses()
 
     def products(self, columns: Floats) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
@@ -131,7 +131,7 @@ class Beside:
         rest_cross, rest_own, rest_moment = (
             self.parts.elsewhere(one) for one in (cross, own, moment)
         )
-        projected = self.sums.inverses[:, None] @ rest_cross
+        projected = self.inverses[:, None] @ rest_cross
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
         width = own.shape[-1]

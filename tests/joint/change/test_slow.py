@@ -23,7 +23,6 @@ from opamc_cli.joint.change.slow import (
     shift_current,
     shift_power,
     shifts,
-    slow_candidates,
     with_model,
 )
 from opamc_cli.joint.change.units import own_fit
@@ -189,15 +188,6 @@ def test_declared_friction_is_not_expected_to_differ_by_what_no_effect_holds():
     for term, expected in zip(both, (inflation, 1.0, inflation), strict=True):
         p_value = slow_shift(units, population, term, expected)[0]
         assert found[term.key] == pytest.approx(p_value, rel=1e-4)
-
-
-def test_candidates_are_all_guesses_of_what_every_unit_can_show(units):
-    effects = [LIBRARY[name] for name in ("spring", "stribeck", "thermal_viscous")]
-    found = slow_candidates(units, effects)
-    track = units.dataset.coarse.track
-    guesses = LIBRARY["stribeck"].guesses(track, np.zeros(track.size))
-    assert [term.parameters for term in found] == [{}, *guesses]
-    assert {term.effect.name for term in found} == {"spring", "stribeck"}
 
 
 @pytest.mark.parametrize("fine", [True, False])
