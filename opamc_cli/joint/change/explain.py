@@ -44,9 +44,7 @@ GROWTH, CLEAR_GROWTH = 4.0, 10.0
 """A mesh's ripple of twice the amplitude, four times the power, is a fault however much more cold
 grease changed; where the payload has changed, which moves a healthy gear's ripple too, any ripple
 has to grow tenfold in power. Nothing else does that to it: such a ripple is clear. Nor does
-grease let what no effect holds grow fourfold: on eight joints like those of
-`benchmarks/closed_loop.py` 0.5 to 1.2 times where they were 20 degrees colder, up to 45 with play.
-"""
+grease let what no effect holds grow fourfold."""
 
 
 @dataclass(frozen=True)

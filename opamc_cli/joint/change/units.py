@@ -55,9 +55,9 @@ class Compared:
             moving = grid.track.moving & (group >= 0)
             grids.append(grid_of(replace(grid.track, group=group, moving=moving), whole=True))
         fine, coarse = grids
-        names = tuple(str(unit) for unit in np.flatnonzero(units))
-        grouping = Grouping(fine.track.group, names, (), "units")
-        return Compared(Dataset(fine, coarse, self.dataset.factor, grouping), self.after[units])
+        # Another dataset, for what was kept is of the other units.
+        dataset = Dataset(fine, coarse, self.dataset.factor, self.dataset.grouping)
+        return Compared(dataset, self.after[units])
 
 
 Tracked = tuple[Track, Grouping]

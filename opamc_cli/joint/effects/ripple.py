@@ -104,7 +104,10 @@ class Ripple(Effect):
         waves = [wave[rows] for wave in turning] if answering else turning
         scale = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
-        following = _following_model(waves, track.model_a[rows], parameters)
+        model_a = track.model_a[rows]
+        sizes = [np.sign(model_a)] * bool(parameters.get("load"))
+        sizes += [model_a] * bool(parameters.get("current"))
+        following = [size * wave for size in sizes for wave in waves]
         turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
         plain = 2 + len(swelling)
         last = plain + 4 * len(answering)
@@ -142,8 +145,11 @@ class Ripple(Effect):
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
-        order = parameters["order"]
-        nearest = min(named_orders(track, order), key=lambda named: abs(named - order))
+        order, ratio = parameters["order"], track.joint.gear_ratio
+        named = [float(max(round(order), 1))]
+        if track.angle_kind == "motor" and ratio:
+            named += [2 * teeth / ratio * k for _, teeth in meshes(ratio) for k in range(1, 5)]
+        nearest = min(named, key=lambda one: abs(one - order))
         close = abs(nearest - order) < 0.25 * order_resolution(track)
         return parameters | {"order": nearest} if close else parameters
 
@@ -169,11 +175,6 @@ def _filters(top_hz: float, density: float) -> int:
     """Count the filters from a highest frequency down, so many per octave; one at least."""
     octaves = min(math.log2(top_hz / LOWEST_HZ), OCTAVES)
     return 1 + max(int(density * octaves), 0)
-
-
-def _following_model(waves: list[Floats], model_a: Floats, parameters: Parameters) -> list[Floats]:
-    sizes = {"load": np.sign(model_a), "current": model_a}
-    return [size * wave for name, size in sizes.items() if parameters.get(name) for wave in waves]
 
 
 def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
@@ -204,16 +205,6 @@ def _top_hz(track: Track, order: float) -> float:
     speed = np.abs(np.gradient(track.machine_angle_rad)) * track.rate_hz
     fastest = float(np.quantile(speed[track.moving], 0.99))
     return min(order * fastest / (2 * math.pi), HIGHEST_SHARE * track.rate_hz)
-
-
-def named_orders(track: Track, order: float) -> list[float]:
-    """Orders near a found one that have a meaning."""
-    named = [float(max(round(order), 1))]
-    ratio = track.joint.gear_ratio
-    if track.angle_kind == "motor" and ratio:
-        for _, teeth in meshes(ratio):
-            named += [2 * teeth / ratio * k for k in range(1, 5)]
-    return named
 
 
 def meshes(ratio: float) -> tuple[tuple[str, float], ...]:

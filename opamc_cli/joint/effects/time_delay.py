@@ -5,7 +5,7 @@ from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -53,18 +53,14 @@ class TimeDelay(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
-        # Nobody looks at the other samples of an averaged track.
-        wanted = np.ones(track.size, dtype=bool) if track.full is None else rows
         if parameters.get("filtered"):
             late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
-            shifted = block_mean(np.concatenate(late), full.bounds, factor)[wanted]
+            shifted = block_mean(np.concatenate(late), full.bounds, factor)
         else:
-            shifted = late_means(track.static_sums, full.bounds, samples, factor, wanted)
-        part = shifted if track.full is not None else shifted[rows]
+            shifted = late_means(track.static_sums, full.bounds, samples, factor)
+        part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        moved = np.zeros(track.size)
-        moved[wanted] = (shifted - track.static_means[wanted]) @ coefficients
-        return stack(moved)
+        return stack((shifted - track.static_means) @ coefficients)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
@@ -83,26 +79,21 @@ class TimeDelay(Effect):
 
 
 def late_means(
-    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int, wanted: Bools
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
 ) -> Floats:
-    """Means of the wanted blocks of columns that come later, the first and the last values held.
+    """Means of blocks of columns that come later, the first and the last values held.
 
     Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
     no more than there are blocks; between samples it is what a straight line between them gives.
-    `wanted` is a bool array of shape (n // factor per recording,).
     """
-    means, block = [], 0
+    means = []
     for number, (start, stop) in enumerate(bounds):
-        size, count = stop - start, (stop - start) // factor
-        chosen = np.flatnonzero(wanted[block : block + count])
         own = sums[start + number : stop + number + 1]
-        # The edges of blocks, each between a whole sample and the next one; beyond the ends the
-        # nearest step goes on.
-        edges = factor * np.stack([chosen, chosen + 1]) - samples
-        whole = np.clip(edges.astype(np.int64), 0, size - 1)
-        at = own[whole] + (edges - whole)[..., None] * (own[whole + 1] - own[whole])
-        means.append((at[1] - at[0]) / factor)
-        block += count
+        edges = factor * np.arange((stop - start) // factor + 1) - samples
+        # Beyond the ends the nearest step goes on.
+        whole = np.clip(edges.astype(np.int64), 0, stop - start - 1)
+        at = own[whole] + (edges - whole)[:, None] * (own[whole + 1] - own[whole])
+        means.append(np.diff(at, axis=0) / factor)
     return np.concatenate(means)
 
 

@@ -215,8 +215,7 @@ class Fit:
         dataset, track = self.dataset, self.dataset.fine.track
         fast = np.zeros((track.size, 1))
         for term, values in zip(self.terms, self.coefficients, strict=True):
-            if term.effect.fast:
-                fast += dataset.columns(term, True) @ values[:, None]
+            fast += dataset.columns(term, True) @ values[:, None] if term.effect.fast else 0.0
         smooth = averaged(fast, track.bounds, track.kernel)
         fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
@@ -282,27 +281,11 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
-    """Fit all terms jointly; where some scale with the load or the model, until that settles.
-
-    The same terms have the same fit, whatever was fitted before.
-    """
-    load, model, coefficients, residual, sums = dataset.cache.fitted(
-        tuple(term.key for term in terms), lambda: _settled(dataset, terms)
-    )
-    fitted = dataset.with_model(load, model, static_terms(terms))
-    return Fit(terms, coefficients, fitted, residual, sums)
-
-
-Found = tuple[Floats, Floats, tuple[Floats, ...], Floats, Sums]
-"""A fit's load, model, coefficients, residual and sums: what does not hold its dataset."""
-
-
-def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
+    """Fit all terms jointly; where some scale with the load or the model, until that settles."""
     track = dataset.fine.track
     dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
-    plain = not np.any(track.model_a)
-    fewest = 3 if plain else 2
+    fewest = 2 if np.any(track.model_a) else 3
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
         fitted = _fit_once(dataset, terms)
@@ -311,8 +294,7 @@ def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
         if not circular or settled:
             break
         dataset, before = _with_newton_load(fitted), error
-    track = fitted.dataset.fine.track
-    return track.load_a, track.model_a, fitted.coefficients, fitted.residual_a, fitted.sums
+    return fitted
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:

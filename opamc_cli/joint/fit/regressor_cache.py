@@ -1,20 +1,14 @@
 """What fits of the same recordings share: regressors that do not follow the model, and products."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, TypeVar
 
 import numpy as np
 
 from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
-Result = TypeVar("Result")
-
 MOST_BYTES = 120e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
-MOST_FITS = 16
-"""A search fits a quarter of its models twice, mostly soon after."""
 
 
 class RegressorCache:
@@ -24,7 +18,6 @@ class RegressorCache:
     """
 
     def __init__(self) -> None:
-        self._fits: OrderedDict[Hashable, Any] = OrderedDict()
         self._columns: dict[Hashable, Floats] = {}
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
@@ -32,20 +25,10 @@ class RegressorCache:
 
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
-        self._fits.clear()
         self._columns.clear()
         self._taken.clear()
         self._products.clear()
         self._currents.clear()
-
-    def fitted(self, key: Hashable, fit: Callable[[], Result]) -> Result:
-        """Return what a fit found, computed where it is not at hand."""
-        found: Result = self._fits[key] if key in self._fits else fit()
-        self._fits[key] = found
-        self._fits.move_to_end(key)
-        if len(self._fits) > MOST_FITS:
-            self._fits.popitem(last=False)
-        return found
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
@@ -99,6 +82,4 @@ class RegressorCache:
         blocks = sum(block.nbytes for block in self._columns.values())
         taken = sum(block.nbytes + rows.nbytes for block, rows in self._taken.values())
         if blocks + taken > MOST_BYTES:
-            self._columns.clear()
-            self._taken.clear()
-            self._products.clear()
+            self.clear()

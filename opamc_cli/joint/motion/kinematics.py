@@ -269,7 +269,6 @@ def build_track(
 def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Axes that every recording holds; none where none of them moves."""
     common = set.intersection(*(set(recording.others_rad) for recording in recordings))
-
     moves = any(
         np.ptp(filled(one.others_rad[axis])) > SLOWEST_SHARE * np.ptp(filled(one.position_rad))
         for one in recordings

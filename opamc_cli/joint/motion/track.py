@@ -42,10 +42,6 @@ NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """Those of which a block has something else than the mean, or nothing."""
 
 
-ROWS_OF_THE_LOAD = 10_000
-"""Samples by which the inertia's part of the load is told: the load has no noise."""
-
-
 @dataclass(frozen=True)
 class Joint:
     """Constants of the joint; None where nobody knows them."""
@@ -155,10 +151,9 @@ class Track:
     @cached_property
     def load_inertia(self) -> float:
         """Current of the fitted load that follows the acceleration, in A by rad/s²."""
-        rows = np.flatnonzero(self.moving)
-        rows = rows[:: max(rows.size // ROWS_OF_THE_LOAD, 1)]
+        rows = self.moving
         place = self.position_rad[rows]
-        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
+        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, place**0)
         columns = np.stack(shapes, axis=0).T
         return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
 

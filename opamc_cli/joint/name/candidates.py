@@ -73,26 +73,23 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     effect = full.effect
     (batch,) = batches_of(dataset, [full], fine=True)
     cross = beside.products(batch.columns)[:, None]
-    best = None
-    forms = [(full, tuple(range(batch.width)))]
-    for form, keep in effect.variants(full.parameters):
-        forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
-    for term, keep in forms:
+    found = []
+    forms = [(full.parameters, tuple(range(batch.width))), *effect.variants(full.parameters)]
+    for parameters, keep in forms:
+        whole = effect.flags_choose_columns or parameters is full.parameters
+        term = Term(effect, parameters, None if whole else keep)
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
         gain = float(beside.gains_of(cross[..., index], own, batch.moment[..., index])[0])
-        found = judged(term, gain, index.size)
-        if best is None or found.score < best.score:
-            best = found
-    assert best is not None
-    return best
+        found.append(judged(term, gain, index.size))
+    return min(found, key=lambda one: one.score)
 
 
 class Beside:
     """A chain's own regressors on one grid, made ready to have candidates put beside them."""
 
     def __init__(self, chain: Chain, fine: bool) -> None:
-        dataset = chain.fit.dataset
+        self.dataset = dataset = chain.fit.dataset
         self.fine = fine or dataset.coarse is dataset.fine
         self.parts: Parts = dataset.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
@@ -111,6 +108,11 @@ class Beside:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
         return np.concatenate([none, *self.parts.products_of(self.blocks, columns)], axis=1)
+
+    def candidate(self, term: Term) -> Candidate:
+        """Judge one guess."""
+        (batch,) = batches_of(self.dataset, [term], self.fine)
+        return judged(term, float(self.gains(batch)[0]), batch.width)
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""

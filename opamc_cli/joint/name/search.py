@@ -151,9 +151,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
-        term = refined(dataset, candidate.term, beside)
-        (batch,) = batches_of(dataset, [term], beside.fine)
-        trial = judged(term, float(beside.gains(batch)[0]), batch.width)
+        trial = beside.candidate(refined(candidate.term, beside))
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.gain > (1 - PRICE) * candidate.gain else candidate)
     chain.fit.forget()
