@@ -74,10 +74,10 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     (batch,) = batches_of(dataset, [full], fine=True)
     cross = beside.products(batch.columns)[:, None]
     found = []
-    forms = [(full.parameters, tuple(range(batch.width))), *effect.variants(full.parameters)]
-    for parameters, keep in forms:
-        whole = effect.flags_choose_columns or parameters is full.parameters
-        term = Term(effect, parameters, None if whole else keep)
+    forms = [(full, tuple(range(batch.width)))]
+    for form, keep in effect.variants(full.parameters):
+        forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
+    for term, keep in forms:
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
         gain = float(beside.gains_of(cross[..., index], own, batch.moment[..., index])[0])
