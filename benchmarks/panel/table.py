@@ -111,7 +111,7 @@ def behind(row: Row, name: str, *, share: bool) -> bool:
     of different samples differ, and who begins with the better motion has less to gain.
     """
     reached = {
-        other: result["after"] / (result["before"] if share else 1.0)
+        other: result["after"] / (max(result["before"], 1e-9) if share else 1.0)
         for other, result in row["results"].items()
         if "after" in result
     }

@@ -8,11 +8,7 @@ Floats = NDArray[np.float64]
 
 SINGULAR_BELOW = 1e-7
 """Of the largest eigenvalue: regressors that differ by less than 3e-4 of their size are not told
-apart; what noise makes of the difference would be extrapolated. Over a stroke of 0.75 rad a spring
-differs from gravity by 1e-3, over half a radian by less than 3e-4: one of 15 times the noise is
-named there all the same, at 0.077 A; at 1e-9 for each regressor at 0.071 A, but one of 20 measured
-joints loses what it had and ends 0.5 % worse. At 1e-8 a minute of a testbed's axis takes 1.4 times
-as long, ten minutes twice, since every filter of a drive's answer is told from its neighbours."""
+apart; what noise makes of the difference would be extrapolated (docs/loop.md)."""
 
 
 def solve(gram: Floats, moment: Floats) -> Floats:
@@ -21,24 +17,21 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     Of products of regressors, (k, k), and these times the signal, (k,); directions below 1e-7 of
     the largest get no coefficient.
     """
-    if moment.shape[-1] == 0:
-        return moment
-    if moment.shape == (1,):
-        alone: Floats = moment / np.maximum(gram[0], 1e-200)
-        return alone
-    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
-    scaled = gram / (scale[..., :, None] * scale[..., None, :])
-    solution: Floats = np.einsum("...ij,...j->...i", _inverse(scaled), moment / scale) / scale
+    solution: Floats = (inverse(gram) @ moment[..., None])[..., 0]
     return solution
 
 
 def inverse(gram: Floats) -> Floats:
-    """Pseudo-inverses of stacked matrices of products, shape (..., k, k)."""
+    """Pseudo-inverses of scaled, stacked matrices of products, shape (..., k, k)."""
     if gram.shape[-1] == 0:
         return gram
     scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
     both = scale[..., :, None] * scale[..., None, :]
-    found: Floats = _inverse(gram / both) / both
+    values, vectors = eigenvectors(gram / both)
+    sizes = np.abs(values)
+    large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
+    factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
+    found: Floats = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2) / both
     return found
 
 
@@ -56,13 +49,3 @@ def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
         values = np.stack([pair[0] for pair in pairs]).reshape(symmetric.shape[:-1])
         vectors = np.stack([pair[1] for pair in pairs]).reshape(symmetric.shape)
     return values, vectors
-
-
-def _inverse(gram: Floats) -> Floats:
-    """Pseudo-inverse of symmetric matrices, shape (..., k, k), by their eigenvectors."""
-    values, vectors = eigenvectors(gram)
-    sizes = np.abs(values)
-    large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
-    factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
-    inverse: Floats = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2)
-    return inverse

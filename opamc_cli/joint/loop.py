@@ -198,7 +198,7 @@ def _opened(
     has_name = any(step.named for step in steps)
     without_name = [step for step in steps if not step.named]
     # A model that predicts no better than the mean lacks something, whatever was found.
-    predicts = _r2(after) > 0
+    predicts = after.sealed_r2 > 0
     if has_name:
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
@@ -222,8 +222,8 @@ def _opened(
         verdict=verdict,
         rmse_before_a=rmse_before,
         rmse_after_a=rmse_after,
-        r2_before=_r2(before),
-        r2_after=_r2(after),
+        r2_before=before.sealed_r2,
+        r2_after=after.sealed_r2,
         floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
         noise_a=measurement_noise(after.residual_a[after.dataset.sharp.fit]),
         explained_share=float(np.clip(reached, 0.0, 1.0)),
@@ -252,12 +252,3 @@ def untestable(before: Fit, library: Library) -> dict[str, str]:
     track = before.dataset.fine.track
     reasons = {name: effect.untestable(track) for name, effect in library.items()}
     return {name: why for name, why in reasons.items() if why is not None}
-
-
-def _r2(fitted: Fit) -> float:
-    opened = fitted.opened
-    grid = opened.dataset.sharp
-    current = grid.track.current_a[grid.sealed]
-    power = float(np.sum((current - current.mean()) ** 2))
-    rest = float(np.sum(opened.residual_a[grid.sealed] ** 2))
-    return 1.0 - rest / power if power > 0 else 0.0

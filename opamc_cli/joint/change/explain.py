@@ -1,17 +1,18 @@
 """What changed between two sets of recordings of one joint, as effects of the library."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from opamc_cli.joint.change.energy import energy_of, rest_growth, shift_power
+from opamc_cli.joint.change.energy import energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
-from opamc_cli.joint.change.reading import Finding, Reading
-from opamc_cli.joint.change.search import SlowCause, find_slow_causes
-from opamc_cli.joint.change.slow import learn
-from opamc_cli.joint.change.units import Follow, follow, followed, read_side, usable_terms
+from opamc_cli.joint.change.reading import Cause
+from opamc_cli.joint.change.search import find_slow_causes
+from opamc_cli.joint.change.slow import learn, shift_power, with_model
+from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
 
@@ -43,30 +44,7 @@ GROWTH, CLEAR_GROWTH = 4.0, 10.0
 """A mesh's ripple of twice the amplitude, four times the power, is a fault however much more cold
 grease changed; where the payload has changed, which moves a healthy gear's ripple too, any ripple
 has to grow tenfold in power. Nothing else does that to it: such a ripple is clear. Nor does
-grease let what no effect holds grow fourfold: on eight joints like those of
-`benchmarks/closed_loop.py` 0.5 to 1.2 times where they were 20 degrees colder, up to 45 with play.
-"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cause(Finding):
-    """A finding with its weight."""
-
-    domain: str
-    share: float
-    """Share of the change of the current's mean square beyond the sessions' own differences that it
-    explains, 0 to 1."""
-    origin: str
-    """The effect's: "joint", or "environment", "load", "measurement", which are no fault of it."""
-    serious: bool
-    """True where it is the joint's and large enough to be called a fault whatever else changed."""
-    clear: bool = False
-    """True where nothing that all joints have in common could look like it."""
-
-    @property
-    def harmless(self) -> bool:
-        """Whether the joint is no worse for it."""
-        return self.origin != "joint"
+grease let what no effect holds grow fourfold."""
 
 
 @dataclass(frozen=True)
@@ -116,45 +94,56 @@ def explain_change(
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS
-    before = read_side(baseline, joint, after=False, cycles=cycles, follow=follow)
-    after = read_side(target, joint, after=True, cycles=cycles)
+    before = read_side(baseline, joint, cycles, follow)
+    after = read_side(target, joint, cycles)
     if not before or not after:
         side = "target" if before else "baseline"
         return Change((), 0.0, False, why_not=f"too little motion in the {side}")
-    terms = usable_terms(before + after, [effect_named(library, name) for name in DECLARED])
-    before, after = followed(before, after, terms)
-    if len(before) < 2 or not after:
+    compared = side_by_side(before, after)
+    declared = [effect_named(library, name) for name in DECLARED]
+    terms = tuple(Term(one, {}) for one in declared if one.untestable(compared.track) is None)
+    compared = followed(compared, terms)
+    late = compared.after
+    if np.count_nonzero(~late) < 2 or not late.any():
         why = "too few cycles or recordings whose torque axis can be followed"
         return Change((), 0.0, False, why_not=why)
-    if not any(unit.current_a().any() for unit in before):
+    if not compared.sums(()).power[~late].any():
         return Change((), 0.0, False, why_not="no current in the baseline")
-    population = learn(before, terms, SESSIONS_DIFFER if cycles else 0.0)
-    units = [unit.with_model(terms, population.mean) for unit in before + after]
+    population = learn(compared, terms, SESSIONS_DIFFER if cycles else 0.0)
+    compared = with_model(compared, population)
 
-    slow = find_slow_causes(units, population, library)
-    residuals = fast_residuals(units, terms, slow[-1].shift if slow else None)
-    periodic = find_periodic(units, residuals, LINES_DIFFER if cycles else 0.0)
+    slow = find_slow_causes(compared, population, library)
+    residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
+    periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
     held = 0.0 if periodic is None else periodic.power
 
-    energy = energy_of(units, population, slow_found=bool(slow))
+    spread, fast = energy_of(compared, population)
     # What each slow cause takes from the change's mean square, in their order.
-    rests = [energy_of(units, population, True, found.shift).total for found in slow]
+    rests = [sum(energy_of(compared, population, found.shift)) for found in slow]
     # A line stands out of the spectrum before it stands out of the whole mean square.
-    moved, gains = energy.slow, -np.diff(np.minimum.accumulate([energy.total, *rests]))
-    powers = [shift_power(units, found.shift) for found in slow]
+    # Coefficients that do not lie outside the baseline's differ as healthy sessions' do.
+    moved = spread if slow else 0.0
+    gains = -np.diff(np.minimum.accumulate([spread + fast, *rests]))
+    powers = [shift_power(compared, found.shift) for found in slow]
     friction = powers and {found.effect for found in slow} <= HIDDEN
-    if friction and energy.slow < VISIBLE * powers[-1]:
+    if friction and spread < VISIBLE * powers[-1]:
         # The mean square hardly shows the change: its own power is what there is of it.
         moved, gains = powers[-1], np.diff(powers, prepend=0.0)
-    whole = max(moved + max(energy.fast, held), SMALLEST_POWER)
+    whole = max(moved + max(fast, held), SMALLEST_POWER)
     causes = [
-        _slow_cause(found, gain / whole, library) for found, gain in zip(slow, gains, strict=True)
+        _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)
+        for found, gain in zip(slow, gains, strict=True)
     ]
-    if periodic is not None and periodic.reading.effect in library:
-        carries = held >= SMALLEST_LINE_SHARE * max(energy.fast, held)
-        if periodic.reading.known or carries:
+    if periodic is not None and periodic.effect in library:
+        carries = held >= SMALLEST_LINE_SHARE * max(fast, held)
+        if periodic.known or carries:
+            ratio, share = periodic.evidence["power_ratio"], held / whole
+            grown, doubled = ratio >= CLEAR_GROWTH, periodic.mesh and ratio >= GROWTH
             loaded = any(cause.origin == "load" for cause in causes)
-            causes.append(_periodic_cause(periodic.reading, held / whole, library, loaded))
+            clear = periodic.mesh and grown
+            enough = share >= FAULT_SHARE and (grown or not loaded)
+            serious = clear or enough or (doubled and not loaded)
+            causes.append(_weighed(periodic, share, library, serious, clear))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -164,41 +153,28 @@ def explain_change(
     others = [cause for cause in causes if cause.origin != "environment"]
     excused = len(others) < len(causes) and not serious
     shift = slow[-1].shift if slow else None
-    if excused and rest_growth(units, population, shift) >= GROWTH:
+    if excused and rest_growth(compared, population, shift) >= GROWTH:
         causes = others
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(
         causes=tuple(causes),
         explained_share=min(sum(cause.share for cause in causes), 1.0),
         harmless=harmless >= HARMLESS_SHARE and not serious,
-        units=(len(before), len(after)),
+        units=(int(np.count_nonzero(~late)), int(np.count_nonzero(late))),
         sessions=not cycles,
-        angle=units[0].fine.angle_kind,
+        angle=compared.track.angle_kind,
     )
 
 
-def _slow_cause(found: SlowCause, unclipped: float, library: Library) -> Cause:
-    share = float(np.clip(unclipped, 0.0, 1.0))
-    return _weighed(found, share, library, serious=share >= FAULT_SHARE)
-
-
-def _periodic_cause(reading: Reading, share: float, library: Library, loaded: bool) -> Cause:
-    ratio = reading.evidence["power_ratio"]
-    grown, doubled = ratio >= CLEAR_GROWTH, reading.mesh and ratio >= GROWTH
-    enough = share >= FAULT_SHARE and grown if loaded else share >= FAULT_SHARE or doubled
-    clear = reading.mesh and grown
-    return _weighed(reading, share, library, serious=clear or enough, clear=clear)
-
-
 def _weighed(
-    found: Finding, share: float, library: Library, serious: bool, clear: bool = False
+    found: Cause, share: float, library: Library, serious: bool, clear: bool = False
 ) -> Cause:
     effect = library[found.effect]
-    return Cause(
-        **{one.name: getattr(found, one.name) for one in fields(Finding)},
+    return replace(
+        found,
         domain=effect.domain,
-        share=share,
         origin=effect.origin,
-        serious=serious and not effect.harmless,
+        share=float(np.clip(share, 0.0, 1.0)),
+        serious=serious and effect.origin == "joint",
         clear=clear,
     )

@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from opamc_cli.joint.change.moderated import moderated_t
-from opamc_cli.joint.change.slow import Shift, without
-from opamc_cli.joint.change.units import Unit, own_fit
+from opamc_cli.joint.change.slow import Shift, shift_current
+from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 from opamc_cli.joint.spectra import (
@@ -64,35 +64,36 @@ class Line:
     """Corrected for the number of orders."""
 
 
-def fast_residuals(units: list[Unit], terms: tuple[Term, ...], shift: Shift | None) -> list[Floats]:
-    """Residuals of every unit's own fit on the full grid; zero where samples do not count.
+def fast_residuals(compared: Compared, terms: tuple[Term, ...], shift: Shift | None) -> Floats:
+    """Residual of every unit's own fit on the full grid, (n,); zero where samples do not count.
 
     Slow effects, the `shift`, are taken from the target's current first.
     """
-    residuals = []
-    for unit in units:
-        full = np.zeros(unit.fine.size)
-        current = without(unit, shift)
-        full[unit.fine_rows] = own_fit(unit, terms, fine=True, current=current)[1]
-        residuals.append(full)
-    return residuals
+    dataset, track = compared.dataset, compared.track
+    taken = shift_current(compared, shift)
+    coefficients = own_fit(compared, terms, True, taken)[0]
+    columns = [dataset.columns(term, True) for term in terms]
+    columns += [] if track.blur is None else [track.blur]
+    fitted = np.einsum("nk,nk->n", np.concatenate(columns, axis=1), coefficients[track.group])
+    current = track.current_a if taken is None else track.current_a - taken
+    return np.where(dataset.fine.fit, current - fitted, 0.0)
 
 
-def clocked(unit: Unit) -> Unit:
+def clocked(compared: Compared) -> Compared:
     """Let time turn the machine, once a second: its orders are then frequencies in Hz."""
-    fine = replace(
-        unit.fine, machine_angle_rad=2 * np.pi * unit.fine.run_time_s, angle_kind="joint"
-    )
-    return replace(unit, fine=fine)
+    fine = compared.dataset.fine
+    turns = 2 * np.pi * fine.track.run_time_s
+    track = replace(fine.track, machine_angle_rad=turns, angle_kind="joint")
+    return replace(compared, dataset=replace(compared.dataset, fine=replace(fine, track=track)))
 
 
 def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
-    """Half-open stretches of motion in one direction long enough to count orders."""
+    """Half-open stretches of motion in one direction and one group, long enough to count orders."""
     # Where the motion is logged, samples that do not count, at a corner of the acceleration say, do
     # not end a stroke: the angle is known on both sides of them.
     logged = "logged" in track.channels
     side = track.direction if logged else np.where(rows, track.direction, 0.0)
-    edges = np.flatnonzero(np.diff(side) != 0) + 1
+    edges = np.flatnonzero((np.diff(side) != 0) | (np.diff(track.group) != 0)) + 1
     shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
     found = []
     for first, last in pairwise([0, *edges, side.size]):
@@ -106,38 +107,30 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     return found
 
 
-def order_spectra(units: list[Unit], residuals: list[Floats]) -> OrderSpectra | None:
-    """Spectra of all units on one grid of orders; None where no stroke is long enough."""
-    pieces = [
-        (unit, residual, strokes(unit.fine, unit.fine_rows & (residual != 0)))
-        for unit, residual in zip(units, residuals, strict=True)
-    ]
-    pieces = [piece for piece in pieces if piece[2]]
-    travels = [
-        float(np.ptp(unit.fine.machine_angle_rad[a:b])) for unit, _, cut in pieces for a, b in cut
-    ]
-    tops = [highest_order(unit.fine) for unit, _, _ in pieces]
-    if not pieces or min(tops) <= 0:
-        return None
-    bins = AngleBins.of(max(travels), min(tops))
+def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra:
+    """Spectra of all units on one grid of orders; of none where too few strokes are long enough."""
+    track, after = compared.track, compared.after
+    pieces = strokes(track, residual != 0)
+    travels = [float(np.ptp(track.machine_angle_rad[start:stop])) for start, stop in pieces]
+    top = highest_order(track)
+    none = OrderSpectra(np.zeros(0), np.zeros((0, 0)), np.zeros((0, 0)), np.inf)
+    if not pieces or top <= 0:
+        return none
+    bins = AngleBins.of(max(travels), top)
     # long strokes carry the energy: their resolution is what the sum has
     resolution = 2 * np.pi / float(np.average(travels, weights=travels))
-    lowest = max(LOWEST_ORDER[units[0].fine.angle_kind], 2 * resolution)
+    lowest = max(LOWEST_ORDER[track.angle_kind], 2 * resolution)
     first = int(np.searchsorted(bins.orders, lowest))
-    rows: dict[bool, list[Floats]] = {False: [], True: []}
-    for unit, residual, cut in pieces:
-        power = np.zeros(bins.orders.size)
-        samples = 0
-        for start, stop in cut:
-            angle = unit.fine.machine_angle_rad[start:stop]
-            power += bins.power(angle - angle.min(), residual[start:stop])
-            samples += int(np.count_nonzero(residual[start:stop]))
-        rows[unit.after].append(power[first:] / samples)
-    if len(rows[False]) < 2 or not rows[True]:
-        return None
-    return OrderSpectra(
-        bins.orders[first:], np.stack(rows[False]), np.stack(rows[True]), resolution
-    )
+    power, samples = np.zeros((after.size, bins.orders.size)), np.zeros(after.size)
+    for start, stop in pieces:
+        unit, angle = track.group[start], track.machine_angle_rad[start:stop]
+        power[unit] += bins.power(angle - angle.min(), residual[start:stop])
+        samples[unit] += np.count_nonzero(residual[start:stop])
+    rows = power[:, first:] / np.maximum(samples, 1.0)[:, None]
+    before, later = rows[~after & (samples > 0)], rows[after & (samples > 0)]
+    if len(before) < 2 or not len(later):
+        return none
+    return OrderSpectra(bins.orders[first:], before, later, resolution)
 
 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
@@ -158,8 +151,10 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
     growth = after.mean(axis=0) - before.mean(axis=0)
     spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * spectra.resolution / spacing), OVERSAMPLING)
+    around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
     excess = np.exp(after.mean(axis=0)) - np.exp(before.mean(axis=0))
-    possible = (p_values < LARGEST_P) & (growth > np.log(SMALLEST_RATIO))
+    doubled = np.minimum(growth, growth - median_filter(growth, around)) > np.log(SMALLEST_RATIO)
+    possible = (p_values < LARGEST_P) & doubled
     found: list[Line] = []
     while len(found) < most and possible.any():
         peak = int(np.argmax(np.where(possible, excess, -np.inf)))
@@ -167,16 +162,7 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         # a finite stroke smears a line: its side lobes are no lines of their own
         lobes = excess[peak] * SIDE_LOBES / (np.pi * np.maximum(away, 1.0)) ** 2
         possible &= (away > 1.5) & (excess > lobes)
-        reach = int(NEIGHBOURHOOD * spectra.resolution / spacing)
-        around = np.r_[
-            max(peak - reach, 0) : max(peak - guard, 0), peak + guard + 1 : peak + reach + 1
-        ]
-        around = around[around < orders.size]
-        if around.size and growth[peak] - np.median(growth[around]) < np.log(SMALLEST_RATIO):
-            continue
-        line = _line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak])
-        if all(abs(line.order - other.order) > 1.5 * spectra.resolution for other in found):
-            found.append(line)
+        found.append(_line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak]))
     return found
 
 

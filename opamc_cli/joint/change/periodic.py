@@ -1,11 +1,11 @@
 """Which periodic effect grew: over the motor angle, over time, or in the frame of the phases."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from opamc_cli.joint.change.energy import comb_energy
 from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra
 from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
-from opamc_cli.joint.change.units import Unit
+from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import standing_views
 
@@ -14,51 +14,45 @@ STANDING = 0.7
 phase picks up has as much in that frame as in either of its two lines over the motor angle."""
 
 
-@dataclass(frozen=True)
-class Periodic:
-    """A periodic effect that grew."""
-
-    reading: Reading
-    """What it means."""
-    power: float
-    """Mean square that it holds more in the target than in the baseline, A^2."""
-
-
-def find_periodic(
-    units: list[Unit], residuals: list[Floats], between: float = 0.0
-) -> Periodic | None:
+def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Reading | None:
     """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
-    spectra = order_spectra(units, residuals)
-    lines = [] if spectra is None else grown_lines(spectra, between)
-    if spectra is None or not lines:
+    spectra = order_spectra(compared, residual)
+    lines = grown_lines(spectra, between)
+    if not lines:
         return None
-    timed = [clocked(unit) for unit in units]
-    hum = _picked_up(timed, residuals, lines[0], between)
+    timed = clocked(compared)
+    hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
-    reading = read_lines(lines, units[0].fine, spectra.resolution)
-    if reading is None:
-        return None
+    reading = read_lines(lines, compared.track, spectra.resolution)
     if not reading.known:
         # An order that means nothing may be a frequency: hum, or a structure that rings.
-        clock = order_spectra(timed, residuals)
-        beats = grown_lines(clock, between) if clock is not None else []
-        if clock is not None and beats and beats[0].excess > lines[0].excess:
+        clock = order_spectra(timed, residual)
+        beats = grown_lines(clock, between)
+        if beats and beats[0].excess > lines[0].excess:
             at = read_frequency(beats[0], clock.resolution)
-            return (
-                None if at is None else Periodic(at, comb_energy(timed, residuals, at.fundamental))
-            )
-    return Periodic(reading, comb_energy(units, residuals, reading.fundamental))
+            return None if at is None else _with_power(at, timed, residual)
+    return _with_power(reading, compared, residual)
+
+
+def _with_power(reading: Reading, compared: Compared, *residuals: Floats) -> Reading:
+    held = [comb_energy(compared, one, reading.fundamental) for one in residuals]
+    return replace(reading, power=sum(held))
 
 
 def _picked_up(
-    timed: list[Unit], residuals: list[Floats], strongest: Line, between: float
-) -> Periodic | None:
+    timed: Compared, residual: Floats, strongest: Line, between: float
+) -> Reading | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
-    sides = _quadratures(timed, residuals)
-    one, other = (order_spectra(timed, side) for side in sides) if sides else (None, None)
-    if one is None or other is None:
+    sides = [
+        side
+        for turning, signals in standing_views(timed.track, residual)
+        if turning
+        for side in signals
+    ]
+    if not sides:
         return None
+    one, other = (order_spectra(timed, side) for side in sides)
     spectra = replace(one, before=one.before + other.before, after=one.after + other.after)
     beats = grown_lines(spectra, between)
     if not beats or beats[0].excess < STANDING * strongest.excess:
@@ -67,12 +61,5 @@ def _picked_up(
     if reading is None:
         return None
     # Half of it is there; the other half turns twice as fast as the field.
-    held = 2 * sum(comb_energy(timed, side, reading.fundamental) for side in sides)
-    return Periodic(reading, held)
-
-
-def _quadratures(units: list[Unit], residuals: list[Floats]) -> list[list[Floats]]:
-    """Residuals along both axes of the phases' frame; none where no phases were logged."""
-    views = [standing_views(unit.fine, one) for unit, one in zip(units, residuals, strict=True)]
-    turned = [signals for view in views for turning, signals in view if turning]
-    return [list(side) for side in zip(*turned, strict=True)] if len(turned) == len(units) else []
+    held = _with_power(reading, timed, *sides)
+    return replace(held, power=2 * held.power)

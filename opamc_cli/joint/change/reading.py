@@ -30,6 +30,9 @@ SIDE_RESOLUTIONS = 4.0
 """A damaged mesh has play that the load closes: as the load changes along a stroke, the line of
 its passage is spread over its neighbourhood."""
 
+OF_A_SENSOR = {"1p": "sensor_offset", "2p": "sensor_gain", "6p": "dead_time"}
+"""Kinds of orders that errors of the current measurement have, with the effects."""
+
 FLEXSPLINE = "flexspline tooth damage (2(N+1)/N): inspect the flexspline"
 EITHER = (
     "kinematic error, twice per wave generator turn, that has grown, or flexspline tooth damage "
@@ -40,7 +43,7 @@ FLEXSPLINE_TIE = "flexspline tooth damage (order 2(N+1)/N)"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Finding:
+class Cause:
     """An effect that the target has and the baseline has not, or has less of."""
 
     effect: str
@@ -55,36 +58,61 @@ class Finding:
     """Effects or readings that explain the change as well."""
     evidence: Parameters = field(default_factory=dict)
     """What was measured, by name."""
+    domain: str = ""
+    origin: str = "joint"
+    """With `domain`: the effect's. "joint", or "environment", "load", "measurement", which are no
+    fault of it."""
+    share: float = 0.0
+    """Share of the change of the current's mean square beyond the sessions' own differences that it
+    explains, 0 to 1."""
+    serious: bool = False
+    """True where it is the joint's and large enough to be called a fault whatever else changed."""
+    clear: bool = False
+    """True where nothing that all joints have in common could look like it."""
+
+    @property
+    def harmless(self) -> bool:
+        """Whether the joint is no worse for it."""
+        return self.origin != "joint"
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reading(Finding):
+class Reading(Cause):
     """What the lines say."""
 
     lines: tuple[Line, ...]
     """Those that belong to it."""
     fundamental: float
-    """Order whose harmonics are the comb."""
-    known: bool
-    """Whether the order has a meaning in a strain wave gear."""
-    mesh: bool = False
-    """Whether it is that of the wave generator's passage over the teeth."""
+    """Order, or frequency, whose harmonics are the comb."""
+    kind: str
+    """As that of `OrderMeaning`; or "mesh", the wave generator's passage over the teeth, or
+    "mains"."""
+    power: float = 0.0
+    """Mean square that it holds more in the target than in the baseline, A^2."""
+
+    @property
+    def known(self) -> bool:
+        """Whether the order has a meaning in a strain wave gear."""
+        return self.kind != "unknown"
+
+    @property
+    def mesh(self) -> bool:
+        """Whether it is that of the wave generator's passage over the teeth."""
+        return self.kind == "mesh"
 
 
-def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading | None:
+def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
-    if not lines:
-        return None
-    electrical = _other(lines[0], track, resolution)
-    if electrical.effect != "ripple" or "electrical," in electrical.interpretation:
-        return electrical
+    other = _other(lines[0], track, resolution)
+    if other.kind in OF_A_SENSOR:
+        return other
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
         passages = [line for line in wave if _passage(line, poles, track, resolution)]
         # One line is enough if it is the strongest; a comb speaks for itself.
         if lines[0] in passages or (passages and len(wave) >= SHORTEST_COMB):
             return _wave_generator(wave, track, resolution, poles)
-    return electrical
+    return other
 
 
 def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
@@ -106,7 +134,7 @@ def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
         },
         lines=(line,),
         fundamental=line.order,
-        known=True,
+        kind="mains",
     )
 
 
@@ -189,7 +217,17 @@ def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: f
         interpretation += f" (order {measured:.4g} per motor turn if it has {poles:.0f} pole pairs)"
     evidence = _evidence(first, measured / poles, resolution)
     evidence["power_ratio"] = max(line.growth for line in lines)
-    return _read(lines, order / poles, evidence, interpretation, ties, known=True, mesh=True)
+    return Reading(
+        effect="ripple",
+        parameters={"order": order / poles},
+        interpretation=interpretation,
+        p_value=min(line.p_value for line in lines),
+        ties=ties,
+        evidence=evidence,
+        lines=tuple(lines),
+        fundamental=order / poles,
+        kind="mesh",
+    )
 
 
 def _evidence(line: Line, order: float, resolution: float) -> Parameters:
@@ -199,31 +237,6 @@ def _evidence(line: Line, order: float, resolution: float) -> Parameters:
         "order_resolution": resolution,
         "power_ratio": line.growth,
     }
-
-
-def _read(
-    lines: list[Line],
-    order: float,
-    evidence: Parameters,
-    text: str,
-    ties: tuple[str, ...],
-    *,
-    known: bool,
-    effect: str = "ripple",
-    mesh: bool = False,
-) -> Reading:
-    return Reading(
-        effect=effect,
-        parameters={"order": order},
-        interpretation=text,
-        p_value=min(line.p_value for line in lines),
-        ties=ties,
-        evidence=evidence,
-        lines=tuple(lines),
-        fundamental=order,
-        known=known,
-        mesh=mesh,
-    )
 
 
 def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> tuple[float, float]:
@@ -258,14 +271,19 @@ def _meant(order: float, track: Track, resolution: float) -> float:
 
 
 def _other(line: Line, track: Track, resolution: float) -> Reading:
-    text = read_order(_meant(line.order, track, resolution), track)
-    effect = "ripple"
-    ties: tuple[str, ...] = ()
-    if "electrical," in text and "phases" in track.channels:
-        for multiple, name in (("6p", "dead_time"), ("2p", "sensor_gain"), ("1p", "sensor_offset")):
-            if f"electrical, {multiple} " in text:
-                effect, ties = name, ("ripple",)
-                text += " (the drive's current measurement, not the gear)"
-    evidence = _evidence(line, line.order, resolution)
-    known = "unknown" not in text
-    return _read([line], line.order, evidence, text, ties, known=known, effect=effect)
+    meaning = read_order(_meant(line.order, track, resolution), track)
+    effect, text = "ripple", meaning.text
+    if meaning.kind in OF_A_SENSOR and "phases" in track.channels:
+        effect = OF_A_SENSOR[meaning.kind]
+        text += " (the drive's current measurement, not the gear)"
+    return Reading(
+        effect=effect,
+        parameters={"order": line.order},
+        interpretation=text,
+        p_value=line.p_value,
+        ties=() if effect == "ripple" else ("ripple",),
+        evidence=_evidence(line, line.order, resolution),
+        lines=(line,),
+        fundamental=line.order,
+        kind=meaning.kind,
+    )

@@ -75,11 +75,6 @@ class Effect:
     """True where they look at the static columns alone: at which terms there are, not at how they
     fit."""
 
-    @property
-    def harmless(self) -> bool:
-        """Whether a joint that has more of it is no worse for it: changed, but not at fault."""
-        return self.origin != "joint"
-
     def untestable(self, track: Track) -> str | None:
         """Why the recording cannot show this effect, or None where it can."""
         for channel in self.needs:

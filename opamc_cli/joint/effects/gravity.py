@@ -31,21 +31,17 @@ class Gravity(Effect):
         """Travels of the joint from a few degrees to a whole turn, where nobody knows it."""
         if "scale" in track.channels:
             return [{}]
-        travel = _travel(track)
+        travel = max(track.travel_rad, 1e-9)
         return [{"joint_rad_per_rad": joint / travel} for joint in TRAVELS_RAD]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to somewhat more than a turn of the joint."""
         if "scale" in track.channels:
             return {}
-        travel = _travel(track)
+        travel = max(track.travel_rad, 1e-9)
         return {"joint_rad_per_rad": (SHORTEST_TRAVEL_RAD / travel, LONGEST_TRAVEL_RAD / travel)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Sine and cosine of the joint angle."""
         angle = parameters.get("joint_rad_per_rad", 1.0) * track.position_rad
         return stack(np.sin(angle), np.cos(angle))
-
-
-def _travel(track: Track) -> float:
-    return max(float(np.ptp(track.position_rad[track.moving])), 1e-9)

@@ -26,13 +26,12 @@ class Hysteresis(Effect):
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Lengths from a hundredth to half of the travel."""
-        span = self._span(track)
+        span = track.travel_rad
         return [{"length_rad": length} for length in geometric(span / 100, span / 2, 9)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From a two-hundredth of the travel to all of it."""
-        span = self._span(track)
-        return {"length_rad": (span / 200, span)}
+        return {"length_rad": (track.travel_rad / 200, track.travel_rad)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """State of Dahl's model, +-1 where it has settled."""
@@ -40,10 +39,6 @@ class Hysteresis(Effect):
         for start, stop in track.bounds:
             state[start:stop] = dahl_state(track.position_rad[start:stop], parameters["length_rad"])
         return stack(state)
-
-    @staticmethod
-    def _span(track: Track) -> float:
-        return float(np.ptp(track.position_rad[track.moving]))
 
 
 @njit(cache=True)

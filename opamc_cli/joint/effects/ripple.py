@@ -1,6 +1,7 @@
 """Torque that repeats with the angle of a rotating part."""
 
 import math
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -103,7 +104,10 @@ class Ripple(Effect):
         waves = [wave[rows] for wave in turning] if answering else turning
         scale = np.abs(track.velocity[rows]) / track.speed_scale - 0.5
         swelling = [scale * wave for wave in waves] if parameters.get("speed") else []
-        following = _following_model(waves, track.model_a[rows], parameters)
+        model_a = track.model_a[rows]
+        sizes = [np.sign(model_a)] * bool(parameters.get("load"))
+        sizes += [model_a] * bool(parameters.get("current"))
+        following = [size * wave for size in sizes for wave in waves]
         turned = 2 + 4 * len(answering) if parameters.get("direction") else 0
         plain = 2 + len(swelling)
         last = plain + 4 * len(answering)
@@ -141,14 +145,17 @@ class Ripple(Effect):
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the named order where it lies within a quarter of the order resolution."""
-        order = parameters["order"]
-        nearest = min(named_orders(track, order), key=lambda named: abs(named - order))
+        order, ratio = parameters["order"], track.joint.gear_ratio
+        named = [float(max(round(order), 1))]
+        if track.angle_kind == "motor" and ratio:
+            named += [2 * teeth / ratio * k for _, teeth in meshes(ratio) for k in range(1, 5)]
+        nearest = min(named, key=lambda one: abs(one - order))
         close = abs(nearest - order) < 0.25 * order_resolution(track)
         return parameters | {"order": nearest} if close else parameters
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""
-        return read_order(parameters["order"], track, compared=False)
+        return read_order(parameters["order"], track, compared=False).text
 
 
 def _answering(track: Track, parameters: Parameters) -> list[float]:
@@ -168,11 +175,6 @@ def _filters(top_hz: float, density: float) -> int:
     """Count the filters from a highest frequency down, so many per octave; one at least."""
     octaves = min(math.log2(top_hz / LOWEST_HZ), OCTAVES)
     return 1 + max(int(density * octaves), 0)
-
-
-def _following_model(waves: list[Floats], model_a: Floats, parameters: Parameters) -> list[Floats]:
-    sizes = {"load": np.sign(model_a), "current": model_a}
-    return [size * wave for name, size in sizes.items() if parameters.get(name) for wave in waves]
 
 
 def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
@@ -205,16 +207,6 @@ def _top_hz(track: Track, order: float) -> float:
     return min(order * fastest / (2 * math.pi), HIGHEST_SHARE * track.rate_hz)
 
 
-def named_orders(track: Track, order: float) -> list[float]:
-    """Orders near a found one that have a meaning."""
-    named = [float(max(round(order), 1))]
-    ratio = track.joint.gear_ratio
-    if track.angle_kind == "motor" and ratio:
-        for _, teeth in meshes(ratio):
-            named += [2 * teeth / ratio * k for k in range(1, 5)]
-    return named
-
-
 def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
     """Return the teeth that two lobes pass per output turn, with the line's formula.
 
@@ -241,22 +233,30 @@ def order_ties(order: float, track: Track) -> list[str]:
     return [name for _, name in sorted(close, key=lambda line: abs(line[0] - order))[1:]]
 
 
-def read_order(order: float, track: Track, compared: bool = True) -> str:
+@dataclass(frozen=True)
+class OrderMeaning:
+    """What an order of a ripple means."""
+
+    kind: str
+    """"tooth", "rotor", "generator", "1p", "2p", "6p" (of the electrical angle), "cogging" or
+    "unknown"."""
+    text: str
+    """To a maintainer."""
+
+
+def read_order(order: float, track: Track, compared: bool = True) -> OrderMeaning:
     """Read an order, per revolution of the track's machine angle, by the table of orders.
 
-    "unknown periodic source" where none fits. Many healthy gears have one of the gear's lines:
-    where it was not `compared` with an earlier recording nothing is to be inspected.
+    Many healthy gears have one of the gear's lines: where it was not `compared` with an earlier
+    recording nothing is to be inspected.
     """
-    if track.angle_kind == "joint":
-        return (
-            f"unknown periodic source, order {order:.5g} per joint revolution "
-            "(gear ratio unknown, so it cannot be counted per motor revolution)"
+    if track.angle_kind != "motor":
+        lacking = "gear ratio" if track.angle_kind == "joint" else "pole pairs"
+        text = (
+            f"order {order:.5g} per {track.angle_kind} revolution ({lacking} unknown, so it cannot "
+            "be counted per motor revolution)"
         )
-    if track.angle_kind == "electrical":
-        return (
-            f"order {order:.4g} per electrical revolution (pole pairs unknown, so it cannot be "
-            "counted per motor revolution)"
-        )
+        return OrderMeaning("unknown", f"unknown periodic source, {text}")
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
     width = min(0.35 * order_resolution(track), 0.25)
     if ratio:
@@ -269,27 +269,34 @@ def read_order(order: float, track: Track, compared: bool = True) -> str:
                 "growth since an earlier recording tells tooth damage"
             )
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
-                return damage
+                return OrderMeaning("tooth", damage)
             for sideband in (-2, -1, 1, 2):
                 beside = abs(order - tooth - sideband / ratio) < min(width, 0.35 / ratio)
                 if harmonic == 1 and beside and abs(order - 2.0) >= 0.35 / ratio:
-                    return f"sideband of {formula}, {damage}"
+                    return OrderMeaning("tooth", f"sideband of {formula}, {damage}")
     healthy = "many healthy gears have it, compare with an earlier recording"
     rotor = "check rotor and wave generator" if compared else healthy
     generator = "check the wave generator" if compared else healthy
     known = [
-        (1, f"eccentricity, once per motor revolution: {rotor}"),
-        (2, f"kinematic error, twice per wave generator turn: {generator}"),
-        (4, f"kinematic error, four times per wave generator turn: {generator}"),
+        (1, "rotor", f"eccentricity, once per motor revolution: {rotor}"),
+        (2, "generator", f"kinematic error, twice per wave generator turn: {generator}"),
+        (4, "generator", f"kinematic error, four times per wave generator turn: {generator}"),
     ]
     if poles:
         known += [
-            (k * poles, f"electrical, {k}p per motor revolution: check drive and sensors")
+            (k * poles, f"{k}p", f"electrical, {k}p per motor revolution: check drive and sensors")
             for k in (1, 2, 6)
         ]
         known += [
-            (math.lcm(slots, 2 * poles), f"cogging of {slots} slots and {2 * poles} poles")
+            (
+                math.lcm(slots, 2 * poles),
+                "cogging",
+                f"cogging of {slots} slots and {2 * poles} poles",
+            )
             for slots in (6, 9, 12, 15, 18, 24, 27, 36)
         ]
+    for meant, kind, text in known:
+        if abs(order - meant) < width:
+            return OrderMeaning(kind, text)
     unknown = f"unknown periodic source, order {order:.5g} per motor revolution"
-    return next((text for meant, text in known if abs(order - meant) < width), unknown)
+    return OrderMeaning("unknown", unknown)

@@ -5,7 +5,7 @@ from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Bools, Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -53,18 +53,14 @@ class TimeDelay(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
-        # Nobody looks at the other samples of an averaged track.
-        wanted = np.ones(track.size, dtype=bool) if track.full is None else rows
         if parameters.get("filtered"):
             late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
-            shifted = block_mean(np.concatenate(late), full.bounds, factor)[wanted]
+            shifted = block_mean(np.concatenate(late), full.bounds, factor)
         else:
-            shifted = late_means(track.static_sums, full.bounds, samples, factor, wanted)
-        part = shifted if track.full is not None else shifted[rows]
+            shifted = late_means(track.static_sums, full.bounds, samples, factor)
+        part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        moved = np.zeros(track.size)
-        moved[wanted] = (shifted - track.static_means[wanted]) @ coefficients
-        return stack(moved)
+        return stack((shifted - track.static_means) @ coefficients)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
@@ -83,37 +79,22 @@ class TimeDelay(Effect):
 
 
 def late_means(
-    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int, wanted: Bools
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
 ) -> Floats:
-    """Means of the wanted blocks of columns that come later, the first and the last values held.
+    """Means of blocks of columns that come later, the first and the last values held.
 
     Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
     no more than there are blocks; between samples it is what a straight line between them gives.
-    `wanted` is a bool array of shape (n // factor per recording,).
     """
-    sizes = np.array([stop - start for start, stop in bounds])
-    blocks = sizes // factor
-    number = np.repeat(np.arange(sizes.size), blocks)
-    # Edge j of a recording is where its block j begins; the last one is where the last block ends.
-    begins = np.zeros(int(blocks.sum()) + sizes.size, dtype=bool)
-    begins[np.flatnonzero(wanted) + number[wanted]] = True
-    needed = np.flatnonzero(begins | np.concatenate([[False], begins[:-1]]))
-    counts = blocks + 1
-    recording = np.repeat(np.arange(sizes.size), counts)[needed]
-    edges = factor * (needed - (np.cumsum(counts) - counts)[recording]) - samples
-    size = sizes[recording]
-    inside = np.clip(edges, 0.0, size)
-    whole = np.minimum(inside.astype(np.int64), size - 1)
-    share = (inside - whole)[:, None]
-    whole += (np.cumsum(sizes + 1) - sizes - 1)[recording]
-    at_edges = sums[whole]
-    steps = sums[whole + 1] - at_edges
-    at_edges += share * steps
-    outside = np.flatnonzero((edges < 0) | (edges > size))
-    # Before the beginning and after the end the nearest step goes on.
-    at_edges[outside] += (edges - inside)[outside, None] * steps[outside]
-    means: Floats = np.diff(at_edges, axis=0)[begins[needed][:-1]] / factor
-    return means
+    means = []
+    for number, (start, stop) in enumerate(bounds):
+        own = sums[start + number : stop + number + 1]
+        edges = factor * np.arange((stop - start) // factor + 1) - samples
+        # Beyond the ends the nearest step goes on.
+        whole = np.clip(edges.astype(np.int64), 0, stop - start - 1)
+        at = own[whole] + (edges - whole)[:, None] * (own[whole + 1] - own[whole])
+        means.append(np.diff(at, axis=0) / factor)
+    return np.concatenate(means)
 
 
 def lagging(columns: Floats, samples: float) -> Floats:

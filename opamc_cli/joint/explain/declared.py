@@ -16,7 +16,7 @@ from opamc_cli.joint.name.search import Pool, candidates
 BETTER = 0.97
 """Of the held-out mean square error: another window than the noise asks for must be worth it."""
 
-JUDGED = ("moving", "clear", "channels", "period_samples")
+JUDGED = ("moving", "clear", "channels")
 """What tells which samples count. A longer window has fewer moving samples, none of them near a
 reversal: judged by its own, it is the best wherever friction is wrong."""
 
@@ -43,7 +43,6 @@ def best_fit(
     ways = [] if "windows" in without_rules else smoothings(recordings)
     smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
     if smoothing is not None:
-        smoothing = replace(smoothing, blurred=True)
         track = _judged_alike(build_track(recordings, joint, smoothing), track)
         dataset = dataset_of(track, grouping)
     return declared_fit(dataset, model)
@@ -59,9 +58,7 @@ def _best_of(
 
     def held_out(track: Track) -> float:
         sums = declared_fit(dataset_of(track, grouping), model).sums
-        parts = sums.parts
-        samples = sum(b - a for (a, b), j in zip(parts.slices, parts.judged, strict=True) if j)
-        return float(sums.held_out()[parts.judged].sum()) / max(samples, 1)
+        return float(sums.held_out()[sums.parts.judged].sum())
 
     error, best = held_out(track), None
     for smoothing in ways:

@@ -147,18 +147,6 @@ def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) 
     return place
 
 
-def travel_since_reversal(track: Track) -> Floats:
-    """Path since the direction last changed, in radians."""
-    path = np.cumsum(np.abs(np.diff(track.position_rad, prepend=track.position_rad[:1])))
-    direction = np.where(track.direction != 0, track.direction, np.nan)
-    known = np.where(np.isnan(direction), 0, np.arange(track.size))
-    direction = direction[np.maximum.accumulate(known)]
-    turned = np.concatenate([[True], direction[1:] != direction[:-1]])
-    last = np.maximum.accumulate(np.where(turned, np.arange(track.size), 0))
-    since: Floats = path - path[last]
-    return since
-
-
 def _direction(track: Track) -> list[Floats]:
     return [track.direction]
 
@@ -185,7 +173,6 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
     Smooth("angle", "joint-angle", lambda t: t.position_rad, _one),
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, _direction),
-    Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, _direction),
     Smooth("load", "load", lambda t: np.abs(t.load_a), _direction, follows_model=True),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, _one, constant=False),
     Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),

@@ -5,7 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import MOST_ROUNDS, SETTLED, Term, currents, static_terms
+from opamc_cli.joint.fit.model import (
+    MOST_ROUNDS,
+    SETTLED,
+    Term,
+    currents,
+    r2_of,
+    rmse_of,
+    static_terms,
+)
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 
 PLACED = ("motor-angle", "joint-angle")
@@ -25,15 +33,12 @@ class Applied:
 
     def rmse(self, among: Bools | None = None) -> float:
         """Root mean square residual on the judged samples, or on those that are `among` them."""
-        values = self.residual_a[self._rows(among)]
-        return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+        return rmse_of(self.residual_a[self._rows(among)])
 
     def r2(self, among: Bools | None = None) -> float:
         """Share of the current's variance that the model explains; negative if it adds to it."""
         rows = self._rows(among)
-        current = self.track.current_a[rows]
-        variance = float(np.var(current)) if current.size else 0.0
-        return 1 - self.rmse(among) ** 2 / variance if variance else 0.0
+        return r2_of(self.track.current_a[rows], self.residual_a[rows])
 
     def _rows(self, among: Bools | None) -> Bools:
         return self.judged if among is None else self.judged & among

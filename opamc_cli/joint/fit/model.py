@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters
-from opamc_cli.joint.fit.parts import Parts, Sums, parts_of
+from opamc_cli.joint.fit.parts import Parts, Sums, parts_of, whole_parts
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
@@ -73,12 +73,8 @@ class Grid:
     sealed: Bools
     """With `fit`: moving samples of the groups that are open, and of those that are sealed; bool
     arrays of shape (n,)."""
-
-    @property
-    def rows(self) -> list[Ints]:
-        """Places of each open group's `fit` samples on the grid."""
-        places = np.flatnonzero(self.fit)
-        return np.split(places, np.flatnonzero(np.diff(self.track.group[places])) + 1)
+    parts: Parts
+    """The `fit` samples in parts."""
 
 
 @dataclass(frozen=True)
@@ -91,9 +87,7 @@ class Dataset:
     factor: int
     """Fine samples per coarse one."""
     grouping: Grouping
-    """"""
-    fit_groups: tuple[int, ...]
-    """Groups that may be looked at before the end."""
+    """What is left out as one, and what is sealed."""
     opened: "Dataset | None" = None
     """The same open samples with some of every sealed group beside them, where `fine` has none."""
     cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
@@ -106,22 +100,18 @@ class Dataset:
         All samples are fitted, since some effects live there; residuals are looked at on these, if
         there are any among the open ones and among the sealed ones.
         """
-        track, rows = self.fine.track, (self.fine.fit, self.fine.sealed)
-        clear = [track.clear[some] for some in rows if some.any()]
-        if all(some.all() for some in clear) or not all(some.any() for some in clear):
-            return self.fine
-        track = replace(track, moving=track.moving & track.clear)
-        return _grid(track, self.fit_groups, self.grouping.sealed)
+        grid, clear = self.fine, self.fine.track.clear
+        kept = [clear[some] for some in (grid.fit, grid.sealed) if some.any()]
+        if all(some.all() for some in kept) or not all(some.any() for some in kept):
+            return grid
+        fit, track = grid.fit & clear, grid.track
+        track = replace(track, moving=track.moving & clear, open_samples=fit)
+        return replace(grid, track=track, fit=fit, sealed=grid.sealed & clear)
 
-    @cached_property
+    @property
     def parts(self) -> tuple[Parts, Parts]:
         """Open samples of the fine and of the coarse grid, in parts."""
-        if "parts" not in self.cache.shared:
-            fine = parts_of(self.fine.rows, self.fine.track.clear)
-            coarse = parts_of(self.coarse.rows, self.coarse.track.clear)
-            self.cache.shared["parts"] = (fine, coarse)
-        found: tuple[Parts, Parts] = self.cache.shared["parts"]
-        return found
+        return self.fine.parts, self.coarse.parts
 
     def columns(self, term: Term, fine: bool) -> Floats:
         """Regressors of a term on one of the grids; fast ones have none on the coarse one."""
@@ -132,16 +122,15 @@ class Dataset:
         key = term.key, track is self.fine.track, *(one.key for one in beside)
         return self.cache.columns(key, lambda: term.columns(track))
 
-    def sums_of(self, blocks: list[Floats], fine: bool) -> Sums:
-        """Products of regressors with one another and the current, over each part."""
-        fine = fine or self.coarse is self.fine
-        parts = self.parts[0 if fine else 1]
-        current = (self.fine if fine else self.coarse).track.current_a
-        return self.cache.sums(blocks, current, parts, fine)
+    def sums(self, terms: Iterable[Term], fine: bool, *beside: Floats) -> Sums:
+        """Products of terms' regressors, and others beside, with one another and the current.
 
-    def computed(self, term: Term, fine: bool, rows: Ints) -> Floats:
-        """Regressors of a guess at some samples; nobody will ask for them again."""
-        return term.columns_at(self.grid_of(fine).track, rows)
+        Over each part; the others are given on the whole grid, (n, k).
+        """
+        fine = fine or self.coarse is self.fine
+        grid = self.grid_of(fine)
+        blocks = [*(self.columns(term, fine) for term in terms), *beside]
+        return self.cache.sums(blocks, grid.track.current_a, grid.parts, fine)
 
     def grid_of(self, fine: bool) -> Grid:
         """Return the fine or the coarse grid."""
@@ -161,39 +150,44 @@ def dataset_of(track: Track, grouping: Grouping) -> Dataset:
     track = replace(track, group=grouping.group)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
-    groups = tuple(g for g in range(len(grouping.names)) if g not in grouping.sealed)
     if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
-        return _dataset(track, grouping, groups)
-    pieces = thinned(track, grouping, groups)
+        return _dataset(track, grouping)
+    pieces = thinned(track, grouping, grouping.open)
     sealed = thinned(track, grouping, grouping.sealed)
-    grid = _grid(cut(track, sorted((*pieces, *sealed))), groups, grouping.sealed)
-    opened = Dataset(grid, grid, 1, grouping, groups)
-    dataset = _dataset(cut(track, pieces), grouping, groups)
-    return replace(dataset, opened=opened)
+    grid = grid_of(cut(track, sorted((*pieces, *sealed))), grouping.sealed)
+    dataset = _dataset(cut(track, pieces), grouping)
+    return replace(dataset, opened=Dataset(grid, grid, 1, grouping))
 
 
-def _dataset(track: Track, grouping: Grouping, groups: tuple[int, ...]) -> Dataset:
+def _dataset(track: Track, grouping: Grouping) -> Dataset:
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
     by_rate = int(track.rate_hz // COARSE_RATE_HZ)
     factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
     coarse_track = coarsen(track, factor)
-    fine = _grid(track, groups, grouping.sealed)
-    coarse = fine if coarse_track is track else _grid(coarse_track, groups, grouping.sealed)
-    if coarse is not fine:
+    fine = coarse = grid_of(track, grouping.sealed)
+    if coarse_track is not track:
         # The moving average must not carry sealed samples into open ones.
         sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
         touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
-        coarse = _grid(replace(coarse_track, moving=coarse_track.moving & ~touched), groups, ())
+        moving = coarse_track.moving & ~touched
         # Of a second of motion a long moving average may leave nothing.
-        coarse = coarse if coarse.fit.any() else fine
-    return Dataset(fine, coarse, factor, grouping, groups)
+        if np.any(moving & (coarse_track.group >= 0)):
+            coarse = grid_of(replace(coarse_track, moving=moving))
+    return Dataset(fine, coarse, factor, grouping)
 
 
-def _grid(track: Track, groups: tuple[int, ...], sealed: tuple[int, ...]) -> Grid:
+def grid_of(track: Track, sealed: tuple[int, ...] = (), whole: bool = False) -> Grid:
+    """Tell the samples of a track's groups, but for the sealed ones, in parts.
+
+    A group is one part where it is to stay `whole`.
+    """
     member = track.moving & (track.group >= 0)
-    fit = member & np.isin(track.group, groups)
-    track = replace(track, open_samples=fit)
-    return Grid(track, fit, member & np.isin(track.group, sealed))
+    locked = np.isin(track.group, sealed)
+    fit = member & ~locked
+    places = np.flatnonzero(fit)
+    groups = np.split(places, np.flatnonzero(np.diff(track.group[places])) + 1)
+    parts = whole_parts(groups) if whole else parts_of(groups, track.clear)
+    return Grid(replace(track, open_samples=fit), fit, member & locked, parts)
 
 
 @dataclass(frozen=True)
@@ -221,39 +215,31 @@ class Fit:
         dataset, track = self.dataset, self.dataset.fine.track
         fast = np.zeros((track.size, 1))
         for term, values in zip(self.terms, self.coefficients, strict=True):
-            if term.effect.fast:
-                fast += dataset.columns(term, True) @ values[:, None]
+            fast += dataset.columns(term, True) @ values[:, None] if term.effect.fast else 0.0
         smooth = averaged(fast, track.bounds, track.kernel)
         fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        return dataset.sums_of([*slow, fast], False).less_last(), slow, fast[:, 0]
+        return dataset.sums((), False, *slow, fast).less_last(), slow, fast[:, 0]
 
     @cached_property
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
-        parts, track = self.dataset.parts[0], self.dataset.fine.track
-        shared = self.dataset.cache.shared
-        if "ones" not in shared:
-            shared["ones"] = np.ones((track.size, 1))
-            shared["stretches"] = parts.stretches(track.direction)
-        return self._sums_beside(shared["ones"]).without_drift(shared["stretches"]).held_out()
+        grid = self.dataset.fine
+        sums = self.dataset.sums(self.terms, True, np.ones((grid.track.size, 1)))
+        return sums.without_drift(grid.parts.stretches(grid.track.direction)).held_out()
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
         """Held-out error of each part, with the difference to other windows beside the terms."""
         blur = self.dataset.fine.track.blur
-        return self._sums_beside(*(() if blur is None else (blur,))).held_out()
-
-    def _sums_beside(self, *blocks: Floats) -> Sums:
-        own = [self.dataset.columns(term, fine=True) for term in self.terms]
-        return self.dataset.sums_of([*own, *blocks], True)
+        beside = () if blur is None else (blur,)
+        return self.dataset.sums(self.terms, True, *beside).held_out()
 
     def forget(self) -> None:
         """Drop what is computed again where it is asked for: a search keeps many fits."""
         self.dataset.fine.track.forget()
         self.dataset.coarse.track.forget()
         self.__dict__.pop("coarse_sums", None)
-        self.sums.forget()
 
     @cached_property
     def opened(self) -> "Fit":
@@ -273,32 +259,33 @@ class Fit:
         """Root mean square residual on the open or on the sealed samples."""
         fit = self.opened if sealed else self
         grid = fit.dataset.sharp
-        values = fit.residual_a[grid.sealed if sealed else grid.fit]
-        return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+        return rmse_of(fit.residual_a[grid.sealed if sealed else grid.fit])
+
+    @property
+    def sealed_r2(self) -> float:
+        """Share of the current's variance on the sealed samples that the fit predicts."""
+        fit = self.opened
+        grid = fit.dataset.sharp
+        return r2_of(grid.track.current_a[grid.sealed], fit.residual_a[grid.sealed])
+
+
+def rmse_of(residual: Floats) -> float:
+    """Root mean square, 0 of nothing."""
+    return float(np.sqrt(np.mean(residual**2))) if residual.size else 0.0
+
+
+def r2_of(current: Floats, residual: Floats) -> float:
+    """Share of a current's variance, (n,), that is not in the residual; below 0 if that adds."""
+    variance = float(np.var(current)) if current.size else 0.0
+    return 1.0 - rmse_of(residual) ** 2 / variance if variance > 0 else 0.0
 
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
-    """Fit all terms jointly; where some scale with the load or the model, until that settles.
-
-    The same terms have the same fit, whatever was fitted before.
-    """
-    load, model, coefficients, residual, sums = dataset.cache.fitted(
-        tuple(term.key for term in terms), lambda: _settled(dataset, terms)
-    )
-    fitted = dataset.with_model(load, model, static_terms(terms))
-    return Fit(terms, coefficients, fitted, residual, sums)
-
-
-Found = tuple[Floats, Floats, tuple[Floats, ...], Floats, Sums]
-"""A fit's load, model, coefficients, residual and sums: what does not hold its dataset."""
-
-
-def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
+    """Fit all terms jointly; where some scale with the load or the model, until that settles."""
     track = dataset.fine.track
     dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
-    plain = not np.any(track.model_a)
-    fewest = 3 if plain else 2
+    fewest = 2 if np.any(track.model_a) else 3
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
         fitted = _fit_once(dataset, terms)
@@ -307,8 +294,7 @@ def _settled(dataset: Dataset, terms: tuple[Term, ...]) -> Found:
         if not circular or settled:
             break
         dataset, before = _with_newton_load(fitted), error
-    track = fitted.dataset.fine.track
-    return track.load_a, track.model_a, fitted.coefficients, fitted.residual_a, fitted.sums
+    return fitted
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:
@@ -360,7 +346,7 @@ def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     current = grid.track.current_a
     blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
-    sums = dataset.sums_of(blocks, fine=True)
+    sums = dataset.sums((), True, *blocks)
     solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     total, model, load = currents(terms, blocks, coefficients, current.size)

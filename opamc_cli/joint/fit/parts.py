@@ -62,7 +62,7 @@ class Parts:
         """
         halves = self.halves
         starts = [start for start, _ in self.slices]
-        taken = self.taken(direction)
+        taken = direction[self.rows]
         forth, back = (
             _summed(np.add.reduceat(taken * way > 0, starts, dtype=float), halves)
             for way in (1, -1)
@@ -88,11 +88,6 @@ class Parts:
         units = self.by_unit(values)
         rest: Floats = units.sum(axis=0) - units
         return rest
-
-    def taken(self, values: Floats) -> Floats:
-        """Return the parts' samples of an array on the grid."""
-        taken: Floats = values[self.rows]
-        return taken
 
     def products(self, left: Floats, right: Floats) -> Floats:
         """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
@@ -130,6 +125,13 @@ def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
                     judged.append(kind)
     slices = ranges(piece.size for piece in rows)
     return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged))
+
+
+def whole_parts(groups: Sequence[Ints]) -> Parts:
+    """Take groups of samples, given by their places, as one part each."""
+    numbers = np.arange(len(groups))
+    rows = np.concatenate([np.zeros(0, dtype=np.int64), *groups])
+    return Parts(rows, ranges(map(len, groups)), numbers, numbers >= 0)
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,6 @@ class Sums:
         moment = (self.moment - among)[:, :-1]
         return Sums(self.gram[:, :-1, :-1], moment, power, self.parts)
 
-    @cached_property
     def inverses(self) -> Floats:
         """Pseudo-inverse of the products outside each unit, shape (units, k, k)."""
         rest = self.parts.elsewhere(self.gram)
@@ -189,18 +190,15 @@ class Sums:
     def coefficients(self) -> Floats:
         """Fit to all units but each one, shape (units, k)."""
         moment = self.parts.elsewhere(self.moment)
-        found: Floats = np.einsum("uij,uj->ui", self.inverses, moment)
+        found: Floats = np.einsum("uij,uj->ui", self.inverses(), moment)
         return found
-
-    def forget(self) -> None:
-        """Drop the inverses; they are computed again where they are asked for."""
-        self.__dict__.pop("inverses", None)
 
     def held_out(self) -> Floats:
         """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
-        if self.moment.shape[1] == 0:
-            return self.power
-        coefficients = self.coefficients[self.parts.unit]
+        return self.left(self.coefficients[self.parts.unit])
+
+    def left(self, coefficients: Floats) -> Floats:
+        """Sum of squared errors of each part, (p,), with given coefficients, (k,) or (p, k)."""
         predicted = (self.gram @ coefficients[..., None])[..., 0]
         square = np.sum(coefficients * (predicted - 2 * self.moment), axis=-1)
         error: Floats = np.maximum(self.power + square, 0.0)

@@ -1,20 +1,14 @@
 """What fits of the same recordings share: regressors that do not follow the model, and products."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, TypeVar
 
 import numpy as np
 
 from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
-Result = TypeVar("Result")
-
 MOST_BYTES = 120e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
-MOST_FITS = 16
-"""A search fits a quarter of its models twice, mostly soon after."""
 
 
 class RegressorCache:
@@ -24,44 +18,31 @@ class RegressorCache:
     """
 
     def __init__(self) -> None:
-        self.shared: dict[str, Any] = {}
-        self._fits: OrderedDict[Hashable, Any] = OrderedDict()
-        self._columns: OrderedDict[Hashable, Floats] = OrderedDict()
+        self._columns: dict[Hashable, Floats] = {}
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
+        self._currents: dict[bool, Floats] = {}
 
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
-        self.shared.clear()
-        self._fits.clear()
         self._columns.clear()
         self._taken.clear()
         self._products.clear()
-
-    def fitted(self, key: Hashable, fit: Callable[[], Result]) -> Result:
-        """Return what a fit found, computed where it is not at hand."""
-        found: Result = self._fits[key] if key in self._fits else fit()
-        self._fits[key] = found
-        self._fits.move_to_end(key)
-        if len(self._fits) > MOST_FITS:
-            self._fits.popitem(last=False)
-        return found
+        self._currents.clear()
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
-        found = self._columns.get(key)
-        if found is None:
-            found = self._columns[key] = compute()
-        self._columns.move_to_end(key)
-        return found
+        if key not in self._columns:
+            self._columns[key] = compute()
+        return self._columns[key]
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
         """Sum products of regressors, term by term (n, k), over parts.
 
         Of one grid, current, shape (n,), and parts are the same in every call.
         """
-        self._forget_strangers(blocks)
-        every = [*blocks, self.shared.setdefault(f"target {fine}", current[:, None])]
+        self._bounded()
+        every = [*blocks, self._currents.setdefault(fine, current[:, None])]
         for i, block in enumerate(every):
             missing = [
                 other
@@ -89,31 +70,16 @@ class RegressorCache:
         key = (id(block), fine)
         if key not in self._taken:
             # The block itself is kept beside its rows, so that its identity stays its own.
-            self._taken[key] = (block, parts.taken(block))
+            self._taken[key] = (block, block[parts.rows])
         return self._taken[key][1]
 
-    @property
-    def _held(self) -> int:
-        blocks = sum(block.nbytes for block in self._columns.values())
-        return blocks + sum(rows.nbytes for _, rows in self._taken.values())
+    def _bounded(self) -> None:
+        """Forget all regressors where they take too much memory.
 
-    def _forget_strangers(self, blocks: Sequence[Floats]) -> None:
-        """Keep the memory bounded: what was used longest ago goes first.
-
-        What is asked for now stays: a block that is kept here no more may be freed by its owner,
-        and another one would find the products of its place in memory.
+        A block's rows are kept with it, so that no other one gets its place in memory and its
+        products.
         """
-        asked = {id(block) for block in blocks}
-        for key, block in list(self._columns.items()):
-            if self._held <= MOST_BYTES:
-                break
-            if id(block) not in asked:
-                del self._columns[key]
-                for fine in (True, False):
-                    self._taken.pop((id(block), fine), None)
-        wanted = {id(block) for block in (*self._columns.values(), *blocks)}
-        wanted |= {id(value) for value in self.shared.values()}
-        for key in [key for key in self._taken if key[0] not in wanted]:
-            del self._taken[key]
-        for pair in [p for p in self._products if p[0] not in wanted or p[1] not in wanted]:
-            del self._products[pair]
+        blocks = sum(block.nbytes for block in self._columns.values())
+        taken = sum(block.nbytes + rows.nbytes for block, rows in self._taken.values())
+        if blocks + taken > MOST_BYTES:
+            self.clear()

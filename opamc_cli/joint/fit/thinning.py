@@ -70,8 +70,4 @@ def cut(track: Track, pieces: Pieces) -> Track:
 def _with_surroundings(track: Track, start: int, stop: int) -> tuple[int, int]:
     first, last = next(bound for bound in track.bounds if bound[0] <= start < bound[1])
     lead = int(LEAD_S * track.rate_hz)
-    begin = max(start - lead, first)
-    if track.period_samples:
-        # Pieces that begin at the same place of the cycle can be laid over one another.
-        begin = first + (begin - first) // track.period_samples * track.period_samples
-    return begin, min(stop + int(TAIL_S * track.rate_hz), last)
+    return max(start - lead, first), min(stop + int(TAIL_S * track.rate_hz), last)

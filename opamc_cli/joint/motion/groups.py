@@ -16,7 +16,6 @@ SEALED_BLOCKS = (2, 5, 9)
 run three times, every fourth block is the same motion, which nothing open would have shown."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
-FEWEST_FIT_GROUPS = 4
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,12 @@ class Grouping:
     sealed: tuple[int, ...]
     """Groups that nothing looks at before the end."""
     kind: str
-    """"""
+    """"cycles", "recordings" or "blocks"."""
+
+    @property
+    def open(self) -> tuple[int, ...]:
+        """Groups that may be looked at before the end."""
+        return tuple(g for g in range(len(self.names)) if g not in self.sealed)
 
 
 def cycle_length(path: Floats) -> int | None:
@@ -94,36 +98,20 @@ def group_samples(
     pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
     if len(pieces) < 2:
         return _blocks(moving, run_names)
-    sealed_pieces = _sealed_pieces(pieces)
-    fit = [i for i in range(len(pieces)) if i not in sealed_pieces]
-    parts = -(-FEWEST_FIT_GROUPS // len(fit)) if len(fit) < FEWEST_FIT_GROUPS else 1
-    names: list[str] = []
-    sealed: list[int] = []
-    for i, (_, start, stop, name) in enumerate(pieces):
-        cuts = 1 if i in sealed_pieces else parts
-        indices = np.flatnonzero(moving[start:stop]) + start
-        edges = [start, *(int(part[0]) for part in np.array_split(indices, cuts)[1:]), stop]
-        for j in range(cuts):
-            group[edges[j] : edges[j + 1]] = len(names)
-            if i in sealed_pieces:
-                sealed.append(len(names))
-            names.append(name if cuts == 1 else f"{name}.{j}")
+    for number, (_, start, stop, _) in enumerate(pieces):
+        group[start:stop] = number
     kind = "cycles" if period is not None else "recordings"
-    return Grouping(group, tuple(names), tuple(sealed), kind)
+    names = tuple(name for *_, name in pieces)
+    return Grouping(group, names, _sealed([run for run, *_ in pieces]), kind)
 
 
-def _sealed_pieces(pieces: list[tuple[int, int, int, str]]) -> set[int]:
-    by_run: dict[int, list[int]] = {}
-    for i, piece in enumerate(pieces):
-        by_run.setdefault(piece[0], []).append(i)
-    if all(len(members) >= 4 for members in by_run.values()):
-        batches = list(by_run.values())
-    else:
-        batches = [list(range(len(pieces)))]
-    sealed: set[int] = set()
-    for members in batches:
-        sealed.update(members[-max(round(SEALED_SHARE * len(members)), 1) :])
-    return sealed
+def _sealed(runs: list[int]) -> tuple[int, ...]:
+    """Which pieces are sealed: the last of each run, if each has four or more, else of all."""
+    batches = [np.flatnonzero(np.equal(runs, run)) for run in dict.fromkeys(runs)]
+    if min(batch.size for batch in batches) < 4:
+        batches = [np.arange(len(runs))]
+    last = [batch[-max(round(SEALED_SHARE * batch.size), 1) :] for batch in batches]
+    return tuple(np.sort(np.concatenate(last)).tolist())
 
 
 def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:

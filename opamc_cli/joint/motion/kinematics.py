@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -24,7 +23,7 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import SAMPLED, Bools, Floats, Joint, Track, ranges
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
 
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
@@ -88,8 +87,6 @@ class Smoothing:
 
     window_s: float
     from_velocity: bool
-    blurred: bool = False
-    """Whether it is laid beside other windows: not while it competes with them."""
 
 
 def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
@@ -153,15 +150,14 @@ def motion_from_position(
         window = smoothing_window(position_rad, rate_hz, derivative=2)
     else:
         window = max(int(smoothing.window_s * rate_hz) | 1, SHORTEST_WINDOW)
-    beside = smoothing is None or smoothing.blurred
-    motion = _smoothed(position_rad, rate_hz, window, 2, beside)
+    motion = _smoothed(position_rad, rate_hz, window, 2)
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         size = float(np.sqrt(np.mean(motion.velocity**2)))
         agrees = size > 0 and float(np.std(velocity_rad_s - motion.velocity)) < 0.1 * size
         own = window if asked else smoothing_window(velocity_rad_s, rate_hz, derivative=1)
         if agrees and (asked or own < window):
-            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1, beside)
+            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1)
             return replace(cleaner, position_rad=motion.position_rad)
     return motion
 
@@ -174,9 +170,7 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
     return replace(motion, position_rad=np.concatenate([[0.0], np.cumsum(steps)]))
 
 
-def _smoothed(
-    path: Floats, rate_hz: float, window: int, derivative: int, beside: bool = True
-) -> Motion:
+def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
     noise = measurement_noise(path)
@@ -187,7 +181,7 @@ def _smoothed(
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        blur=blurred(path, rate_hz, window, derivative) if beside else None,
+        blur=blurred(path, rate_hz, window, derivative),
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
 
@@ -263,20 +257,11 @@ def build_track(
             clock = max(recording.started_s - first, clock)
         times.append(clock + piece.time_s)
         clock += piece.size / rate
-    joined: dict[str, Any] = {}
-    for name in SAMPLED:
-        values = [getattr(piece, name) for piece in pieces]
-        known = all(value is not None for value in values)
-        joined[name] = np.concatenate(values) if known else None
     alone = len(recordings) == 1
     common = all(recording.started_s is not None for recording in recordings)
     return replace(
-        pieces[0],
-        **joined | {"time_s": np.concatenate(times)},
-        bounds=ranges(piece.size for piece in pieces),
-        channels=frozenset.intersection(*(piece.channels for piece in pieces)),
-        kernel=max((piece.kernel for piece in pieces), key=len),
-        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+        joined(pieces),
+        time_s=np.concatenate(times),
         own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
     )
 
@@ -284,7 +269,6 @@ def build_track(
 def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Axes that every recording holds; none where none of them moves."""
     common = set.intersection(*(set(recording.others_rad) for recording in recordings))
-
     moves = any(
         np.ptp(filled(one.others_rad[axis])) > SLOWEST_SHARE * np.ptp(filled(one.position_rad))
         for one in recordings

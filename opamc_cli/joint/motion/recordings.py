@@ -22,7 +22,7 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
     channels = track.channels | ({"revisits"} if _revisits(track) else set())
-    track = replace(track, period_samples=period, channels=channels)
+    track = replace(track, channels=channels)
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
 

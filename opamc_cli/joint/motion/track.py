@@ -1,6 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -40,10 +40,6 @@ SAMPLED = (
 """Attributes of a track that have a value per sample, or are None."""
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """Those of which a block has something else than the mean, or nothing."""
-
-
-ROWS_OF_THE_LOAD = 10_000
-"""Samples by which the inertia's part of the load is told: the load has no noise."""
 
 
 @dataclass(frozen=True)
@@ -99,8 +95,6 @@ class Track:
     temperature_c: Floats | None = None
     electrical_rad: Floats | None = None
     """With `temperature_c`: where known; (n,) or None."""
-    period_samples: int | None = None
-    """Length of a cycle, if the motion repeats."""
     static_terms: "tuple[Regressors, ...]" = ()
     """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None
@@ -140,6 +134,11 @@ class Track:
         speeds = np.abs(self.velocity[self.moving])
         return float(np.quantile(speeds, 0.95)) if speeds.size else 1.0
 
+    @property
+    def travel_rad(self) -> float:
+        """Way from the lowest to the highest position of the moving samples."""
+        return float(np.ptp(self.position_rad[self.moving]))
+
     @cached_property
     def middle_temperature_c(self) -> float:
         """Mean temperature of the moving samples; 0 where none is logged."""
@@ -152,10 +151,9 @@ class Track:
     @cached_property
     def load_inertia(self) -> float:
         """Current of the fitted load that follows the acceleration, in A by rad/s²."""
-        rows = np.flatnonzero(self.moving)
-        rows = rows[:: max(rows.size // ROWS_OF_THE_LOAD, 1)]
+        rows = self.moving
         place = self.position_rad[rows]
-        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, np.ones(rows.size))
+        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, place**0)
         columns = np.stack(shapes, axis=0).T
         return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
 
@@ -279,6 +277,23 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
 
 
+def joined(pieces: Sequence[Track]) -> Track:
+    """Lay tracks of one joint at one rate one after another; what one of them lacks, none has."""
+    sampled: dict[str, Any] = {}
+    for name in SAMPLED:
+        values = [getattr(piece, name) for piece in pieces]
+        known = all(value is not None for value in values)
+        sampled[name] = np.concatenate(values) if known else None
+    return replace(
+        pieces[0],
+        **sampled,
+        bounds=ranges(piece.size for piece in pieces),
+        channels=frozenset.intersection(*(piece.channels for piece in pieces)),
+        kernel=max((piece.kernel for piece in pieces), key=len),
+        evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+    )
+
+
 def coarsen(track: Track, factor: int) -> Track:
     """Average a track over blocks of samples; a block moves if all of its samples move.
 
@@ -305,7 +320,6 @@ def coarsen(track: Track, factor: int) -> Track:
     clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
     moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
-    period = track.period_samples
     sampled = {name: getattr(full, name) for name in SAMPLED if name not in NOT_AVERAGED}
     means: dict[str, Any] = {
         name: mean(values) for name, values in sampled.items() if values is not None
@@ -321,5 +335,4 @@ def coarsen(track: Track, factor: int) -> Track:
         blur=None,
         **means,
         full=full,
-        period_samples=None if period is None else round(period / factor),
     )

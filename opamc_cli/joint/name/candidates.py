@@ -2,22 +2,17 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from itertools import groupby
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import COARSE_SAMPLES, Dataset, Term
+from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
-from opamc_cli.joint.least_squares import SINGULAR_BELOW, inverse
-from opamc_cli.joint.motion.track import Floats, Ints
+from opamc_cli.joint.least_squares import SINGULAR_BELOW
+from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
-NARROW = 4
-"""Regressors up to which a chain's terms are joined: a guess is gone through once for them all,
-which saves a twentieth of the time."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +46,10 @@ class Batch:
 def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batch]:
     """Compute the regressors of guesses and their products, by width."""
     parts = dataset.parts[0 if fine else 1]
-    current = parts.taken(dataset.grid_of(fine).track.current_a)[:, None]
+    current = (dataset.grid_of(fine).track.current_a)[parts.rows][:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = dataset.computed(term, fine, parts.rows)
+        columns = term.columns_at(dataset.grid_of(fine).track, parts.rows)
         alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
     for (width, _), members in alike.items():
@@ -78,7 +73,7 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     effect = full.effect
     (batch,) = batches_of(dataset, [full], fine=True)
     cross = beside.products(batch.columns)[:, None]
-    best = None
+    found = []
     forms = [(full, tuple(range(batch.width)))]
     for form, keep in effect.variants(full.parameters):
         forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
@@ -86,47 +81,38 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
         gain = float(beside.gains_of(cross[..., index], own, batch.moment[..., index])[0])
-        found = judged(term, gain, index.size)
-        if best is None or found.score < best.score:
-            best = found
-    assert best is not None
-    return best
+        found.append(judged(term, gain, index.size))
+    return min(found, key=lambda one: one.score)
 
 
 class Beside:
     """A chain's own regressors on one grid, made ready to have candidates put beside them."""
 
     def __init__(self, chain: Chain, fine: bool) -> None:
-        dataset = chain.fit.dataset
+        self.dataset = dataset = chain.fit.dataset
         self.fine = fine or dataset.coarse is dataset.fine
         self.parts: Parts = dataset.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
         if not self.fine:
             self.sums, blocks, fast = chain.fit.coarse_sums
-            self.fast_part = self.parts.taken(fast)
+            self.fast_part = fast[self.parts.rows]
         else:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             follows = not all(term.is_constant for term in chain.fit.terms)
-            self.sums = dataset.sums_of(blocks, True) if follows else chain.fit.sums
+            self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
-        runs = [list(run) for _, run in groupby(self.blocks, lambda b: b.shape[1] <= NARROW)]
-        self.joined = [
-            block
-            for run in runs
-            for block in ([np.concatenate(run, axis=1)] if run[0].shape[1] <= NARROW else run)
-        ]
-        current = dataset.grid_of(self.fine).track.current_a
-        self.current = self.parts.taken(current)
-        if self.fast_part is not None:
-            self.current = self.current - self.fast_part
-        self.step = max(self.current.size // COARSE_SAMPLES, 1)
-        self.before = self.sums.held_out()
+        self.before, self.inverses = self.sums.held_out(), self.sums.inverses()
 
     def products(self, columns: Floats) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
-        return np.concatenate([none, *(self.parts.products(b, columns) for b in self.joined)], 1)
+        return np.concatenate([none, *self.parts.products_of(self.blocks, columns)], axis=1)
+
+    def candidate(self, term: Term) -> Candidate:
+        """Judge one guess."""
+        (batch,) = batches_of(self.dataset, [term], self.fine)
+        return judged(term, float(self.gains(batch)[0]), batch.width)
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
@@ -147,7 +133,7 @@ class Beside:
         rest_cross, rest_own, rest_moment = (
             self.parts.elsewhere(one) for one in (cross, own, moment)
         )
-        projected = self.sums.inverses[:, None] @ rest_cross
+        projected = self.inverses[:, None] @ rest_cross
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
         width = own.shape[-1]
@@ -171,32 +157,3 @@ class Beside:
         after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
         gain: Floats = 1.0 - (after / max(before, 1e-300)) ** 2
         return gain
-
-    @cached_property
-    def refined_rows(self) -> Ints:
-        """Every so-many-th of the parts' rows, for `fitted_drop`."""
-        return self.parts.rows[:: self.step]
-
-    def fitted_drop(self, columns: Floats, *, whole: bool = False) -> float:
-        """Sum of squares that columns on the refined rows take away beside the chain, when fitted.
-
-        Smooth in the effect's parameters, so that these can be refined; by as many rows as the
-        coarse grid has, which tell a parameter as well as all. Those of a `whole` effect are not
-        fitted: they are one.
-        """
-        beside, gram, moment, current = self._refining
-        cross = beside.T @ columns
-        projected = gram @ cross
-        left = columns.T @ columns - cross.T @ projected
-        left += SINGULAR_BELOW * np.diag(np.diagonal(columns.T @ columns) + 1e-200)
-        asked = columns.T @ current - projected.T @ moment
-        if whole:
-            return float(2 * asked.sum() - left.sum())
-        return float(asked @ np.linalg.solve(left, asked))
-
-    @cached_property
-    def _refining(self) -> tuple[Floats, Floats, Floats, Floats]:
-        current = self.current[:: self.step]
-        blocks = [block[:: self.step] for block in self.blocks]
-        beside = np.concatenate([np.zeros((current.size, 0)), *blocks], axis=1)
-        return beside, inverse((beside.T @ beside)[None])[0], beside.T @ current, current

@@ -54,7 +54,8 @@ class Chain:
     @cached_property
     def price(self) -> float:
         """Logarithm of the mean square error by which the added terms have to pay."""
-        return sum(price_of(term, values.size) for term, values in self._added_values)
+        declared = len(self.fit.terms) - self.added
+        return sum(price_of(term, values.size) for term, values in self._valued[declared:])
 
     @property
     def score(self) -> float:
@@ -62,9 +63,8 @@ class Chain:
         return float(np.log(max(self.mean_square, 1e-300))) + self.price
 
     @property
-    def _added_values(self) -> list[tuple[Term, Floats]]:
-        pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
-        return pairs[len(pairs) - self.added :]
+    def _valued(self) -> list[tuple[Term, Floats]]:
+        return list(zip(self.fit.terms, self.fit.coefficients, strict=True))
 
     def plausible_beside(self, other: "Chain") -> bool:
         """Whether coefficients have the sign that physics gives them, or had another before.
@@ -80,8 +80,7 @@ class Chain:
 
     @property
     def _signs(self) -> list[bool]:
-        pairs = list(zip(self.fit.terms, self.fit.coefficients, strict=True))
-        grid = self.fit.dataset.fine
+        pairs, grid = self._valued, self.fit.dataset.fine
         way = np.unique(grid.track.direction[grid.fit])
         # What never turns round cannot tell an offset from dry friction: it may all be either.
         share = {"coulomb": 1.0, "offset": float(way[0]) if way.size == 1 else 0.0}

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from opamc_cli.joint.effects.base import Parameters
-from opamc_cli.joint.fit.model import SETTLED, Dataset, Term
+from opamc_cli.joint.fit.model import SETTLED, Term
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.candidates import Beside
 
@@ -16,9 +16,9 @@ LOGARITHMIC = 5.0
 """Ratio of a parameter's limits from which on it is refined as a logarithm."""
 
 
-def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
+def refined(term: Term, beside: Beside) -> Term:
     """Refine the searched parameters of a candidate beside a chain."""
-    track = dataset.grid_of(beside.fine).track
+    track = beside.dataset.grid_of(beside.fine).track
     limits = {k: v for k, v in term.effect.limits(track).items() if k in term.parameters}
     if not limits:
         return term
@@ -34,9 +34,7 @@ def refined(dataset: Dataset, term: Term, beside: Beside) -> Term:
         return moved
 
     def lost(values: Floats) -> float:
-        trial = Term(term.effect, outwards(values), term.keep)
-        columns = dataset.computed(trial, beside.fine, beside.refined_rows)
-        return -beside.fitted_drop(columns, whole=term.effect.whole)
+        return -beside.candidate(Term(term.effect, outwards(values), term.keep)).gain
 
     start, step = np.empty((2, len(names)))
     for i, (name, log) in enumerate(zip(names, logs, strict=True)):

@@ -11,7 +11,7 @@ from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
 from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
-from opamc_cli.joint.name.significance import LEAST_T, p_value
+from opamc_cli.joint.name.significance import p_value
 
 CHAINS = 2
 """Followed side by side: a bump that imitates a spring shows itself only beside the spring. Four
@@ -151,9 +151,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
-        term = refined(dataset, candidate.term, beside)
-        (batch,) = batches_of(dataset, [term], beside.fine)
-        trial = judged(term, float(beside.gains(batch)[0]), batch.width)
+        trial = beside.candidate(refined(candidate.term, beside))
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.gain > (1 - PRICE) * candidate.gain else candidate)
     chain.fit.forget()
@@ -219,12 +217,9 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
-    share, t_value = child.gain_over(parent)
+    share, _ = child.gain_over(parent)
     if share < pool.least_share:
         return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
-    if child.terms[-1].effect.unnamed and t_value < LEAST_T and "certain" not in pool.without:
-        # What may have any form has to show it everywhere; a payload changes once.
-        return "takes something off the held-out error here and there, not everywhere"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     effect = child.terms[-1].effect

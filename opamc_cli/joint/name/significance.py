@@ -32,8 +32,8 @@ def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
     """
     dataset = fit.dataset
     fine, _ = dataset.parts
-    columns = fine.taken(dataset.columns(term, fine=True))
-    residual = fine.taken(fit.residual_a)[:, None]
+    columns = dataset.columns(term, fine=True)[fine.rows]
+    residual = fit.residual_a[fine.rows][:, None]
     gram = fine.products(columns, columns)
     moment = fine.products(columns, residual)[:, :, 0]
     power = fine.products(residual, residual)[:, 0, 0]

@@ -30,7 +30,7 @@ def following(kept: KeptResults | None) -> Follow:
     """Return `units.follow`, made to look for its results first."""
     if kept is None:
         return follow
-    found = remembered(_plain, kept)
+    found = remembered(_as_values, kept)
 
     def kept_follow(recording: Recording, joint: Joint) -> Tracked | None:
         plain = found(_Job(replace(recording, started_s=None), joint))
@@ -39,7 +39,7 @@ def following(kept: KeptResults | None) -> Follow:
     return kept_follow
 
 
-def _plain(job: _Job) -> Mapping[str, Any] | None:
+def _as_values(job: _Job) -> Mapping[str, Any] | None:
     """Return a track and its groups as plain values, without what follows from others."""
     tracked = follow(job.recording, job.joint)
     if tracked is None:

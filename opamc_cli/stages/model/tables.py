@@ -80,7 +80,7 @@ def _groups_entry(dataset: Dataset) -> dict[str, Any]:
     grouping = dataset.grouping
     return {
         "kind": grouping.kind,
-        "fit": [grouping.names[g] for g in dataset.fit_groups],
+        "fit": [grouping.names[g] for g in grouping.open],
         "sealed": [grouping.names[g] for g in grouping.sealed],
     }
 

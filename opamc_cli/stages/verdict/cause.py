@@ -1,7 +1,6 @@
 """Why a joint has changed: the effect that target runs have and baseline runs lack."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -9,7 +8,8 @@ import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import OpamcError
-from opamc_cli.joint.change.explain import Cause, Change, explain_change
+from opamc_cli.joint.change.explain import Change, explain_change
+from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -169,7 +169,7 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "clear": first.clear,
         "evidence": dict(first.evidence),
         "why": _why(first, change),
-        "others": [{key: asdict(cause)[key] for key in OF_OTHERS} for cause in others],
+        "others": [{key: getattr(cause, key) for key in OF_OTHERS} for cause in others],
     }
 
 

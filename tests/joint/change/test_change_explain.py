@@ -7,7 +7,6 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint.change import explain
-from opamc_cli.joint.change.energy import Energy
 from opamc_cli.joint.change.explain import explain_change
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -91,7 +90,7 @@ def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
 def test_friction_that_the_mean_square_does_not_show_is_measured_by_its_own(
     monkeypatch, kind, share
 ):
-    monkeypatch.setattr(explain, "energy_of", lambda *given, **named: Energy(0.0, 0.0))
+    monkeypatch.setattr(explain, "energy_of", lambda *given, **named: (0.0, 0.0))
     causes = change_of(kind).causes
     assert sum(cause.share for cause in causes) == pytest.approx(share, abs=0.05)
 

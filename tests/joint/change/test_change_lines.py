@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from sessions import columns_of, current_of, rows_of, with_track
 from simulator import simulate
 
 from opamc_cli.joint.change.lines import (
@@ -16,7 +17,7 @@ from opamc_cli.joint.change.lines import (
     strokes,
 )
 from opamc_cli.joint.change.slow import Shift
-from opamc_cli.joint.change.units import own_fit, read_side
+from opamc_cli.joint.change.units import read_side, side_by_side
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
@@ -35,22 +36,27 @@ def units():
         Recording(f"part-{k}", 500.0, current_a=made.current[a:b], position_rad=made.position[a:b])
         for k, (a, b) in enumerate(pairwise(edges))
     ]
-    before = read_side(recordings[:2], JOINT, after=False, cycles=False)
-    return before + read_side(recordings[2:], JOINT, after=True, cycles=False)
+    sides = recordings[:2], recordings[2:]
+    return side_by_side(*(read_side(side, JOINT, cycles=False) for side in sides))
 
 
-def test_binned_transform_is_the_plain_sum_over_the_angle(units):
+@pytest.fixture(scope="module")
+def counted(units):
+    return units.dataset.fine.fit
+
+
+def test_binned_transform_is_the_plain_sum_over_the_angle(units, counted):
     rng = np.random.default_rng(0)
-    white = [np.where(unit.fine_rows, rng.normal(size=unit.fine.size), 0.0) for unit in units]
-    spectra = order_spectra(units, white)
-    unit, residual = units[0], white[0]
-    pieces = strokes(unit.fine, unit.fine_rows & (residual != 0))
+    residual = np.where(counted, rng.normal(size=counted.size), 0.0)
+    spectra = order_spectra(units, residual)
+    track = units.track
+    pieces = [piece for piece in strokes(track, counted) if track.group[piece[0]] == 0]
     samples = sum(np.count_nonzero(residual[start:stop]) for start, stop in pieces)
     errors = []
     for k in range(0, spectra.orders.size, spectra.orders.size // 40):
         plain = 0.0
         for start, stop in pieces:
-            angle = unit.fine.machine_angle_rad[start:stop]
+            angle = track.machine_angle_rad[start:stop]
             turned = np.exp(-1j * spectra.orders[k] * angle)
             plain += abs(np.sum(residual[start:stop] * turned)) ** 2
         errors.append(abs(spectra.before[0, k] - plain / samples) / max(plain / samples, 0.5))
@@ -60,15 +66,24 @@ def test_binned_transform_is_the_plain_sum_over_the_angle(units):
     assert spectra.before.mean() == pytest.approx(1.0, abs=0.1)
 
 
-def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units):
-    unit = units[0]
-    (start, stop), *_ = strokes(unit.fine, unit.fine_rows)
+def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units, counted):
+    track = units.track
+    (start, stop), *_ = strokes(track, counted)
     middle = (start + stop) // 2
-    rows = unit.fine_rows.copy()
+    rows = counted.copy()
     rows[middle - 5 : middle + 5] = False
-    assert strokes(unit.fine, rows)[0] == (start, stop)
-    followed = replace(unit.fine, channels=unit.fine.channels - {"logged"})
+    assert strokes(track, rows)[0] == (start, stop)
+    followed = replace(track, channels=track.channels - {"logged"})
     assert strokes(followed, rows)[0][1] <= middle - 5
+
+
+def test_a_stroke_ends_with_its_unit(units, counted):
+    track = units.track
+    (start, stop), *_ = strokes(track, counted)
+    middle = (start + stop) // 2
+    group = track.group.copy()
+    group[middle:stop] += 1
+    assert strokes(replace(track, group=group), counted)[0] == (start, middle)
 
 
 def spectra_of(after_line=None, before_line=None, size=400, resolution=0.04, seed=0, units=4):
@@ -151,89 +166,79 @@ def test_more_orders_that_are_looked_at_make_a_line_less_sure():
     assert many == pytest.approx(2 * few, rel=1e-6)
 
 
-def test_over_time_a_line_s_order_is_its_frequency(units):
-    timed = [clocked(unit) for unit in units]
-    tone = [
-        np.where(unit.fine_rows, np.cos(2 * np.pi * 40.0 * unit.fine.run_time_s), 0.0)
-        for unit in units
-    ]
-    spectra = order_spectra(timed, tone)
+def test_over_time_a_line_s_order_is_its_frequency(units, counted):
+    tone = np.where(counted, np.cos(2 * np.pi * 40.0 * units.track.run_time_s), 0.0)
+    spectra = order_spectra(clocked(units), tone)
     assert spectra.orders[np.argmax(spectra.after[0])] == pytest.approx(40.0, abs=0.2)
     assert spectra.orders[0] >= 8.0  # the lowest of the joint's orders
 
 
-def test_spectra_need_two_units_before_and_one_after(units):
-    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
-    assert order_spectra(units[1:], white[1:]) is None
-    assert order_spectra(units[:2], white[:2]) is None
-    assert order_spectra(units, [0 * one for one in white]) is None
+def test_spectra_need_two_units_before_and_one_after(units, counted):
+    white = np.where(counted, 1.0, 0.0)
+    assert order_spectra(units.only(np.array([False, True, True])), white).orders.size == 0
+    assert order_spectra(units.only(~units.after), white).orders.size == 0
+    assert order_spectra(units, 0 * white).orders.size == 0
     # A unit without a long stroke is left out.
-    short = [*white[:2], 0 * white[0], white[2]]
-    spectra = order_spectra([*units[:2], units[0], units[2]], short)
-    assert (len(spectra.before), len(spectra.after)) == (2, 1)
-    still = [
-        replace(unit, fine=replace(unit.fine, machine_angle_rad=0 * unit.fine.machine_angle_rad))
-        for unit in units
-    ]
-    assert order_spectra(still, white) is None
+    gone = np.where(units.track.group == 0, 0.0, white)
+    assert order_spectra(units, gone).orders.size == 0
+    still = with_track(units, machine_angle_rad=0 * units.track.machine_angle_rad)
+    assert order_spectra(still, white).orders.size == 0
 
 
-def test_a_stroke_is_long_and_goes_one_way(units):
-    unit = units[0]
-    found = strokes(unit.fine, unit.fine_rows)
-    assert len(found) > 2
-    assert strokes(unit.fine, np.zeros_like(unit.fine_rows)) == []
+def test_a_stroke_is_long_and_goes_one_way(units, counted):
+    track = units.track
+    found = strokes(track, counted)
+    assert len(found) > 6
+    assert strokes(track, np.zeros_like(counted)) == []
     for start, stop in found:
-        inside = unit.fine.direction[start:stop][unit.fine_rows[start:stop]]
+        inside = track.direction[start:stop][counted[start:stop]]
         assert len(set(inside)) == 1
         # 0.4 cycles of the lowest order, 0.4 per turn of the motor: a turn.
-        assert np.ptp(unit.fine.machine_angle_rad[start:stop]) >= 2 * np.pi
+        assert np.ptp(track.machine_angle_rad[start:stop]) >= 2 * np.pi
         assert stop - start >= 50
-    slow = replace(unit.fine, machine_angle_rad=1e-3 * unit.fine.machine_angle_rad)
-    assert strokes(slow, unit.fine_rows) == []
-    few = np.zeros_like(unit.fine_rows)
+    slow = replace(track, machine_angle_rad=1e-3 * track.machine_angle_rad)
+    assert strokes(slow, counted) == []
+    few = np.zeros_like(counted)
     few[found[0][0] : found[0][0] + 49] = True
-    assert strokes(unit.fine, few) == []
+    assert strokes(track, few) == []
 
 
-def test_a_fast_residual_is_the_own_fit_s_without_a_shift(units):
-    coulomb, offset = (Term(LIBRARY[name], {}) for name in ("coulomb", "offset"))
-    shift = Shift((offset,), np.array([0.7]), np.eye(1), 0.0, 1)
-    plain = fast_residuals(units, (coulomb,), None)
-    shifted = fast_residuals(units, (coulomb,), shift)
-    for unit, residual, other in zip(units, plain, shifted, strict=True):
-        assert not residual[~unit.fine_rows].any()
-        own = own_fit(unit, (coulomb,), fine=True)[1]
-        np.testing.assert_array_equal(residual[unit.fine_rows], own)
-        assert np.array_equal(residual, other) is not unit.after
+def test_a_fast_residual_is_the_own_fit_s_without_a_shift(units, counted):
+    terms = tuple(Term(LIBRARY[name], {}) for name in ("coulomb", "offset"))
+    shift = Shift((Term(LIBRARY["spring"], {}),), np.array([0.7, 0.1]), 0.0, 2)
+    plain = fast_residuals(units, terms, None)
+    shifted = fast_residuals(units, terms, shift)
+    assert not plain[~counted].any()
+    for unit, after in enumerate(units.after):
+        rows = rows_of(units, unit, True)
+        columns = columns_of(units, terms, unit, True)
+        if units.track.blur is not None:
+            columns = np.concatenate([columns, units.track.blur[rows]], axis=1)
+        current = current_of(units, unit, True)
+        own = current - columns @ np.linalg.lstsq(columns, current)[0]
+        np.testing.assert_allclose(plain[rows], own, atol=1e-9)
+        assert np.allclose(plain[rows], shifted[rows], atol=1e-9) is not after
 
 
-def test_the_resolution_is_that_of_the_long_strokes_and_orders_begin_at_two_of_it(units):
-    white = [np.where(unit.fine_rows, 1.0, 0.0) for unit in units]
-    spectra = order_spectra(units, white)
-    travels = np.array(
-        [
-            np.ptp(unit.fine.machine_angle_rad[start:stop])
-            for unit in units
-            for start, stop in strokes(unit.fine, unit.fine_rows)
-        ]
-    )
+def test_the_resolution_is_that_of_the_long_strokes_and_orders_begin_at_two_of_it(units, counted):
+    spectra = order_spectra(units, np.where(counted, 1.0, 0.0))
+    angle = units.track.machine_angle_rad
+    pieces = strokes(units.track, counted)
+    travels = np.array([np.ptp(angle[start:stop]) for start, stop in pieces])
     assert spectra.resolution == pytest.approx(2 * np.pi * travels.sum() / (travels**2).sum())
     lowest = max(0.4, 2 * spectra.resolution)
     spacing = spectra.orders[1] - spectra.orders[0]
     assert lowest <= spectra.orders[0] < lowest + spacing
-    assert spectra.orders[-1] == pytest.approx(
-        min(highest_order(unit.fine) for unit in units), abs=2 * spacing
-    )
+    assert spectra.orders[-1] == pytest.approx(highest_order(units.track), abs=2 * spacing)
 
 
-def test_a_travel_of_more_bins_than_memory_allows_is_wound_up_by_whole_turns(units, monkeypatch):
-    tones = [
-        np.where(unit.fine_rows, np.cos(3 * unit.fine.machine_angle_rad), 0.0) for unit in units
-    ]
-    whole = order_spectra(units, tones)
+def test_a_travel_of_more_bins_than_memory_allows_is_wound_up_by_whole_turns(
+    units, counted, monkeypatch
+):
+    tone = np.where(counted, np.cos(3 * units.track.machine_angle_rad), 0.0)
+    whole = order_spectra(units, tone)
     monkeypatch.setattr("opamc_cli.joint.spectra.MOST_BINS", whole.orders.size // 8)
-    wound = order_spectra(units, tones)
+    wound = order_spectra(units, tone)
     assert wound.orders.size < whole.orders.size / 2
     for spectra in (whole, wound):
         peak = spectra.orders[np.argmax(spectra.before.mean(axis=0))]

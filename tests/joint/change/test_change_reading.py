@@ -54,10 +54,6 @@ def test_lines_are_read_in_the_frame_that_they_can_be_told_to_turn_in(
     assert reading.mesh == reading.known
 
 
-def test_nothing_is_read_in_no_lines():
-    assert read_lines([], MOTOR, 0.02) is None
-
-
 def test_what_was_measured_is_told_with_its_error():
     strong, harmonic = line(2.021, 2.001, 0.003, 9.0), line(4.04, growth=30.0)
     reading = read_lines([strong, harmonic, line(3.3)], MOTOR, 0.02)

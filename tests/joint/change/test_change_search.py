@@ -6,7 +6,7 @@ from sessions import COEFFICIENTS, LIBRARY, TERMS, units_of
 
 from opamc_cli.joint.change import search
 from opamc_cli.joint.change.search import find_slow_causes
-from opamc_cli.joint.change.slow import learn
+from opamc_cli.joint.change.slow import learn, with_model
 
 FEW = {name: LIBRARY[name] for name in (
     "payload_change", "offset", "coulomb", "viscous", "sublinear_friction", "quadratic_friction",
@@ -16,10 +16,8 @@ FEW = {name: LIBRARY[name] for name in (
 
 def causes_of(extra, library=FEW, colder=None, **options):
     units = units_of(extra, colder=colder, **options)
-    healthy = [unit for unit in units if not unit.after]
-    population = learn(healthy, TERMS)
-    units = [unit.with_model(TERMS, population.mean) for unit in units]
-    return find_slow_causes(units, population, library)
+    population = learn(units, TERMS)
+    return find_slow_causes(with_model(units, population), population, library)
 
 
 def only(*names):
@@ -142,7 +140,7 @@ def test_what_a_ripple_leaves_in_the_slow_current_is_no_cause():
 
 
 def test_only_friction_is_a_first_cause_that_the_mean_square_does_not_show(monkeypatch):
-    monkeypatch.setattr(search, "_left", lambda *given, **named: 1.0)
+    monkeypatch.setattr(search, "left_by", lambda compared, *given: np.ones(compared.after.size))
     assert [cause.effect for cause in causes_of(heavy)] == ["coulomb"]
     assert causes_of(payload, library=only("payload_change")) == []
     assert causes_of(stiff, library=only("spring")) == []

@@ -60,9 +60,9 @@ def test_the_rest_is_nothing_special():
     assert effect.settled({"a": 1.0}, TRACK) == {"a": 1.0}
     assert effect.interpretation({}, TRACK) == "what it means"
     assert not effect.is_constant({})
-    assert not effect.harmless
+    assert effect.origin == "joint"
     effect.origin, effect.from_motion = "load", True
-    assert effect.harmless
+    assert effect.origin != "joint"
     assert effect.is_constant({})
     with pytest.raises(NotImplementedError):
         effect.columns(TRACK, {})

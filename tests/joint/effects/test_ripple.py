@@ -84,7 +84,7 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
 )
 def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
     _, track = track_of(Joint(100.0, 5))
-    assert reading in read_order(order, track)
+    assert reading in read_order(order, track).text
 
 
 @pytest.mark.parametrize("order", [1.0, 1.98, 2.0, 2.01, 2.02, 4.0])
@@ -109,4 +109,4 @@ def test_orders_closer_than_the_resolution_are_tied():
 def test_without_gear_ratio_orders_are_counted_per_joint_revolution():
     _, track = track_of(Joint())
     assert track.angle_kind == "joint"
-    assert "per joint revolution" in read_order(202.0, track)
+    assert "per joint revolution" in read_order(202.0, track).text

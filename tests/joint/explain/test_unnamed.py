@@ -1,7 +1,6 @@
 """Functions without a name: how a covariate is stretched, and where travel begins anew."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from simulator import simulate
 
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
+from opamc_cli.joint.explain.unnamed import Response, Shift, stretched
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 
@@ -38,16 +37,6 @@ def test_every_stretch_of_a_covariate_is_seen_and_none_is_flattened():
     place = stretched(values, np.ones(1000, dtype=bool))
     assert place[899] == pytest.approx((0.9 + 0.1) / 2, abs=0.02)
     assert np.all(np.diff(place) > 0)
-
-
-def test_travel_since_reversal_of_a_zigzag():
-    track = SimpleNamespace(
-        position_rad=np.array([0.0, 1, 2, 3, 2, 1, 1, 0, 1, 3]),
-        direction=np.array([1, 1, 1, 1, -1, -1, 0, -1, 1, 1]),
-        size=10,
-    )
-    # A rest is no reversal; a reversal counts from the sample at which the direction is another.
-    np.testing.assert_array_equal(travel_since_reversal(track), [0, 1, 2, 3, 0, 1, 1, 2, 0, 2])
 
 
 def test_a_model_beside_its_own_rates_of_change_settles_at_once():

@@ -8,7 +8,7 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.base import Effect, stack
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit import model, regressor_cache
+from opamc_cli.joint.fit import model
 from opamc_cli.joint.fit.model import Term, currents, dataset_of, fit_terms, static_terms
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
 from opamc_cli.joint.motion.recordings import grouped_track
@@ -87,11 +87,12 @@ def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(mo
 
 def test_groups_come_one_after_the_other():
     dataset = dataset_from(joint_of("cyclic", None, rate=250.0))
-    group = dataset.fine.track.group
-    assert [set(group[rows].tolist()) for rows in dataset.fine.rows] == [
-        {number} for number in dataset.fit_groups
-    ]
-    assert sum(rows.size for rows in dataset.fine.rows) == np.count_nonzero(dataset.fine.fit)
+    parts, group = dataset.fine.parts, dataset.fine.track.group
+    owners = [set(group[parts.rows[start:stop]].tolist()) for start, stop in parts.slices]
+    assert [min(owner) for owner in owners] == sorted(min(owner) for owner in owners)
+    assert all(len(owner) == 1 for owner in owners)
+    assert set.union(*owners) == set(dataset.grouping.open)
+    assert sorted(parts.rows) == np.flatnonzero(dataset.fine.fit).tolist()
 
 
 def test_what_is_not_clear_is_fitted_and_not_looked_at():
@@ -160,31 +161,6 @@ def test_terms_that_follow_the_model_are_fitted_until_that_settles(monkeypatch):
     Following.rounds = 0
     fit_terms(dataset, terms)
     assert Following.rounds == model.MOST_ROUNDS
-
-
-def test_the_same_terms_are_fitted_once():
-    dataset = dataset_from(joint_of("cyclic", lambda q, v, a, t: np.sin(7 * t) * np.sin(q)))
-    fitted = fit_terms(dataset, (*rigid(), Term(Following(), {})))
-    Following.rounds = 0
-    # Of what else is known of a term than its effect and parameters, the later one's is told.
-    terms = (*rigid(), Term(Following(), {}))
-    again = fit_terms(fitted.dataset, terms)
-    assert Following.rounds == 0
-    assert again.residual_a is fitted.residual_a
-    assert all(one is other for one, other in zip(again.terms, terms, strict=True))
-    fit_terms(dataset, terms[:-1])
-    assert fit_terms(dataset, terms[:-1]).terms == terms[:-1]
-
-
-def test_old_fits_are_forgotten():
-    dataset = dataset_from(joint_of("cyclic", lambda q, v, a, t: np.sin(7 * t) * np.sin(q)))
-    kept = fit_terms(dataset, rigid())
-    for order in range(regressor_cache.MOST_FITS):
-        assert fit_terms(dataset, rigid()).residual_a is kept.residual_a
-        fit_terms(dataset, (*rigid()[: order % 4], term("ripple", order=1.0 + order)))
-    for order in range(regressor_cache.MOST_FITS):
-        fit_terms(dataset, (term("ripple", order=2.5 + order),))
-    assert fit_terms(dataset, rigid()).residual_a is not kept.residual_a
 
 
 def test_a_current_is_added_up_by_what_it_is():

@@ -36,27 +36,25 @@ def terms(*effects):
     return tuple(Term(library[name], parameters) for name, parameters in effects)
 
 
-def test_cycles_are_taken_whole_and_begin_at_the_same_place(low_limit):
+def test_cycles_are_taken_whole(low_limit):
     track, grouping = long_track(cycles=30)
     dataset = dataset_of(track, grouping)
     taken = np.unique(dataset.fine.track.group[dataset.fine.fit])
     assert grouping.kind == "cycles"
-    assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.fit_groups)
+    assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.grouping.open)
     for group in taken:
         there = np.count_nonzero(dataset.fine.fit & (dataset.fine.track.group == group))
         assert there == np.count_nonzero(track.moving & (grouping.group == group))
-    first = [dataset.fine.track.position_rad[start] for start, _ in dataset.fine.track.bounds]
-    np.testing.assert_allclose(first, first[0], atol=1e-6)
 
 
 def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
     track, _ = long_track(cycles=30, kind="sines")
     blocks = group_samples(track.moving, track.bounds, None, track.rate_hz, ("run",))
     assert blocks.kind == "blocks"
-    dataset = dataset_of(replace(track, period_samples=None), blocks)
+    dataset = dataset_of(track, blocks)
     fine = dataset.fine
     assert np.count_nonzero(fine.fit) == pytest.approx(LIMIT * 0.75, rel=0.02)
-    for group in dataset.fit_groups:
+    for group in dataset.grouping.open:
         whole = track.time_s[track.moving & (blocks.group == group)]
         part = fine.track.time_s[fine.fit & (fine.track.group == group)]
         assert part[0] == whole[0]

@@ -72,7 +72,7 @@ def test_a_block_moves_and_is_clear_if_all_of_its_samples_are():
     moving[5], clear[13] = False, False
     group = np.repeat([0, 1, 2, 3], 500)
     group[498:500] = 1
-    track = replace(track, moving=moving, clear=clear, group=group, period_samples=630)
+    track = replace(track, moving=moving, clear=clear, group=group)
     coarse = coarsen(track, 4)
     assert coarse.rate_hz == 50.0
     assert coarse.bounds == ((0, 250), (250, 500))
@@ -80,7 +80,6 @@ def test_a_block_moves_and_is_clear_if_all_of_its_samples_are():
     assert np.flatnonzero(~coarse.clear).tolist() == [3]
     # of two groups: none
     assert coarse.group[[0, 123, 124, 125, 499]].tolist() == [0, 0, -1, 1, 3]
-    assert coarse.period_samples == 158
     smooth = averaged(track.current_a, track.bounds, track.kernel)
     np.testing.assert_array_equal(coarse.full.current_a, smooth)
     np.testing.assert_array_equal(coarse.current_a, block_mean(smooth, track.bounds, 4))

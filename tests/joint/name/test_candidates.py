@@ -99,16 +99,6 @@ def test_what_the_model_holds_already_takes_nothing(slow_chain):
         assert abs(Beside(slow_chain, True).gains(batch)[0]) < 1e-3
 
 
-def test_the_fitted_drop_is_the_fall_of_the_sum_of_squares(slow_chain):
-    dataset = slow_chain.fit.dataset
-    beside = Beside(slow_chain, True)
-    columns = beside.parts.taken(dataset.columns(Term(LIBRARY["spring"], {}), True))
-    known = np.concatenate(beside.blocks, axis=1)
-    both = np.concatenate([known, columns], axis=1)
-    left = [np.linalg.lstsq(design, beside.current, rcond=1e-9)[1][0] for design in (known, both)]
-    assert beside.fitted_drop(columns) == pytest.approx(left[0] - left[1], rel=1e-4)
-
-
 def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
     dataset = slow_chain.fit.dataset
     beside = Beside(slow_chain, True)
@@ -129,3 +119,19 @@ def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
     assert len(scores) > 1
     assert found.score == pytest.approx(min(scores.values()), abs=1e-4)
     assert scores[found.term.key] == min(scores.values())
+
+
+def test_a_smaller_form_of_the_same_parameters_keeps_its_columns(slow_chain):
+    class Padded(type(LIBRARY["stribeck"])):
+        """A regressor, and one of noise that a smaller form leaves out."""
+
+        def columns(self, track, parameters):
+            noise = np.random.default_rng(0).normal(size=(track.size, 1))
+            return np.concatenate([super().columns(track, parameters), noise], axis=1)
+
+        def variants(self, parameters):
+            return [(parameters, (0,))]
+
+    full = Term(Padded(), {"stribeck_speed": 0.15, "exponent": 2.0})
+    found = best_form(slow_chain.fit.dataset, Beside(slow_chain, True), full)
+    assert found.term.keep == (0,)

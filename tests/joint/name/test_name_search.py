@@ -38,9 +38,9 @@ def one(values):
 
 
 def test_a_single_chain_takes_what_imitates_a_spring_and_two_find_it():
-    # Forwards only, hysteresis and a Stribeck curve imitate half of a spring, and they come first.
+    # Forwards only, a drag at one place imitates a spring and a Stribeck curve, and comes first.
     def both(q, v, a, t):
-        return one(q) + 4 * np.sign(v) * np.exp(-((v / 0.1) ** 2))
+        return one(q) + 4 * np.sign(v) * np.exp(-((v / 0.2) ** 2))
 
     names = ("spring", "position_drag", "stribeck", "quadratic_friction", "sublinear_friction",
              "hysteresis")  # fmt: skip

@@ -18,7 +18,7 @@ def test_a_stribeck_speed_a_fifth_off_is_found_again_without_noise(off):
     recording = joint_of("cyclic", stribeck, strength=1e6, noise_a=1e-8, rate=100.0)
     chain = chain_of(fit_declared([recording]), 0)
     start = Term(LIBRARY["stribeck"], {"stribeck_speed": 0.15 * off, "exponent": 2.0})
-    found = refined(chain.fit.dataset, start, Beside(chain, False))
+    found = refined(start, Beside(chain, False))
     assert found.parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.05)
     assert found.parameters["exponent"] == 2.0
 
@@ -28,7 +28,7 @@ def test_place_and_width_of_a_dragging_place_are_found_together():
     chain = chain_of(fit_declared([recording]), 0)
     start = {"place_rad": 0.34, "width_rad": 0.12, "flatness": 2.0}
     beside = Beside(chain, False)
-    found = refined(chain.fit.dataset, Term(LIBRARY["position_drag"], start), beside)
+    found = refined(Term(LIBRARY["position_drag"], start), beside)
     assert found.parameters["place_rad"] == pytest.approx(0.3, abs=0.01)
     assert found.parameters["width_rad"] == pytest.approx(0.1, rel=0.1)
 
@@ -36,7 +36,7 @@ def test_place_and_width_of_a_dragging_place_are_found_together():
 def test_an_effect_without_parameters_stays_as_it_is():
     chain = chain_of(fit_declared([joint_of("cyclic", stribeck, rate=100.0)]), 0)
     term = Term(LIBRARY["quadratic_friction"], {})
-    assert refined(chain.fit.dataset, term, Beside(chain, False)) is term
+    assert refined(term, Beside(chain, False)) is term
 
 
 def stribeck(q, v, a, t):

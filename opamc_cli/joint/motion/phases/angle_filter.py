@@ -108,7 +108,7 @@ def smoothed_angle(
 
     References
     ----------
-    Rauch, Tung and Striebel, AIAA Journal 3, 1965.
+    Bierman, Automatica 9, 1973: the smoother of Bryson and Frazier, which inverts nothing.
     """
     step = 1.0 / rate_hz
     variance = ANGLE_NOISE_RAD**2
@@ -132,8 +132,9 @@ def _smooth(  # type: ignore[no-untyped-def]
 ):  # fmt: skip
     # Scalars throughout: three states are too few for matrix calls, which cost 20 times as much.
     n = measured.size
-    x = np.empty((n, 3))
-    p = np.empty((n, 6))
+    x, p = np.empty((n, 3)), np.empty((n, 6))
+    # Gains, and errors by their variance, of the rough speed and of the angle.
+    g = np.zeros((n, 2, 4))
     h = step * step / 2
     q00, q01, q02 = walk * step**5 / 20, walk * step**4 / 8, walk * step**3 / 6
     q11, q12, q22 = walk * step**3 / 3, walk * step**2 / 2, walk * step
@@ -161,6 +162,7 @@ def _smooth(  # type: ignore[no-untyped-def]
             total = p11 + rough_variance
             k0, k1, k2 = p01 / total, p11 / total, p12 / total
             error = rough[i] - v
+            g[i, 0] = k0, k1, k2, error / total
             a, v, c = a + k0 * error, v + k1 * error, c + k2 * error
             p00, p02, p22 = p00 - k0 * p01, p02 - k0 * p12, p22 - k2 * p12
             p01, p11, p12 = p01 - k0 * p11, p11 - k1 * p11, p12 - k1 * p12
@@ -170,44 +172,20 @@ def _smooth(  # type: ignore[no-untyped-def]
             error = measured[i] - a
             if turn > 0:
                 error -= turn * np.round(error / turn)
+            g[i, 1] = k0, k1, k2, error / total
             a, v, c = a + k0 * error, v + k1 * error, c + k2 * error
             p11, p12, p22 = p11 - k1 * p01, p12 - k1 * p02, p22 - k2 * p02
             p00, p01, p02 = p00 - k0 * p00, p01 - k0 * p01, p02 - k0 * p02
-        x[i, 0], x[i, 1], x[i, 2] = a, v, c
-        p[i, 0], p[i, 1], p[i, 2] = p00, p01, p02
-        p[i, 3], p[i, 4], p[i, 5] = p11, p12, p22
-    for i in range(n - 2, -1, -1):
-        p00, p01, p02 = p[i, 0], p[i, 1], p[i, 2]
-        p11, p12, p22 = p[i, 3], p[i, 4], p[i, 5]
-        m00 = p00 + step * p01 + h * p02
-        m01 = p01 + step * p11 + h * p12
-        m02 = p02 + step * p12 + h * p22
-        m10, m11, m12 = p01 + step * p02, p11 + step * p12, p12 + step * p22
-        grow = 0.0 if p22 > spread * spread else 1.0
-        u00 = m00 + step * m01 + h * m02 + grow * q00
-        if free[i + 1]:
-            u00 += FREE_RAD2
-        u01 = m01 + step * m02 + grow * q01
-        u02 = m02 + grow * q02
-        u11 = m11 + step * m12 + grow * q11
-        u12 = m12 + grow * q12
-        u22 = p22 + grow * q22
-        a = x[i, 0] + step * x[i, 1] + h * x[i, 2]
-        v = x[i, 1] + step * x[i, 2]
-        d0, d1, d2 = x[i + 1, 0] - a, x[i + 1, 1] - v, x[i + 1, 2] - x[i, 2]
-        # Solve U y = d by Cholesky, then x += (F P)^T y.
-        l00 = np.sqrt(u00)
-        l10, l20 = u01 / l00, u02 / l00
-        l11 = np.sqrt(max(u11 - l10 * l10, 1e-300))
-        l21 = (u12 - l20 * l10) / l11
-        l22 = np.sqrt(max(u22 - l20 * l20 - l21 * l21, 1e-300))
-        z0 = d0 / l00
-        z1 = (d1 - l10 * z0) / l11
-        z2 = (d2 - l20 * z0 - l21 * z1) / l22
-        y2 = z2 / l22
-        y1 = (z1 - l21 * y2) / l11
-        y0 = (z0 - l10 * y1 - l20 * y2) / l00
-        x[i, 0] += m00 * y0 + m10 * y1 + p02 * y2
-        x[i, 1] += m01 * y0 + m11 * y1 + p12 * y2
-        x[i, 2] += m02 * y0 + m12 * y1 + p22 * y2
+        x[i] = a, v, c
+        p[i] = p00, p01, p02, p11, p12, p22
+    # Back from the end, with what all later measurements ask of the state.
+    l0 = l1 = l2 = 0.0
+    for i in range(n - 1, -1, -1):
+        p00, p01, p02, p11, p12, p22 = p[i]
+        x[i, 0] -= p00 * l0 + p01 * l1 + p02 * l2
+        x[i, 1] -= p01 * l0 + p11 * l1 + p12 * l2
+        x[i, 2] -= p02 * l0 + p12 * l1 + p22 * l2
+        l0 -= g[i, 1, 3] + g[i, 1, 0] * l0 + g[i, 1, 1] * l1 + g[i, 1, 2] * l2
+        l1 -= g[i, 0, 3] + g[i, 0, 0] * l0 + g[i, 0, 1] * l1 + g[i, 0, 2] * l2
+        l1, l2 = l1 + step * l0, l2 + step * l1 + h * l0
     return x[:, 0].copy(), x[:, 1].copy(), x[:, 2].copy()

@@ -120,7 +120,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     for _ in range(BRIDGE_ROUNDS):
         strong, measured = averaged_angle(found.vector, angle, noise, found.floor, rate_hz)
         angle, _ = bridged(measured, strong, rough, sure, found.spread, rate_hz, bandwidth)
-    measured = angle + _halved(measured - angle)
+    measured = measured - np.pi * np.round((measured - angle) / np.pi)
     angle, velocity, acceleration = smoothed_angle(
         measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0
     )
@@ -180,9 +180,3 @@ def averaged_angle(
     together = np.abs(square) > max(UNLIKELY * chance, floor**2)
     measured = np.where(alone, np.angle(vector), angle_rad + 0.5 * np.angle(square))
     return alone | together, measured
-
-
-def _halved(angle_rad: Floats) -> Floats:
-    """Angle modulo pi, between -pi/2 and pi/2."""
-    halved: Floats = angle_rad - np.pi * np.round(angle_rad / np.pi)
-    return halved
