@@ -140,3 +140,13 @@ def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChang
         frequency_hz=(bin_number + 1) * cell.bin_hz,
         size_ratio=math.exp(0.5 * change),
     )
+
+
+def typical_ratio(cells: Sequence[SpectrumCell], n_baseline: int) -> float:
+    """Size of the fluctuations over the baseline's, the median of all parts and frequencies."""
+    changes = [
+        np.nanmean(cell.sessions[n_baseline:], axis=0)
+        - np.nanmean(cell.sessions[:n_baseline], axis=0)
+        for cell in cells
+    ]
+    return math.exp(0.5 * float(np.nanmedian(np.concatenate(changes))))

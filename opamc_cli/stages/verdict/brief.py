@@ -8,7 +8,7 @@ from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
 from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_amplitude
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
-from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
 from opamc_cli.stages.verdict.reasons import lies_outside
 
 MOST_EVIDENCE = 2
@@ -59,13 +59,12 @@ def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bund
 
 
 def _smoother(judgement: Judgement, bundle: Bundle) -> bool:
-    """Whether what speaks loudest is that the fluctuations are a fraction of what they were."""
+    """Whether the spectrum speaks loudest, and most fluctuations are a fraction of what they were."""
     known = {name: p for name, p in judgement.witnesses.items() if math.isfinite(p)}
     loudest = bundle.witnesses.get(min(known, key=known.__getitem__, default=""))
     if not isinstance(loudest, SpectrumEvidence):
         return False
-    band = clearest_change(loudest.cells, loudest.n_baseline)
-    return band is not None and band.size_ratio < SMOOTHER
+    return typical_ratio(loudest.cells, loudest.n_baseline) < SMOOTHER
 
 
 def _evidence(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:

@@ -133,7 +133,7 @@ def content(
     unit = current_unit([source for side in sides for source in side.sources])
     axes = []
     for axis, judgement in decided.judgements.items():
-        cause = causes.get(axis)
+        cause = believed(judgement, causes.get(axis), config.score)
         final = _with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
@@ -213,6 +213,18 @@ def policy_of(config: ScoreConfig) -> Policy:
 def is_excused(judgement: Judgement, config: ScoreConfig) -> bool:
     """Tell whether a joint is called healthy although it differs: others may differ as much."""
     return judgement.state == "healthy" and judgement.p_adjusted <= config.false_alarm_rate
+
+
+def believed(
+    judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
+) -> Mapping[str, Any] | None:
+    """Drop a harmless cause where the course, which is what it moves, is a healthy session's.
+
+    Grease, payload and offsets act slowly: they do not excuse what the spectrum alone has found.
+    """
+    course_p = judgement.witnesses.get("profile", 0.0)
+    harmless = cause is not None and cause.get("harmless")
+    return None if harmless and course_p > config.false_alarm_rate else cause
 
 
 def _with_cause(

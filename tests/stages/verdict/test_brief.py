@@ -13,9 +13,10 @@ from opamc_cli.stages.verdict.brief import brief
 @pytest.mark.parametrize(
     ("size", "loudest", "first"),
     [(0.3, "spectrum", "filters"), (0.7, "spectrum", "gear"), (3.0, "spectrum", "gear"),
-     (0.3, "patterns", "gear")],
+     (0.3, "patterns", "gear"), ([0.1, 3, 3, 1, 1, 1, 1, 1], "spectrum", "gear")],
 )  # fmt: skip
 def test_a_current_that_became_smooth_is_no_worn_gear(size, loudest, first):
+    """One frequency that is less, as where a damaged tooth moved a resonance, is no filter."""
     rng = np.random.default_rng(0)
     sessions = 0.02 * rng.normal(size=(6, 8))
     sessions[5] += 2 * np.log(size)  # log powers

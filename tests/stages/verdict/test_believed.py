@@ -1,0 +1,25 @@
+"""What a harmless cause may excuse."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.stages.verdict.verdict import believed
+
+GREASE = {"effect": "thermal_viscous", "harmless": True}
+
+
+@pytest.mark.parametrize(
+    ("witnesses", "cause", "kept"),
+    [
+        ({"profile": 0.001, "spectrum": 1e-30}, GREASE, True),
+        ({"profile": 0.03, "spectrum": 1e-30}, GREASE, False),
+        ({"profile": 0.03}, {"effect": "ripple", "harmless": False}, True),
+        ({"patterns": 0.001}, GREASE, True),
+        ({"profile": 0.03}, None, False),
+    ],
+)
+def test_a_harmless_cause_needs_a_course_that_has_changed(witnesses, cause, kept):
+    judgement = SimpleNamespace(witnesses=witnesses)
+    assert (believed(judgement, cause, ScoreConfig()) is not None) is kept
