@@ -59,7 +59,7 @@ def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bund
 
 
 def _smoother(judgement: Judgement, bundle: Bundle) -> bool:
-    """Whether the spectrum speaks loudest, and most fluctuations are a fraction of what they were."""
+    """Whether the spectrum speaks loudest, and most of the fluctuations have become smaller."""
     known = {name: p for name, p in judgement.witnesses.items() if math.isfinite(p)}
     loudest = bundle.witnesses.get(min(known, key=known.__getitem__, default=""))
     if not isinstance(loudest, SpectrumEvidence):
