@@ -5,13 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.joint.change.reading import Cause
-from opamc_cli.joint.change.slow import (
-    Population,
-    Shift,
-    left_by,
-    shift_power,
-    shifts,
-)
+from opamc_cli.joint.change.slow import Population, Shift, left_by, shift_power, shifts
 from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.library import Library

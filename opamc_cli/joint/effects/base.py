@@ -70,7 +70,6 @@ class Effect:
     from_motion: bool = False
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
-
     from_terms: bool = False
     """True where they look at the static columns alone: at which terms there are, not at how they
     fit."""

@@ -13,15 +13,7 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
-from opamc_cli.joint.motion.track import (
-    Bools,
-    Floats,
-    Ints,
-    Track,
-    averaged,
-    block_mean,
-    coarsen,
-)
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, averaged, block_mean, coarsen
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 16_000

@@ -63,10 +63,8 @@ class Recording:
     @property
     def size(self) -> int:
         """Number of samples."""
-        for values in (self.current_a, self.phases_a, self.position_rad):
-            if values is not None:
-                return int(values.shape[0])
-        return 0
+        logged = (self.current_a, self.phases_a, self.position_rad)
+        return next((len(values) for values in logged if values is not None), 0)
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
