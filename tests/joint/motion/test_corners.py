@@ -171,3 +171,16 @@ def test_vibration_is_no_corner(sway):
     assert np.mean(track.clear[rows]) > 0.9
     at_corners = np.abs(t[:, None] - [0.5, 1.5, 2.0]).min(axis=1) < 0.5 * window / rate
     assert not track.clear[rows & at_corners].any()
+
+
+def test_what_lasts_for_many_windows_is_vibration_and_stays():
+    """A soft joint shaken for a second and a half at a time, which a window of 36 ms rounds off."""
+    rate, window = 250.0, 9
+    t = np.arange(0, 8, 1 / rate)
+    shaken = (t % 2 > 0.5) * 8.0 * np.sin(2 * np.pi * 20 * t)
+    path = np.cumsum(np.cumsum(shaken)) / rate**2 + t
+    current = 0.2 * shaken + np.random.default_rng(0).normal(0, 0.01, t.size)
+    smooth = derivatives(path, rate, window, 2)
+    moving = (t > 0.2) & (t < 7.8)
+    kernel = averaging_kernel(window, 2)
+    assert clear_of_corners(smooth, current, moving, kernel, 0.0).all()
