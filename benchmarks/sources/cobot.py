@@ -21,9 +21,7 @@ RATIO = 101.0
 POLE_PAIRS = 5
 STEP_HZ = 8000
 """Of the mechanics; the drive's loops and the log take every so many of these steps."""
-ELBOW_LOW_RAD, ELBOW_HIGH_RAD = -1.8, 0.3
-LOW_RAD = np.array([-1.6, -0.2, ELBOW_LOW_RAD])
-HIGH_RAD = np.array([1.6, 1.5, ELBOW_HIGH_RAD])
+LOW_RAD, HIGH_RAD = np.array([-1.6, -0.2, -1.8]), np.array([1.6, 1.5, 0.3])
 SECONDS = 60.0
 """Of a recording, in whole cycles of which there are `CYCLES`."""
 CYCLES = (3, 8)
@@ -162,7 +160,7 @@ def _driven(wanted, links, joints, drive, payload_kg, payload_from, steps):
                 encoder[k] = read
                 lag = row[3 + k] + drive.position_gain * (row[k] - read) - seen_speed[k]
                 gain = drive.velocity_gain[k]
-                integral[k] += gain * drive.integral_gain * lag * drive.loop_steps * dt
+                integral[k] += gain * drive.integral_gain * lag * loop_s
                 asked[k] = gain * lag + integral[k]
         for k in range(3):
             current[k] += dt / 0.0006 * (asked[k] - current[k])
@@ -206,9 +204,8 @@ def _driven(wanted, links, joints, drive, payload_kg, payload_from, steps):
         s23, c23 = np.sin(place[1] + place[2]), np.cos(place[1] + place[2])
         at_elbow, at_hand = upper * c2, upper * c2 + fore * c23
         m11 = links.base_inertia + elbow_kg * at_elbow * at_elbow + carried * at_hand * at_hand
-        m11_by_2 = (
-            -2 * elbow_kg * at_elbow * upper * s2 - 2 * carried * at_hand * (upper * s2 + fore * s23)
-        )
+        dropped = upper * s2 + fore * s23
+        m11_by_2 = -2 * elbow_kg * at_elbow * upper * s2 - 2 * carried * at_hand * dropped
         m11_by_3 = -2 * carried * at_hand * fore * s23
         m22 = (
             elbow_kg * upper * upper
@@ -279,12 +276,10 @@ def draw(seed: int, moving: int, *, whole: bool) -> Cobot:
     loop_steps, rate_hz = int(rng.choice([4, 8])), int(rng.choice([125, 250, 500]))
     cut_hz = rng.uniform(40, 150)
     step_a, noise_a = float(rng.choice([0.001, 0.004, 0.01])), rng.uniform(0.005, 0.03)
-    rng.choice([0, 0.0003, 0.001])
     smooth = bool(rng.integers(2))
     places, rests_s = _program(rng, moving)
     top_speed = rng.uniform(0.7, 1.6) * np.array([1, 1, 1.2])
     most_acceleration = rng.uniform(3, 8) * np.ones(3)
-    rng.integers(3, 6)
     heating = np.full(3, rng.uniform(0.03, 0.1))
     joints = Joints(
         inertia, torque_per_a, stiffness if whole else 4 * stiffness,
@@ -402,9 +397,8 @@ def record(cobot: Cobot, hidden: str = "") -> Record:
     seconds = len(wanted) / loop_hz
 
     day = np.random.default_rng([79, cobot.seed, 0])
-    ambient_c = 24 + 0 * day.standard_normal()
     joints = cobot.joints._replace(
-        begins_c=ambient_c + 3 + day.uniform(0, 1, 3),
+        begins_c=27 + day.uniform(0, 1, 3),
         dry=cobot.joints.dry * (1 + 0.02 * day.standard_normal(3)),
     )
     wobble = 1 + 0.02 * day.standard_normal(3)
