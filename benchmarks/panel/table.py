@@ -69,7 +69,8 @@ def by_size(rows: Sequence[Row], names: Sequence[str]) -> str:
         + " |",
         "|---" * (3 + len(sizes)) + "|",
     ]
-    keys = dict.fromkeys((row["source"], row["sensing"]) for row in rows if row["hidden"])
+    sized = [row for row in rows if row["hidden"] and row["size"] is not None]
+    keys = dict.fromkeys((row["source"], row["sensing"]) for row in sized)
     for source, sensing in keys:
         for name in names:
             cells = []

@@ -4,7 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from panel import messy, run, table, two_mass, two_mass_cases
+from panel import cobot, messy, run, table, two_mass, two_mass_cases
 from panel.case import RIGID, Case, Wanted
 
 
@@ -72,3 +72,17 @@ def test_errors_are_summed_where_nobody_knows_a_name():
     assert table.totals(rows, ["a", "b"]) == (
         "Sealed errors summed over 1 of 2 rows of messy, A: a 1.000, b 2.000."
     )
+
+
+def test_a_cobots_recording_is_the_same_each_time_and_holds_what_is_hidden():
+    made = {case.name: case for case in cobot.cases(7, Wanted())}
+    (pit,), (again,), (none,) = (made[f"{name} 7"].make() for name in ("pit", "pit", "none"))
+    assert np.array_equal(pit.current, again.current)
+    assert np.array_equal(pit.position, again.position)
+    assert np.isfinite(pit.current).all()
+    assert pit.current.shape == pit.position.shape
+    assert np.ptp(pit.position) > 0.3
+    # The drive holds the path, whatever rubs; the current pays for it, at one place.
+    assert np.abs(pit.position - none.position).max() < 0.02
+    differs = np.abs(pit.current - none.current)
+    assert np.median(differs) < 0.05 < 0.2 < differs.max()
