@@ -11,6 +11,7 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.smoothing import SHORTEST_WINDOW
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, coarsen, joined
 
 FEWEST_SAMPLES = 10
@@ -105,9 +106,10 @@ def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
             tracks.append(replace(track, group=group))
             late = np.append(late, np.full(int(track.group.max()) + 1, new))
     track = joined(tracks)
-    # a logged path's noise, averaged over less, hides friction: a ball screw without grease was
-    # viscous or dry friction in 6 of 10 draws, and is in 10
-    windows = 1.4 if "logged" in track.channels else 0.8
+    # a noisy path's acceleration, averaged over less, hides friction: a ball screw without grease
+    # was viscous or dry friction in 6 of 10 draws, and is in 10
+    noisy = "logged" in track.channels and track.kernel.size > SHORTEST_WINDOW
+    windows = 1.4 if noisy else 0.8
     width = windows / float(np.sum(track.kernel**2))
     factor = max(int(track.rate_hz / COARSE_RATE_HZ), int(width), 1)
     coarse = coarsen(track, factor)
