@@ -55,6 +55,10 @@ def close(names, orders=(), cycles=5):
 
 
 @pytest.mark.long
+@pytest.mark.xfail(
+    strict=True,
+    reason="refined by the held-out gain, a second line ends at order 1.991",
+)
 def test_what_is_found_beside_declared_parts_is_there():
     ratio = recording()[0].gear_ratio
     turn = (ratio + 1) / ratio

@@ -109,8 +109,7 @@ def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
     # a noisy path's acceleration, averaged over less, hides friction: a ball screw without grease
     # was viscous or dry friction in 6 of 10 draws, and is in 10
     noisy = "logged" in track.channels and track.kernel.size > SHORTEST_WINDOW
-    windows = 1.4 if noisy else 0.8
-    width = windows / float(np.sum(track.kernel**2))
+    width = (1.4 if noisy else 0.8) / float(np.sum(track.kernel**2))
     factor = max(int(track.rate_hz / COARSE_RATE_HZ), int(width), 1)
     coarse = coarsen(track, factor)
     fine = replace(track, moving=track.moving & track.clear)

@@ -145,8 +145,7 @@ class Effect:
 
 def stack(*columns: Floats) -> Floats:
     """Put regressors side by side, each contiguous in memory: they are filtered one by one."""
-    stacked: Floats = np.stack(columns, axis=0).T
-    return stacked
+    return np.asarray(np.stack(columns, axis=0).T)
 
 
 def geometric(low: float, high: float, count: int) -> list[float]:

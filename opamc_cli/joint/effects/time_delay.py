@@ -99,8 +99,7 @@ def late_means(
 
 def lagging(columns: Floats, samples: float) -> Floats:
     """Put columns, (n, k), through a filter of first order, from rest at their first values."""
-    smooth: Floats = _lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T
-    return smooth
+    return np.asarray(_lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T)
 
 
 @njit(cache=True)

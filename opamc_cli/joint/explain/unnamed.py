@@ -143,8 +143,16 @@ def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) 
     span = max(float(levels[-1] - levels[0]), 1e-300)
     rank = np.interp(values, levels, np.linspace(0, 1, QUANTILES))
     linear = np.clip((values - levels[0]) / span, 0, 1)
-    place: Floats = 0.5 * (rank + linear)
-    return place
+    return np.asarray(0.5 * (rank + linear))
+
+
+def travel_since_reversal(track: Track) -> Floats:
+    """Path since the direction last changed, in radians."""
+    path = np.cumsum(np.abs(np.diff(track.position_rad, prepend=track.position_rad[:1])))
+    known = np.maximum.accumulate(np.where(track.direction != 0, np.arange(track.size), 0))
+    turned = np.diff(track.direction[known], prepend=np.nan) != 0
+    since: Floats = path - np.maximum.accumulate(np.where(turned, path, 0.0))
+    return since
 
 
 def _direction(track: Track) -> list[Floats]:
@@ -173,6 +181,7 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
     Smooth("angle", "joint-angle", lambda t: t.position_rad, _one),
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, _direction),
+    Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, _direction),
     Smooth("load", "load", lambda t: np.abs(t.load_a), _direction, follows_model=True),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, _one, constant=False),
     Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),

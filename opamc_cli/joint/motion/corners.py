@@ -52,11 +52,9 @@ def clear_of_corners(
     few = np.count_nonzero(moving & ~lacking) < FEWEST_CLEAR * np.count_nonzero(moving)
     if vibrates or few:
         return clear
-    clear[lacking] = False
-    return clear
+    return ~lacking
 
 
 def widened(rows: Bools, reach: int) -> Bools:
     """Rows that are true, or at most `reach` from one that is."""
-    wide: Bools = maximum_filter1d(rows, 2 * reach + 1, mode="constant")
-    return wide
+    return np.asarray(maximum_filter1d(rows, 2 * reach + 1, mode="constant"))

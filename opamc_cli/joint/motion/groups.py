@@ -65,8 +65,7 @@ def _mismatch(path: Floats) -> Floats:
     squares = np.concatenate([[0.0], np.cumsum(centred**2)])
     lags = np.arange(n)
     overlap = n - lags
-    mismatch: Floats = (squares[overlap] + squares[n] - squares[lags] - 2 * products) / overlap
-    return mismatch
+    return np.asarray((squares[overlap] + squares[n] - squares[lags] - 2 * products) / overlap)
 
 
 def group_samples(

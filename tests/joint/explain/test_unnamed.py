@@ -1,6 +1,7 @@
 """Functions without a name: how a covariate is stretched, and where travel begins anew."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from simulator import simulate
 
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.explain.unnamed import Response, Shift, stretched
+from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 
@@ -132,3 +133,13 @@ def test_what_is_fitted_to_its_own_recordings_or_smooths_the_motion_says_so():
     assert own == set(library) - {"unnamed_response", "unnamed_order"}
     smooth = {name for name, effect in library.items() if effect.as_smoothing}
     assert smooth == {"unnamed_response", "unnamed_shift"}
+
+
+def test_travel_since_reversal_of_a_zigzag():
+    track = SimpleNamespace(
+        position_rad=np.array([0.0, 1, 2, 3, 2, 1, 1, 0, 1, 3]),
+        direction=np.array([1, 1, 1, 1, -1, -1, 0, -1, 1, 1]),
+        size=10,
+    )
+    # A rest is no reversal; a reversal counts from the sample at which the direction is another.
+    np.testing.assert_array_equal(travel_since_reversal(track), [0, 1, 2, 3, 0, 1, 1, 2, 0, 2])
