@@ -143,10 +143,10 @@ def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChang
 
 
 def typical_ratio(cells: Sequence[SpectrumCell], n_baseline: int) -> float:
-    """Size of the fluctuations over the baseline's, the median of all parts and frequencies."""
-    changes = [
-        np.nanmean(cell.sessions[n_baseline:], axis=0)
-        - np.nanmean(cell.sessions[:n_baseline], axis=0)
-        for cell in cells
-    ]
-    return math.exp(0.5 * float(np.nanmedian(np.concatenate(changes))))
+    """Size of the fluctuations over the baseline's, the median of all parts and frequencies.
+
+    Motions that a side lacks are passed over; NaN where nothing is known of both.
+    """
+    changes = np.concatenate([change_between(cell.sessions, n_baseline)[0] for cell in cells])
+    known = changes[np.isfinite(changes)]
+    return math.exp(0.5 * float(np.median(known))) if known.size else math.nan

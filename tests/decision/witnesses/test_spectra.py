@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from opamc_cli.decision.witnesses.deviation import change_between
-from opamc_cli.decision.witnesses.spectra import clearest_change, size_effect
+from opamc_cli.decision.witnesses.spectra import (
+    SpectrumCell,
+    clearest_change,
+    size_effect,
+    typical_ratio,
+)
 from tests.decision.fleet import Fleet, cells, judge, spectra
 
 
@@ -42,3 +47,14 @@ def test_the_clearest_change_is_told_by_place_frequency_and_size():
     assert found.frequency_hz == (bin_number + 1) * cell.bin_hz
     assert found.size_ratio == pytest.approx(np.exp(change[frame * 8 + bin_number] / 2))
     assert clearest_change([replace(c, sessions=c.sessions[:2]) for c in own], 1) is None
+
+
+@pytest.mark.filterwarnings("error")
+def test_the_typical_size_passes_over_motions_that_a_side_lacks():
+    whole = np.zeros((4, 6))
+    whole[3] = 2 * np.log(0.4)
+    lacking = np.full((4, 6), 1.0)
+    lacking[3] = np.nan
+    cells = [SpectrumCell(0, one, np.ones(4), np.ones(6), 2, 3, 5.0) for one in (whole, lacking)]
+    assert typical_ratio(cells, 3) == pytest.approx(0.4)
+    assert np.isnan(typical_ratio(cells[1:], 3))
