@@ -21,6 +21,8 @@ class Sessions:
     """How they were told apart, by preference: "session", "night", "folder", "file"."""
     wrong_clocks: int = 0
     """Recordings whose `started_at` is more than a day off the date of their folder."""
+    unread_clocks: int = 0
+    """Recordings whose `started_at` is no time."""
 
     def __len__(self) -> int:
         """Return the number of sessions."""
@@ -71,6 +73,7 @@ def sessions_of(
         {run: name if len(kinds) == 1 else f"{kind} {name}" for run, (kind, name) in told.items()},
         tuple(kind for kind in (BY_SESSION, BY_NIGHT, BY_FOLDER, BY_FILE) if kind in kinds),
         wrong_clocks,
+        sum(bool(s.info.started_at) and started(s.info.started_at) is None for s in sources),
     )
 
 
@@ -129,6 +132,11 @@ def in_words(baseline: Sessions, target: Sessions) -> list[str]:
             notes.append(
                 f"{name}: started_at of {side.wrong_clocks} of {len(side.of_run)} runs is more "
                 "than a day off the date of their folder, which counts; set the logger's clock"
+            )
+        if side.unread_clocks:
+            notes.append(
+                f"{name}: started_at of {side.unread_clocks} of {len(side.of_run)} runs is no time "
+                "as 2026-03-01T22:00:00Z is, and tells no session"
             )
     alone = sum(len(side) for side in (baseline, target) if BY_FILE in side.told_by)
     if alone > 2:
