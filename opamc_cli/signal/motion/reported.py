@@ -27,10 +27,12 @@ OVERSHOOT_SHARE = 0.01
 """Of the largest size: what a cubic between samples overshoots by where a modulus touches zero was
 up to 0.2 % of it, of some ten samples in a recording."""
 
-CLEAR_SHARE = 0.9
-"""Of two explanations, one that leaves less than this share of what the other leaves. Of simulated
-joints whose rest did not tell it left 0.08 to 0.80 of a modulus, and 1.9 to 58 times as much of a
-loaded current."""
+UNSIGNED_LEAVES, SIGNED_LEAVES = 0.9, 1.5
+"""What the speed's growth leaves of the squares that the acceleration leaves: below and above.
+
+Of simulated joints whose rest did not tell 0.08 to 0.80 of a modulus and 1.9 to 58 of a loaded
+current; of the ball screw's, a modulus of hardly any inertia, up to 1.15.
+"""
 
 EXACT = 1e-9
 """Of the current's square: what is left is rounding."""
@@ -326,9 +328,9 @@ def _grows_with_the_speed(
     signed, growing = left(acceleration), left(acceleration * along)
     if max(signed, growing) < EXACT * float(x[way] @ x[way]):
         return None
-    if min(signed, growing) > CLEAR_SHARE * max(signed, growing):
-        return None
-    return growing < signed
+    if growing < UNSIGNED_LEAVES * signed:
+        return True
+    return False if growing > SIGNED_LEAVES * signed else None
 
 
 def signed_by_speed(
