@@ -342,17 +342,20 @@ def scales_of(joints: Iterable[Joint]) -> dict[Voice, float]:
     session is the target's.
     """
     each: dict[Voice, list[FloatArray]] = {}
-    expected: dict[Voice, Spread] = {}
+    expected: dict[Voice, list[Spread]] = {}
     for joint in joints:
         for voice in joint.voices:
             each.setdefault(voice, []).append(joint.distances[voice].each)
-            expected[voice] = joint.expected(voice)
+            expected.setdefault(voice, []).append(joint.expected(voice))
     scales = {}
     for voice, own in each.items():
         deviations = [np.median(np.abs(one - np.median(one))) for one in own]
         dof = MAD_EFFICIENCY * sum(len(one) for one in own)
         variance = (MAD_TO_SIGMA * float(np.median(deviations))) ** 2
-        scales[voice] = moderated_spread(variance, dof, expected[voice]).scale
+        usual = Spread(
+            float(np.median([one.scale for one in expected[voice]])), expected[voice][0].dof
+        )
+        scales[voice] = moderated_spread(variance, dof, usual).scale
     return scales
 
 

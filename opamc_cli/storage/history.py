@@ -460,6 +460,12 @@ class History:
         """Record a robot's night, in the place of what was known of it."""
         with self.transaction():
             place = (night.robot, night.night)
+            # another reason than the one that was told is news
+            self._db.execute(
+                "DELETE FROM told WHERE kind = 'failed' AND robot = ? AND time = ? AND EXISTS "
+                "(SELECT * FROM night WHERE robot = ? AND night = ? AND why <> ?)",
+                (*place, *place, night.why),
+            )
             for table in ("verdict", "measure"):
                 self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND night = ?", place)
             self._put("night", [night])

@@ -8,6 +8,7 @@ import pytest
 
 from opamc_cli.__main__ import main
 from opamc_cli.errors import ExitCode
+from opamc_cli.signal.motion.reported import lacks_sign, velocity_from_position
 from opamc_cli.storage.runs import RunInfo, save_run
 
 ROOT = Path(__file__).parents[2]
@@ -78,6 +79,16 @@ def screw(tmp_path_factory):
             info = RunInfo(sampling_rate_hz=25.0, program="strokes")
             save_run(out / state / f"{file.stem}.parquet", info, columns)
     return out
+
+
+def test_no_screws_current_is_taken_for_a_signed_one():
+    """A stepper's hardly shows its inertia, and what it shows is noise."""
+    if not SCREW.is_dir():
+        pytest.skip(f"no measured recordings at {SCREW}")
+    for file in sorted(SCREW.glob("*/*.csv")):
+        table = np.genfromtxt(file, delimiter=",", names=True)
+        velocity = velocity_from_position(0.02 * table["position_mm"], 25.0)
+        assert lacks_sign(table["current_a"], velocity), file.parent.name
 
 
 def sides(baseline, target):

@@ -136,6 +136,24 @@ def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):
     assert "xis 2 not judged" in ended.out
 
 
+def test_one_recording_of_another_program_is_not_the_reference_of_all_others(
+    opamc, tmp_path, monkeypatch
+):
+    """It repeats its own cycle more often than the others do theirs."""
+    for seed in range(4):
+        record(tmp_path / "baseline" / f"{seed}.parquet", seed)
+    target = record(tmp_path / "tonight.parquet", 9)
+    another = {axis: ((30.0 + axis, 0.7, 1), (60.0, 0.5, 1)) for axis in (1, 2)}
+    monkeypatch.setattr(recordings, "MOTIONS", another)
+    stray = tmp_path / "baseline" / "stray.parquet"
+    record(stray, 3, made=lambda seed: recordings.columns(seed, cycles=8), robot="R2")
+    ended = diagnose(opamc, tmp_path / "baseline", target, tmp_path / "out")
+    assert ended.code == ExitCode.PARTIAL, ended.err
+    assert "Axes 1 and 2 healthy" in ended.out
+    assert "robot differs: 0 has 'R1', stray 'R2'" in ended.err
+    assert f"{stray}: all" in ended.err
+
+
 # -- what a drive reports ----------------------------------------------------------------------
 
 

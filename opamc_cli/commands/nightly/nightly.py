@@ -112,7 +112,7 @@ def run(
         if wanted == stage.Wanted():
             today = datetime.now(UTC).date()
             untold += history.untold([*silent(history, today), *ahead(history, today)])
-        morning = tell(summary, untold, outcome, loaded.out)
+        morning = tell(summary, untold, outcome, loaded.out, cell)
         if outcome.ended:
             output.failure(outcome.ended)
         page = loaded.out / files.PAGE

@@ -134,6 +134,31 @@ def influences(blocks: Sequence[Block], sessions: NDArray[np.int64]) -> float:
     return max(1.0, float(np.trace(total)) ** 2 / square) if square > 0 else 1.0
 
 
+def noise_share(blocks: Sequence[Block], n_baseline: int) -> float:
+    """Share of the baseline sessions' variance that the scatter of their cycles explains.
+
+    Parameters
+    ----------
+    blocks : sequence of Block
+        All motions of one axis.
+    n_baseline : int
+        Number of baseline sessions, which come first.
+
+    Returns
+    -------
+    float
+        Mean over the motions, 1 at most, and 1 if no session has two cycles.
+    """
+    everyone = np.ones((1, n_baseline), dtype=bool)
+    shares = []
+    for block in blocks:
+        own, weight = block.sessions[:n_baseline], block.weight[:n_baseline]
+        if np.isfinite(own).all() and (weight > 0).all():
+            variance, noise = _variances(block, own - own.mean(axis=0), weight, everyone)
+            shares.append((noise * _mean_inverse(weight, everyone)).mean() / variance.mean())
+    return float(np.fmin(np.mean(shares), 1.0)) if shares else 1.0
+
+
 def _variances(
     block: Block, x: FloatArray, weight: FloatArray, healthy: BoolArray
 ) -> tuple[FloatArray, FloatArray]:

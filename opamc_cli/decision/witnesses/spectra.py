@@ -3,13 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.significance.spread import Spread
-from opamc_cli.decision.witnesses.departure import Block
+from opamc_cli.decision.witnesses.departure import Block, noise_share
 from opamc_cli.decision.witnesses.deviation import change_between, clearest_of
 from opamc_cli.decision.witnesses.evidence import Kind
 
@@ -17,6 +18,18 @@ FloatArray = NDArray[np.float64]
 
 LEAST_VARIANCE = 1e-6
 """Of a log power: sessions that agree to a thousandth of the power agree."""
+
+INFLUENCED_SPREAD = 0.3
+"""Expected spread of a healthy session's log distance if cycles have no noise.
+
+A few influences move all parts at once, so that their sum varies; that of many noisy parts hardly
+does. Where noise is 0.98, 0.97, 0.43 and 0.16 of the sessions' variance (closed loop, fleets,
+nights of four and of sixteen files) it is 0.09, 0.07, 0.27 and 0.38; not all of that is taken,
+since four sessions' worth of it is blended with the joint's own: healthy nights alarm in 1 % then.
+"""
+
+PARTS_IN_ONE = 3.0
+"""Parts that are worth an independent one, as frames overlap: 2.5 to 5 where noise is all."""
 
 
 @dataclass(frozen=True)
@@ -49,13 +62,18 @@ class SpectrumEvidence:
     n_baseline: int
     """Number of baseline sessions."""
     kinds: ClassVar[Sequence[Kind]] = ("orthogonal",)
-    healthy_spread: ClassVar[Spread] = Spread(0.15, 4.0)
-    """0.06, 0.10, 0.22 and, of nights of sixteen files, 0.33 in the middle of joints of three
-    simulators: worth four degrees of freedom only."""
     weight: ClassVar[float] = 5.0
     """It finds damage of the teeth long before the others do: see docs/decision.md."""
     tells_conditions: ClassVar[bool] = False
     depends_on_conditions: ClassVar[bool] = False
+
+    @cached_property
+    def healthy_spread(self) -> Spread:
+        """Expected spread of a healthy session's log distance beyond: the more, the less noise."""
+        blocks = self.blocks()
+        influenced = INFLUENCED_SPREAD * (1 - noise_share(blocks, self.n_baseline))
+        n_parts = max(sum(block.sessions.shape[1] for block in blocks), 1)
+        return Spread(math.hypot(influenced, math.sqrt(2 * PARTS_IN_ONE / n_parts)), 4.0)
 
     def blocks(self) -> list[Block]:
         """Return the log powers of each motion's frames and bins."""

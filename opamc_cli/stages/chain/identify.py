@@ -259,7 +259,11 @@ def _own_references(
     config: IdentifyConfig,
     reference_run: str | None,
 ) -> dict[int, _Reference]:
-    """Find the reference cycle of each axis: in a run that repeats it most and others hold."""
+    """Find the reference cycle of each axis: most runs hold it, and its own repeats it most.
+
+    What most runs hold comes first: one recording of another program or robot that repeats more
+    often would leave all others without a motion.
+    """
     if reference_run is not None and all(p.source.name != reference_run for p in parts):
         names = ", ".join(sorted({p.source.name for p in parts}))
         msg = f"{path}: has no run {reference_run!r} to take the reference from; it has {names}"
@@ -268,7 +272,7 @@ def _own_references(
         axis: _executions([part for part in parts if part.axis == axis], rule)
         for axis in {part.axis for part in parts}
     }
-    best: dict[int, tuple[tuple[int, int], _Reference]] = {}
+    best: dict[int, tuple[tuple[bool, int, int], _Reference]] = {}
     for part in parts:
         if reference_run not in (None, part.source.name):
             continue
@@ -289,9 +293,10 @@ def _own_references(
             start, stop, cycle, count = 0, len(features), features, 1
         # one recording may be odd, or show nothing twice: others tell whether it is the program
         others = [p for p in parts if p.axis == part.axis][:MOST_HELD]
-        if part.axis in best and (count, len(others)) <= best[part.axis][0]:
+        if part.axis in best and (True, count, len(others)) <= best[part.axis][0]:
             continue
-        worth = count, sum(_holds(other, cycle, rule) for other in others)
+        holders = sum(_holds(other, cycle, rule) for other in others)
+        worth = 2 * holders > len(others), count, holders
         if part.axis not in best or worth > best[part.axis][0]:
             spans = tuple(_span(part.rows, i) for i in usable[start:stop].tolist())
             best[part.axis] = (

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
@@ -174,9 +175,9 @@ def _alarm(
     events = [Event(first["night"], robot, axis, "alarm", f"{name}: {text}")]
     nights = [row["night"] for row in rows[found.raised : last]]
     events += [
-        Event(night, robot, axis, "reminder", f"{name}: alarm since {since}; {text}")
-        for night in _reminders(nights, rule.remind_after)
-        if known is None or night < known.night
+        Event(nights[index], robot, axis, "reminder", f"{name}: alarm since {since}; {text}")
+        for index in _said(nights, [""] * len(nights), rule.remind_after)[1:]
+        if known is None or nights[index] < known.night
     ]
     if found.cleared is not None:
         events.append(
@@ -242,33 +243,60 @@ def _not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int)
             if last is not rows[-1]:  # it was judged again
                 span = f"from {first['night']} to {last['night']}"
                 span = first["night"] if first is last else span
-            text = f"{name}: not judged {span}: {last['reason']}"
-            for night in _said(streak, remind_after):
-                yield Event(night, first["robot"], first["axis"], "not-judged", text)
+            nights, reasons = ([row[of] for row in streak] for of in ("night", "reason"))
+            for index, _, why in _told(nights, reasons, remind_after):
+                text = f"{name}: not judged {span}: {why}"
+                yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 
 
 def _failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterator[Event]:
-    for failing, part in groupby(nights, key=lambda row: bool(row.why)):
+    for row in nights:
+        if row.why and not row.night:  # files that do not say of which night they are
+            yield Event("", robot, None, "failed", row.why)
+    dated = [row for row in nights if row.night]
+    for failing, part in groupby(dated, key=lambda row: bool(row.why)):
         streak = list(part)
         if failing:
-            since = "" if len(streak) == 1 else f" ({len(streak)} nights in a row)"
-            text = f"{streak[-1].night}{since}: {streak[-1].why}"
-            for night in _said([{"night": row.night} for row in streak], remind_after):
-                yield Event(night, robot, None, "failed", text)
+            dates, reasons = [row.night for row in streak], [row.why for row in streak]
+            for index, last, why in _told(dates, reasons, remind_after):
+                since = f" ({last + 1} nights in a row)" if last else ""
+                text = f"{dates[last]}{since}: {why}"
+                yield Event(dates[index], robot, None, "failed", text)
 
 
-def _said(streak: Sequence[Mapping[str, Any]], remind_after: int) -> list[str]:
-    nights = [row["night"] for row in streak]
-    return [nights[0], *_reminders(nights, remind_after)]
+def _told(
+    nights: Sequence[str], reasons: Sequence[str], remind_after: int
+) -> Iterator[tuple[int, int, str]]:
+    """Yield when something that lasts is said, the last night that this covers, and why."""
+    said = _said(nights, reasons, remind_after)
+    for index, after in zip(said, [*said[1:], len(nights)], strict=True):
+        last, why = after - 1, reasons[after - 1]
+        if not _kinds(reasons[index]) <= _kinds(why):
+            why += f"; {nights[index]}: {reasons[index]}"
+        yield index, last, why
 
 
-def _reminders(nights: Sequence[str], remind_after: int) -> list[str]:
-    """Return the nights in which something that began with the first is said again."""
-    said = [nights[0]]
-    for night in nights[1:]:
-        if _day(night) - _day(said[-1]) >= remind_after:
-            said.append(night)
-    return said[1:]
+def _said(nights: Sequence[str], reasons: Sequence[str], remind_after: int) -> list[int]:
+    """Return in which of the nights that something lasts it is said.
+
+    In the first, in those with a reason that was not said yet, and after some nights again.
+    """
+    said: list[int] = []
+    known: set[str] = set()
+    for index, (night, reason) in enumerate(zip(nights, reasons, strict=True)):
+        new = _kinds(reason) - known
+        if new or _day(night) - _day(nights[said[-1]]) >= remind_after:
+            said.append(index)
+        known |= new
+    return said
+
+
+def _kinds(reason: str) -> set[str]:
+    """Return a reason's sentences without what differs from night to night: paths and numbers."""
+    return {
+        " ".join(word for word in one.split() if not re.search(r"[\d/]", word))
+        for one in reason.split("; ")
+    }
 
 
 def _day(night: str) -> int:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from opamc_cli.errors import ExitCode
@@ -43,14 +44,17 @@ def ahead(history: History, today: date) -> Iterator[Event]:
     """Say of robots whose last night is still to come: it hides that they have no new one."""
     last: dict[str, str] = {}
     for robot, night in history.nights():
-        last[robot] = max(night, last.get(robot, ""))
+        if night:  # files that cannot be read may tell none
+            last[robot] = max(night, last.get(robot, ""))
     for robot, night in sorted(last.items()):
         if date.fromisoformat(night) > today + timedelta(1):
             text = f"{night} lies in the future; check the clocks of the logger and of this machine"
             yield Event(night, robot, None, "ahead", text)
 
 
-def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: Path) -> Morning:
+def tell(
+    summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: Path, cell: Path
+) -> Morning:
     """Say what a start has found that nobody was told of yet.
 
     Parameters
@@ -63,6 +67,8 @@ def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: P
         What the start did.
     out
         Folder of the results, for paths.
+    cell
+        The cell's file, for what can be done about an alarm.
     """
     names = {robot.name for robot in summary.robots}
     news = [event for event in untold if event.robot in names or event.kind == "silent"]
@@ -72,7 +78,7 @@ def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: P
         fresh = {e.axis for e in news if e.robot == robot.name and e.kind in ("alarm", "reminder")}
         for joint in robot.alarms:
             if joint.axis in fresh:
-                lines += _alarm_lines(robot, joint, out)
+                lines += _alarm_lines(robot, joint, out, cell)
     standing = {(r.name, joint.axis) for r in summary.robots for joint in r.joints if joint.alarm}
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER and not (
@@ -86,16 +92,16 @@ def tell(summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: P
     return Morning(tuple(lines), _values(summary, outcome), code)
 
 
-def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path) -> Iterator[str]:
+def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path, cell: Path) -> Iterator[str]:
     alarm = joint.alarm
     assert alarm is not None
     program = f", program {joint.program}" if robot.several_programs else ""
     yield f"{robot.name} axis {joint.axis}{program}: ALARM, not as it was since {alarm.since}"
-    yield f"  {alarm.text}"
+    yield f"  {robot.text_of(joint)}"
     where = out / joint.report if joint.report else out / files.PAGE
     yield (
-        f"  see {where}; silence it with: opamc nightly acknowledge {robot.name} "
-        f"--axis {joint.axis} --why TEXT"
+        f"  see {where}; silence it with: opamc nightly acknowledge {quote(robot.name)} "
+        f"--axis {joint.axis} --why TEXT --cell {quote(str(cell))}"
     )
 
 
@@ -120,7 +126,7 @@ def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
                     "axis": joint.axis,
                     "program": joint.program,
                     "since": joint.since,
-                    "text": joint.alarm.text,
+                    "text": robot.text_of(joint),
                     "acknowledged": joint.alarm.acknowledged,
                 }
                 for joint in robot.joints

@@ -10,6 +10,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings.sessions import night_of
 from opamc_cli.storage.history import FileRow, History
 from opamc_cli.storage.logs import Facts, LogFile, fetch, find_logs, read_facts
+from opamc_cli.storage.schemas import files
 
 REMEMBER_EVERY = 50
 """Files that are read between two writes to the history: what a kill costs."""
@@ -119,6 +120,9 @@ class _Reader:
         self._cell = cell
 
     def read(self, log: LogFile) -> Recording:
+        if not _is_free(log.robot):
+            taken = f"a robot cannot be called {log.robot}: so is a file of the results; rename it"
+            return Recording(log, log.night or "", "", Facts(error=taken))
         row = self._known.get(log.path)
         if row is None or (row.size, row.mtime_ns) != (log.size, log.mtime_ns):
             try:
@@ -151,6 +155,13 @@ class _Reader:
             config = self._cell.diagnosis_of(robot, "cell")
             self._day_starts[robot] = config.score.day_starts_at
         return self._day_starts[robot]
+
+
+def _is_free(robot: str) -> bool:
+    """Whether a folder of a robot's results may have its name."""
+    # disks that do not tell capitals apart would take one for the other
+    name = robot.casefold()
+    return not name.startswith((".", files.HISTORY)) and name not in (files.PAGE, files.METRICS)
 
 
 def some(names: Sequence[str], most: int = 8) -> str:

@@ -310,11 +310,12 @@ def _record_unjudged(
     cell: CellConfig, history: History, night: PlannedNight, outcome: CellOutcome
 ) -> None:
     """Record a night that has nothing to be compared with, or no recording that can be used."""
-    why = "; ".join(
-        [*(one.facts.error for one in night.broken), *(one.missing for one in night.comparisons)]
-    ).strip("; ")
+    reasons = [one.facts.error for one in night.broken]
+    reasons += [one.missing for one in night.comparisons]
+    why = "; ".join(dict.fromkeys(filter(None, reasons)))
     status = "baseline" if night.in_baseline else "failed"
-    remove_folder(cell.out / night.robot / night.night, of=OF_NIGHT)
+    if night.night:  # else it would be the folder of all nights
+        remove_folder(cell.out / night.robot / night.night, of=OF_NIGHT)
     row = NightRow(night.robot, night.night, night.key, status, 0, why, as_notes(night.notes))
     history.record_night(row)
     _note(outcome, row)

@@ -89,6 +89,21 @@ class RobotSummary:
         found = [joint for joint in self.joints if joint.shown == "alarm"]
         return sorted(found, key=_worst_first)
 
+    def text_of(self, joint: JointSummary) -> str:
+        """Return what is said of a joint's alarm: a joint at fault shakes the others."""
+        assert joint.alarm is not None
+        more = [
+            one
+            for one in self.joints
+            if one.alarm
+            and (one.program, one.night) == (joint.program, joint.night)
+            and (one.health_index or 0.0) > (joint.health_index or 0.0)
+        ]
+        if not more:
+            return joint.alarm.text
+        worst = max(more, key=lambda one: one.health_index or 0.0)
+        return f"{joint.alarm.text}; axis {worst.axis} changed more that night, look there first"
+
     @property
     def shown(self) -> str:
         """The worst of its joints, or what became of its last night."""

@@ -237,3 +237,35 @@ def test_a_long_series_is_probed_in_four_places(monkeypatch):
     places = [*range(10), *range(30, 40), *range(60, 70), *range(90, 100)]
     assert _probe(np.arange(100.0)).tolist() == places
     assert _probe(np.arange(40.0)).tolist() == list(range(40))
+
+
+def held_joint(inertia=0.5):
+    """Speed and current of a joint that its loop holds at rest against its own friction."""
+    ramp, held = np.linspace(0, 1, 50), np.ones(100)
+    one_way = np.concatenate([ramp, held, ramp[::-1]])
+    still = np.zeros(80)
+    v = np.concatenate([still, one_way, still, -one_way, still])
+    friction = np.sign(v)
+    last = np.cumsum(v != 0) > 0
+    friction[last & (v == 0)] = 1.05
+    return v, friction + 0.1 * v + 50 * inertia * np.gradient(v)
+
+
+def test_a_modulus_is_told_where_the_joint_is_held_at_rest_by_its_friction():
+    v, current = held_joint()
+    assert lacks_sign(np.abs(current), v) is True
+    assert lacks_sign(-np.abs(current), v) is True
+    assert lacks_sign(current, v) is False
+    for load in (4.0, -4.0):
+        assert lacks_sign(current + load, v) is False
+    moving = v != 0
+    assert lacks_sign(np.abs(current[moving]), v[moving]) is True
+
+
+def test_an_overshoot_of_resampling_is_no_sign():
+    v, current = held_joint()
+    size = np.abs(current)
+    size[7] = -0.002 * size.max()
+    assert lacks_sign(size, v) is True
+    size[7] = -0.02 * size.max()
+    assert lacks_sign(size, v) is False

@@ -2,6 +2,8 @@
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms import settle_robot
+from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
+from opamc_cli.storage.history import AlarmRow, NightRow
 
 
 def said(*states):
@@ -34,3 +36,41 @@ def test_a_joint_that_was_judged_again_is_not_said_to_be_unjudged_since():
         "axis 2: not judged from 2026-03-01 to 2026-03-02: no motion",
         "axis 2: not judged since 2026-03-04: no motion",
     ]
+
+
+def failures(*reasons):
+    """Return when and how it is said of a robot that its nights failed for these reasons."""
+    nights = [
+        NightRow("r1", f"2026-03-{day:02d}", "", "failed", 0, why)
+        for day, why in enumerate(reasons, start=1)
+    ]
+    events = settle_robot("r1", (), nights, (), AlarmConfig(), 0.4, 6).events
+    return [(one.time[-2:], one.text) for one in events]
+
+
+def test_a_new_reason_is_said_and_an_old_one_is_not_said_again():
+    slow, odd = "took longer than 5 s (limits.seconds)", "logs/{}/a.parquet: cannot be opened"
+    assert failures(slow, slow) == [("01", f"2026-03-02 (2 nights in a row): {slow}")]
+    assert failures(slow, odd.format(2), odd.format(3), slow) == [
+        ("01", f"2026-03-01: {slow}"),
+        ("02", f"2026-03-04 (4 nights in a row): {slow}; 2026-03-02: {odd.format(2)}"),
+    ]
+    both = f"{odd.format(1)}; {slow}"
+    assert [day for day, _ in failures(odd.format(1), both, slow)] == ["01", "02"]
+    assert [day for day, _ in failures(*[slow] * 9)] == ["01", "08"]
+
+
+def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():
+    alarm = AlarmRow("r1", "", 0, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
+    joints = [
+        JointSummary(axis, "", state, night, "", index, alarm)
+        for axis, state, night, index in (
+            (1, "fault", "2026-03-02", 3.0),
+            (2, "fault", "2026-03-02", 5.0),
+            (3, "insufficient-data", "2026-03-02", None),
+            (4, "fault", "2026-03-01", 1.0),
+        )
+    ]
+    robot = RobotSummary("r1", tuple(joints), None)
+    first = "at fault; axis 2 changed more that night, look there first"
+    assert [robot.text_of(joint) for joint in joints] == [first, "at fault", first, "at fault"]

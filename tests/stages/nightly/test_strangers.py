@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import sqlite3
+from dataclasses import replace
 from datetime import date, timedelta
 
 import pytest
@@ -13,7 +14,7 @@ from opamc_cli.commands.nightly.claim import claim
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode, UsageError
 from opamc_cli.stages.nightly.morning import ahead
-from opamc_cli.storage.history import History, NightRow
+from opamc_cli.storage.history import Event, History, NightRow
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
 
@@ -170,3 +171,51 @@ def test_a_night_to_come_is_said(tmp_path):
         (event,) = ahead(history, today)
     assert (event.robot, event.axis) == ("r2", None)
     assert "lies in the future; check the clocks" in event.text
+
+
+def test_a_robot_called_as_a_file_of_the_results_is_its_own_line(small, opamc):
+    logs = small.parent / "logs"
+    names = ("index.html", "Metrics.prom", "history.sqlite-wal")
+    for name in names:
+        shutil.copytree(logs / "r1", logs / name)
+    ended = opamc("nightly", small, "--json")
+    assert ended.code == ExitCode.PARTIAL
+    robots = json.loads(ended.out)["robots"]
+    assert robots["r1"]["done"] == [night(0), night(1), night(2)]
+    for name in names:
+        assert {one["night"] for one in robots[name]["failed"]} == {night(0), night(1), night(2)}
+        assert f"cannot be called {name}" in robots[name]["failed"][0]["why"]
+    assert "r1" in (small.parent / "nightly" / "index.html").read_text()
+
+
+def test_a_file_that_tells_no_night_costs_no_report(small, opamc):
+    logs = small.parent / "logs"
+    for place in sorted((logs / "r1").glob("*/*.parquet")):
+        place.rename(logs / "r1" / f"{place.parent.name}.parquet")
+    small.write_text(small.read_text().replace("{night}/", "").replace("nights: 3", "nights: 2"))
+    opamc("nightly", small)
+    report = small.parent / "nightly" / "r1" / night(2) / "report.html"
+    assert report.is_file()
+    (logs / "r2").mkdir()
+    for robot in ("r1", "r2"):
+        (logs / robot / "a.parquet").write_text("x")
+    first, second = opamc("nightly", small, "--quiet"), opamc("nightly", small, "--quiet")
+    assert report.is_file()
+    assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
+    assert f"r1 {logs / 'r1' / 'a.parquet'}: cannot be opened" in first.out
+    assert f"r2 {logs / 'r2' / 'a.parquet'}: cannot be opened" in first.out
+    assert second.out == ""
+    (logs / "r2" / "b.parquet").write_text("x")
+    assert "b.parquet: cannot be opened" in opamc("nightly", small, "--quiet").out
+
+
+def test_a_night_that_fails_for_another_reason_is_told_anew(tmp_path):
+    failed = NightRow("r1", night(0), KEY, "broken", 1, "took longer than 5 s (limits.seconds)")
+    told = [Event(night(0), "r1", None, "failed", "")]
+    with History(tmp_path / "history.sqlite") as history:
+        history.record_night(failed)
+        history.tell(told)
+        history.record_night(replace(failed, attempts=2))
+        assert history.untold(told) == []
+        history.record_night(replace(failed, status="failed", why="cannot be opened"))
+        assert history.untold(told) == told

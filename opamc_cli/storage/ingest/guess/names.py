@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.storage.ingest.map.axes import has_placeholder
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torque
 from opamc_cli.storage.ingest.source import Listed, Name
 from opamc_cli.storage.schemas.channels import LOGGED
 
@@ -41,6 +41,10 @@ ELSEWHERE = (
 PHASES = {"a": "a", "b": "b", "c": "c", "u": "a", "v": "b", "w": "c"}
 PHASE_NAME = re.compile(r"(?:^|.*[^a-z])(?:i|ia|cur|current|phase|ph|is)[ _.\-]?([abcuvw])$", re.I)
 """Such as `I_u`, `phase_b`, `axis1_current_c`, once the axis' number is taken out."""
+
+
+TOLD_BY_UNIT = ("current", *LOGGED)
+"""Quantities that a unit tells where the name does not; a second may be of anything."""
 
 
 UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
@@ -86,7 +90,7 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
         bare, unit = _without_unit(name)
         unit = channel.unit or unit
         if channel.width is not None:
-            quantity = _quantity(bare)
+            quantity = _quantity(bare, unit)
             if quantity and quantity != "time":
                 found += [
                     Meant(quantity, k, name, name, k, _is_measured(name), unit)
@@ -94,7 +98,7 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
                 ]
             continue
         number, pattern = _numbered(name) if counted else (None, name)
-        quantity = "time" if channel.dates else _quantity(_without_unit(pattern)[0])
+        quantity = "time" if channel.dates else _quantity(_without_unit(pattern)[0], unit)
         if quantity is None or has_placeholder(name):
             continue
         measured = _is_measured(pattern)
@@ -114,7 +118,8 @@ def _without_unit(name: str) -> tuple[str, str | None]:
     return (name[: found.start()], found[1]) if found is not None and known else (name, None)
 
 
-def _quantity(pattern: str) -> str | None:
+def _quantity(pattern: str, unit: str | None) -> str | None:
+    """Return what a name means; where it has no word for it, what its unit is one of."""
     words = _words(pattern)
     if any(word in ELSEWHERE for word in words):
         return None
@@ -125,7 +130,9 @@ def _quantity(pattern: str) -> str | None:
     for quantity, known in WORDS.items():
         if any(word in known for word in words):
             return quantity
-    return None
+    if unit is None or is_torque(unit):
+        return None  # a torque may be of anything
+    return next((each for each in TOLD_BY_UNIT if conversion(unit, each)), None)
 
 
 def _is_measured(pattern: str) -> bool:

@@ -7,10 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from opamc_cli.storage.ingest.map.units import conversion
+
 Float = npt.NDArray[np.float64]
 
-LARGEST_RAD = 4 * math.pi
-"""A joint that turns further than two turns either way is counted in degrees."""
+MOST_TURNS = 2
+"""Hardly any joint turns further either way."""
+
+LARGEST_RAD = 2 * math.pi * MOST_TURNS
+"""What goes further is counted in degrees."""
 
 LARGEST_A = 60.0
 """No joint motor of an arm draws more; what is larger is counted in milliampere."""
@@ -95,6 +100,18 @@ def wraps(positions: Mapping[int, Float], unit: str) -> bool:
     turn = 360.0 if unit == "deg" else 2 * math.pi
     steps = [np.abs(np.diff(v[np.isfinite(v)])) for v in positions.values()]
     return any(bool(((s > 0.75 * turn) & (s < 1.05 * turn)).any()) for s in steps)
+
+
+def turns(largest: float, unit: str) -> float:
+    """Return how many turns a position holds.
+
+    Examples
+    --------
+    >>> turns(5440, "deg") > 15
+    True
+    """
+    known = conversion(unit, "position")
+    return largest * known.factor / (2 * math.pi) if known else 0.0
 
 
 def time_unit(stamps: Float) -> Guess | None:

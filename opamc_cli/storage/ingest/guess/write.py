@@ -15,6 +15,7 @@ from opamc_cli.storage.ingest.guess.channels import Choice, choose, time_channel
 from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
 from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.guess.values import (
+    MOST_TURNS,
     Float,
     Guess,
     angle_units,
@@ -22,6 +23,7 @@ from opamc_cli.storage.ingest.guess.values import (
     current_unit,
     rate_from_speed,
     time_unit,
+    turns,
     wraps,
 )
 from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
@@ -281,6 +283,9 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
         if declared and _fits(declared, kind):
             guess = Guess(declared, f"as the file says; largest {largest:.3g}")
         why = guess.why
+        if kind == "position" and turns(largest, guess.unit) > MOST_TURNS:
+            count = turns(largest, guess.unit)
+            why += f": {count:.3g} turns; a motor's needs scale: 1 / gear ratio"
         if choice.passed_over:
             why += f"; not {', '.join(choice.passed_over[:3])}"
         extra = ", unwrap: true" if kind == "position" and wraps(positions, guess.unit) else ""

@@ -174,3 +174,12 @@ def test_three_columns_without_names_are_phases_if_they_behave_so(tmp_path):
 def test_positions_without_a_current_are_answered_with_what_is_there(tmp_path):
     with pytest.raises(InputError, match=r"no channel looks like a motor current .*q_#.*by hand"):
         guess_map([table(tmp_path / "a.csv", {"t": T, "q_1": SPEED, "q_2": SPEED})])
+
+
+@pytest.mark.parametrize(("scale", "said"), [(700, False), (725, True), (5440, True)])
+def test_a_position_of_many_turns_is_said_to_be_the_motors(tmp_path, scale, said):
+    columns = {"t": T, "A1.I_eff [A]": SPEED, "A1.phi_mot [deg]": scale * ANGLE}
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns, separator=";"))
+    (line,) = [line for line in lines if line.startswith("axis1_position")]
+    assert line.endswith(" turns; a motor's needs scale: 1 / gear ratio") is said
+    assert "unit: deg" in line

@@ -88,3 +88,15 @@ def test_a_unit_in_brackets_at_the_end_of_a_name_is_its_unit_and_no_word_of_it()
         ("time", None, "ms"),
     ]
     assert only("current [1]").unit is None
+
+
+def test_a_name_without_a_word_means_what_its_unit_is_one_of():
+    found = [only(n) for n in ("A1.I_eff [A]", "A1 Ieff (mA)", "J2 Winkel [deg]", "n_3 [rpm]")]
+    assert [(each.quantity, each.number) for each in found] == [
+        ("current", 1),
+        ("current", 1),
+        ("position", 2),
+        ("velocity", 3),
+    ]
+    # neither a torque nor a time is told by its unit: it may be of anything
+    assert meanings([Listed("M_1 [Nm]"), Listed("x_1 [s]"), Listed("tool 1 [A]")]) == []
