@@ -91,8 +91,9 @@ def with_model(compared: Compared, population: Population) -> Compared:
     """Put the load and the current of the baseline's mean model on both grids."""
     dataset, terms = compared.dataset, population.terms
     blocks = [dataset.columns(term, True) for term in terms]
-    parts = np.split(population.mean, np.cumsum([block.shape[1] for block in blocks])[:-1])
-    _, model, load = currents(terms, blocks, parts, compared.track.size)
+    own = np.split(population.mean, np.cumsum([block.shape[1] for block in blocks])[:-1])
+    parts = (block @ values for block, values in zip(blocks, own, strict=True))
+    _, model, load = currents(terms, parts, compared.track.size)
     return replace(compared, dataset=dataset.with_model(load, model, terms))
 
 

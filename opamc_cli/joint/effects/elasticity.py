@@ -54,6 +54,4 @@ class Elasticity(Effect):
 
 def _highest(track: Track) -> float:
     """Highest resonance that a grid shows, in hertz."""
-    if track.full is None:
-        return min(60.0, track.rate_hz / 3)
-    return min(60.0, 0.45 * track.rate_hz, track.full.rate_hz / 3)
+    return min(60.0, 0.45 * track.rate_hz, (track.full or track).rate_hz / 3)

@@ -47,40 +47,32 @@ def answers(
         places[rows] = np.arange(rows.size)
     count = size if rows is None else rows.size
     found = np.empty((2 * len(signals), count)) if out is None else out
-    edges, last = np.array(bounds), len(signals) - 1
-    for i in range(0, len(signals), 2):
-        # Two at a time take as long as one, of which every sample waits for the one before.
-        j = min(i + 1, last)
-        out_of_both = (found[i], found[j], found[len(signals) + i], found[len(signals) + j])
-        both = (signals[i], signals[j])
-        _put_through(both, edges, poles / poles[0], w * w / poles[0], 1 / w, places, out_of_both)
+    edges = np.array(bounds)
+    for i, signal in enumerate(signals):
+        both = found[i], found[len(signals) + i]
+        _put_through(signal, edges, poles / poles[0], w * w / poles[0], 1 / w, places, *both)
     return found
 
 
 @njit(cache=True)
 def _put_through(
-    signals: tuple[Floats, Floats],
+    signal: Floats,
     bounds: Ints,
     poles: Floats,
     gain: float,
     steeper: float,
     places: Ints,
-    out: tuple[Floats, Floats, Floats, Floats],
+    low: Floats,
+    band: Floats,
 ) -> None:
-    one, other = signals
-    low, low_of_other, band, band_of_other = out
     p1, p2 = poles[1], poles[2]
     for start, stop in bounds:
-        a = b = gain * one[start] / (1.0 + p1 + p2)
-        c = d = gain * other[start] / (1.0 + p1 + p2)
+        a = b = gain * signal[start] / (1.0 + p1 + p2)
         for n in range(start, stop):
-            # All have these poles; their zeros are (1 + 1/z)^2 and 1 - 1/z^2.
-            poled = gain * one[n] - p1 * a - p2 * b
-            poled_other = gain * other[n] - p1 * c - p2 * d
+            # Both have these poles; their zeros are (1 + 1/z)^2 and 1 - 1/z^2.
+            poled = gain * signal[n] - p1 * a - p2 * b
             place = places[n]
             if place >= 0:
                 low[place] = poled + 2.0 * a + b
-                low_of_other[place] = poled_other + 2.0 * c + d
                 band[place] = steeper * (poled - b)
-                band_of_other[place] = steeper * (poled_other - d)
-            a, b, c, d = poled, a, poled_other, c
+            a, b = poled, a

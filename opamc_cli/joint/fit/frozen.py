@@ -65,8 +65,9 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
     circular = not all(term.is_constant for term in terms)
     total = np.zeros(track.size)
     for _ in range(MOST_ROUNDS if circular else 1):
-        before, blocks = total, (term.columns(track) for term in terms)
-        total, model, load = currents(terms, blocks, coefficients, track.size)
+        before, pairs = total, zip(terms, coefficients, strict=True)
+        parts = (term.columns(track) @ values for term, values in pairs)
+        total, model, load = currents(terms, parts, track.size)
         if np.abs(total - before).max() <= SETTLED * max(np.abs(total).max(), 1e-12):
             break
         track = track.with_model(load, model, static_terms(terms))

@@ -34,15 +34,13 @@ class Term:
     parameters: Parameters
     keep: tuple[int, ...] | None = None
 
-    def columns(self, track: Track) -> Floats:
-        """Regressors on the track's grid, shape (n, m)."""
-        columns = self.effect.columns(track, self.parameters)
-        return columns if self.keep is None else columns[:, self.keep]
-
-    def columns_at(self, track: Track, rows: Ints) -> Floats:
-        """Likewise at some samples, shape (rows, m)."""
-        columns = self.effect.columns_at(track, self.parameters, rows)
-        return columns if self.keep is None else columns[:, self.keep]
+    def columns(self, track: Track, rows: Ints | None = None) -> Floats:
+        """Regressors on the track's grid, shape (n, m), or at some of its samples, (rows, m)."""
+        effect, given = self.effect, self.parameters
+        found = (
+            effect.columns(track, given) if rows is None else effect.columns_at(track, given, rows)
+        )
+        return found if self.keep is None else found[:, self.keep]
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -67,6 +65,17 @@ class Grid:
     arrays of shape (n,)."""
     parts: Parts
     """The `fit` samples in parts."""
+    near: Ints
+    """Where anybody asks for fast terms: places of the parts' rows, of sealed ones, and of what a
+    moving average takes into a coarse one, in this order; or of all samples; int array."""
+
+    def spread(self, part: Floats) -> Floats:
+        """Put a term's current, of all samples or of those `near`, on the grid; (n,)."""
+        if part.size == self.track.size:
+            return part
+        whole = np.zeros(self.track.size)
+        whole[self.near] = part
+        return whole
 
 
 @dataclass(frozen=True)
@@ -106,13 +115,19 @@ class Dataset:
         return self.fine.parts, self.coarse.parts
 
     def columns(self, term: Term, fine: bool) -> Floats:
-        """Regressors of a term on one of the grids; fast ones have none on the coarse one."""
-        track = self.grid_of(fine).track
+        """Regressors of a term on one of the grids; of fast ones, at the full rate, those `near`.
+
+        Of the hundred columns of a drive's answer that is a third: they stay in the cache.
+        """
+        grid = self.grid_of(fine)
+        track = grid.track
+        fine = track is self.fine.track
+        rows = grid.near if term.effect.fast and fine else None
         beside = track.static_terms if term.effect.from_terms else ()
         if not all(one.is_constant for one in (beside or (term,))):
-            return term.columns(track)
-        key = term.key, track is self.fine.track, *(one.key for one in beside)
-        return self.cache.columns(key, lambda: term.columns(track))
+            return term.columns(track, rows)
+        key = term.key, fine, *(one.key for one in beside)
+        return self.cache.columns(key, lambda: term.columns(track, rows))
 
     def sums(self, terms: Iterable[Term], fine: bool, *beside: Floats) -> Sums:
         """Products of terms' regressors, and others beside, with one another and the current.
@@ -178,8 +193,11 @@ def grid_of(track: Track, sealed: tuple[int, ...] = (), whole: bool = False) -> 
     fit = member & ~locked
     places = np.flatnonzero(fit)
     groups = np.split(places, np.flatnonzero(np.diff(track.group[places])) + 1)
-    parts = whole_parts(groups) if whole else parts_of(groups, track.clear)
-    return Grid(replace(track, open_samples=fit), fit, member & locked, parts)
+    parts = whole_parts(groups, track.size) if whole else parts_of(groups, track.clear)
+    beside = widened(member, track.kernel.size // 2) & ~fit
+    near = np.concatenate([parts.rows, np.flatnonzero(beside)])
+    near = near if near.size < track.size else np.arange(track.size)
+    return Grid(replace(track, open_samples=fit), fit, member & locked, parts, near)
 
 
 @dataclass(frozen=True)
@@ -205,13 +223,14 @@ class Fit:
         left in the averages of the coarse grid, by which nobody could fit it.
         """
         dataset, track = self.dataset, self.dataset.fine.track
-        fast = np.zeros((track.size, 1))
+        fast = np.zeros(track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
-            fast += dataset.columns(term, True) @ values[:, None] if term.effect.fast else 0.0
+            if term.effect.fast:
+                fast += dataset.fine.spread(dataset.columns(term, True) @ values)
         smooth = averaged(fast, track.bounds, track.kernel)
         fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        return dataset.sums((), False, *slow, fast).less_last(), slow, fast[:, 0]
+        return dataset.sums((), False, *slow, fast[:, None]).less_last(), slow, fast
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -301,8 +320,9 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     # What carried the load may have been taken out again.
     if not follow or not any(term.effect.carries_load for term in terms):
         return dataset
-    rows = np.flatnonzero(dataset.fine.fit)
-    rows = rows[:: max(rows.size // COARSE_SAMPLES, 1)]
+    parts = dataset.fine.parts
+    taken = np.argsort(parts.rows)[:: max(parts.rows.size // COARSE_SAMPLES, 1)]
+    rows = parts.rows[taken]
     blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
     carries, follows = (
@@ -312,7 +332,7 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     carriers = np.concatenate(
         [b for b, t in zip(blocks, terms, strict=True) if t.effect.carries_load], axis=1
     )
-    columns = np.concatenate([block[rows] for block in blocks], axis=1)
+    columns = np.concatenate([parts.taken(block)[taken] for block in blocks], axis=1)
     solution = np.concatenate(fitted.coefficients)
     best, least = track.load_a, np.inf
     for _ in range(MOST_ROUNDS):
@@ -341,7 +361,9 @@ def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     sums = dataset.sums((), True, *blocks)
     solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
-    total, model, load = currents(terms, blocks, coefficients, current.size)
+    pairs = zip(blocks, coefficients, strict=True)
+    parts = (grid.spread(block @ values) for block, values in pairs)
+    total, model, load = currents(terms, parts, current.size)
     dataset = dataset.with_model(load, model, static_terms(terms))
     return Fit(terms, coefficients, dataset, current - total, sums)
 
@@ -352,12 +374,11 @@ def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def currents(
-    terms: Sequence[Term], blocks: Iterable[Floats], coefficients: Sequence[Floats], size: int
+    terms: Sequence[Term], parts: Iterable[Floats], size: int
 ) -> tuple[Floats, Floats, Floats]:
-    """Add up the current of all terms, of the static ones, and of those that carry the load."""
+    """Add up all terms' currents, (n,) each, the static ones', and those of the load."""
     total, model, load = np.zeros(size), np.zeros(size), np.zeros(size)
-    for term, block, values in zip(terms, blocks, coefficients, strict=True):
-        part = block @ values
+    for term, part in zip(terms, parts, strict=True):
         total += part
         if term.effect.static and not term.effect.fast:
             model += part

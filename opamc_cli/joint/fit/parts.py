@@ -35,6 +35,12 @@ class Parts:
     """Unit that each part belongs to; a unit is left out as one; int array of shape (p,)."""
     judged: Bools
     """Parts whose error counts; all are fitted; bool array of shape (p,)."""
+    size: int = 0
+    """Samples of the grid; a block of fewer begins with the parts' rows."""
+
+    def taken(self, block: Floats) -> Floats:
+        """Return the parts' rows of a block."""
+        return block[: self.rows.size] if block.shape[0] < self.size else block[self.rows]
 
     @property
     def units(self) -> int:
@@ -124,14 +130,14 @@ def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
                     unit.append(number)
                     judged.append(kind)
     slices = ranges(piece.size for piece in rows)
-    return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged))
+    return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged), clear.size)
 
 
-def whole_parts(groups: Sequence[Ints]) -> Parts:
-    """Take groups of samples, given by their places, as one part each."""
+def whole_parts(groups: Sequence[Ints], size: int = 0) -> Parts:
+    """Take groups of samples, given by their places among `size`, as one part each."""
     numbers = np.arange(len(groups))
     rows = np.concatenate([np.zeros(0, dtype=np.int64), *groups])
-    return Parts(rows, ranges(map(len, groups)), numbers, numbers >= 0)
+    return Parts(rows, ranges(map(len, groups)), numbers, numbers >= 0, size)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.fit.parts import Parts, Sums
 from opamc_cli.joint.motion.track import Floats
 
-MOST_BYTES = 120e6
+MOST_BYTES = 200e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
 
 
@@ -18,17 +18,14 @@ class RegressorCache:
     """
 
     def __init__(self) -> None:
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything; it is computed again where it is asked for."""
         self._columns: dict[Hashable, Floats] = {}
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
-
-    def clear(self) -> None:
-        """Forget everything; it is computed again where it is asked for."""
-        self._columns.clear()
-        self._taken.clear()
-        self._products.clear()
-        self._currents.clear()
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
@@ -70,7 +67,7 @@ class RegressorCache:
         key = (id(block), fine)
         if key not in self._taken:
             # The block itself is kept beside its rows, so that its identity stays its own.
-            self._taken[key] = (block, block[parts.rows])
+            self._taken[key] = (block, parts.taken(block))
         return self._taken[key][1]
 
     def _bounded(self) -> None:

@@ -49,7 +49,7 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     current = (dataset.grid_of(fine).track.current_a)[parts.rows][:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = term.columns_at(dataset.grid_of(fine).track, parts.rows)
+        columns = term.columns(dataset.grid_of(fine).track, parts.rows)
         alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
     batches = []
     for (width, _), members in alike.items():
@@ -99,8 +99,7 @@ class Beside:
             self.fast_part = fast[self.parts.rows]
         else:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
-            follows = not all(term.is_constant for term in chain.fit.terms)
-            self.sums = dataset.sums((), True, *blocks) if follows else chain.fit.sums
+            self.sums = dataset.sums((), True, *blocks)
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses()
 

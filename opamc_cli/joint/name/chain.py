@@ -117,8 +117,7 @@ class Chain:
 
     def gain_beside_smoothing(self, other: "Chain") -> float:
         """Share of the other's error, where both may make up for the smoothing of the motion."""
-        before, after = other.fit.unsmoothed_error, self.fit.unsmoothed_error
-        return _gain(before, after)[0]
+        return _gain(other.fit.unsmoothed_error, self.fit.unsmoothed_error)[0]
 
 
 def chain_of(fit: Fit, added: int) -> Chain:

@@ -89,7 +89,7 @@ def curve_of(fit: Fit, place: int) -> Curve:
     grid = dataset.sharp
     term, values = fit.terms[place], fit.coefficients[place]
     rows = np.flatnonzero(grid.fit)
-    named = (dataset.columns(term, fine=True) @ values)[rows]
+    named = grid.spread(dataset.columns(term, fine=True) @ values)[rows]
     both = named + fit.residual_a[rows]
     name, unit, resists, values_of = COVARIATES[term.effect.domain]
     track = grid.track

@@ -73,28 +73,12 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
         return None
     if _trial(parent, best, term, pool).why_not is not None:
         passing = [other.chain for other in trials(parent, pool) if other.why_not is None]
-        passing += _passing_without_another(best, place, pool)
         return min(passing, key=lambda chain: chain.score, default=parent)
     if "unnamed" not in pool.without:
         for rival in trials(parent, _rivals_of(term, unnamed)):
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain
     return None
-
-
-def _passing_without_another(best: Chain, place: int, pool: Pool) -> list[Chain]:
-    """Return the chains without another effect, beside which this one passes.
-
-    Of two that are nearly alike, each may turn the other's sign, or a third one's.
-    """
-    found = []
-    for other in range(best.added):
-        if other != place:
-            shorter = without(best, other)
-            own = place - (other < place)
-            trial = _trial(without(shorter, own), shorter, best.terms[place], pool)
-            found += [trial.chain] if trial.why_not is None else []
-    return found
 
 
 def _rivals_of(term: Term, unnamed: Pool) -> Pool:

@@ -32,7 +32,7 @@ def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
     """
     dataset = fit.dataset
     fine, _ = dataset.parts
-    columns = dataset.columns(term, fine=True)[fine.rows]
+    columns = fine.taken(dataset.columns(term, fine=True))
     residual = fit.residual_a[fine.rows][:, None]
     gram = fine.products(columns, columns)
     moment = fine.products(columns, residual)[:, :, 0]

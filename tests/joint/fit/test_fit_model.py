@@ -163,10 +163,26 @@ def test_terms_that_follow_the_model_are_fitted_until_that_settles(monkeypatch):
     assert Following.rounds == model.MOST_ROUNDS
 
 
+def test_fast_terms_are_kept_near_what_anybody_asks_for():
+    recording = joint_of("cyclic", lambda q, v, a, t: np.sin(40 * q), rate=1000.0)
+    fitted = fit_terms(dataset_from(recording), (*rigid(), term("ripple", order=40.0)))
+    dataset, grid = fitted.dataset, fitted.dataset.fine
+    block = dataset.columns(fitted.terms[-1], True)
+    whole = fitted.terms[-1].columns(grid.track)
+    assert block.shape[0] == grid.near.size < grid.track.size
+    np.testing.assert_array_equal(block, whole[grid.near])
+    np.testing.assert_array_equal(grid.parts.taken(block), grid.parts.taken(whole))
+    ripple = whole @ fitted.coefficients[-1]
+    known = grid.fit | grid.sealed
+    spread = grid.spread(block @ fitted.coefficients[-1])
+    np.testing.assert_allclose(spread[known], ripple[known], atol=1e-12)
+    assert grid.spread(ripple) is ripple
+
+
 def test_a_current_is_added_up_by_what_it_is():
-    blocks = [np.full((4, 1), 10.0**k) for k in range(4)]
+    parts = [np.full(4, 10.0**k) for k in range(4)]
     terms = (term("gravity"), term("coulomb"), term("ripple", order=2.0), Term(Following(), {}))
-    total, static, load = currents(terms, blocks, [np.ones(1)] * 4, 4)
+    total, static, load = currents(terms, parts, 4)
     assert (total[0], static[0], load[0]) == (1111.0, 11.0, 1.0)
     assert static_terms(terms) == terms[:2]
 
@@ -187,9 +203,9 @@ def test_fast_terms_are_taken_as_fitted_on_the_coarse_grid():
     dataset, track = fitted.dataset, fitted.dataset.coarse.track
     sums, slow, fast = fitted.coarse_sums
     assert sum(block.shape[1] for block in slow) == sums.moment.shape[1] == 5
-    ripple = dataset.columns(terms[-1], fine=False) @ fitted.coefficients[-1]
-    np.testing.assert_allclose(fast, ripple, atol=1e-12)
+    ripple = terms[-1].columns(track) @ fitted.coefficients[-1]
     rows = dataset.parts[1].rows
+    np.testing.assert_allclose(fast[rows], ripple[rows], atol=1e-12)
     columns, left = np.concatenate(slow, axis=1)[rows], (track.current_a - ripple)[rows]
     np.testing.assert_allclose(sums.moment.sum(axis=0), columns.T @ left)
     assert sums.power.sum() == pytest.approx(left @ left)

@@ -61,7 +61,7 @@ def slow_gain(chain, columns, fine):
             smooth = averaged(term.columns(on), on.bounds, on.kernel)
             current = current - block_mean(smooth, on.bounds, dataset.factor) @ values
         else:
-            blocks.append(dataset.columns(term, fine))
+            blocks.append(term.columns(dataset.grid_of(fine).track))
     base = np.concatenate(blocks, axis=1)[parts.rows]
     both = np.concatenate([base, columns], axis=1)
     target = current[parts.rows]

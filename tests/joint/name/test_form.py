@@ -123,7 +123,7 @@ def drawn(domain, track=TRACK, inside=None):
     term = SimpleNamespace(effect=SimpleNamespace(domain=domain), parameters={"first": 3.0, "b": 9})
     inside = np.ones(SIZE, dtype=bool) if inside is None else inside
     dataset = SimpleNamespace(
-        sharp=SimpleNamespace(fit=inside, track=track),
+        sharp=SimpleNamespace(spread=lambda part: part, fit=inside, track=track),
         columns=lambda term, fine: COLUMN if fine else None,
     )
     fit = SimpleNamespace(

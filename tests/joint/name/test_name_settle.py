@@ -9,8 +9,6 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.name import search
-from opamc_cli.joint.name import settle as settle_module
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.search import Pool, beam, trials
 from opamc_cli.joint.name.settle import settled
@@ -63,24 +61,6 @@ def test_a_name_that_holds_a_part_of_what_a_smooth_function_does_goes(name):
     assert [one.effect.name for one in chain.terms] == ["unnamed_angle"]
     kept, _ = settle(stop, term(name), names=(name,), without=("unnamed",))
     assert [one.effect.name for one in kept.terms] == [name]
-
-
-def test_of_two_that_do_not_go_together_the_better_one_stays(monkeypatch):
-    def both(q, v, a, t):
-        return stribeck(q, v, a, t) + 0.2 * v * np.abs(v)
-
-    def objection(child, parent, pool):
-        names = [one.effect.name for one in child.terms]
-        return "turned" if names[-1] == "stribeck" and "quadratic_friction" in names else None
-
-    for module in (search, settle_module):
-        monkeypatch.setattr(module, "objection", objection)
-    names = ("stribeck", "quadratic_friction")
-    for order in (1, -1):
-        terms = [term("stribeck", **SPEED), term("quadratic_friction")][::order]
-        chain, named = settle(both, *terms, names=names, without=("unnamed",))
-        assert [one.effect.name for one in chain.terms] == ["stribeck"]
-        assert [one.term.effect.name for one in named] == ["stribeck"]
 
 
 def test_of_two_names_for_one_regressor_each_tells_the_other():

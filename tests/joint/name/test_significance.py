@@ -44,7 +44,7 @@ def chain():
 def slow_gains(chain, term, seed):
     """Turn the sign of whole units, and leave each out in turn, by plain least squares."""
     parts = chain.fit.dataset.parts[0]
-    columns = chain.fit.dataset.columns(term, True)[parts.rows]
+    columns = term.columns(chain.fit.dataset.fine.track)[parts.rows]
     residual = chain.fit.residual_a[parts.rows]
     unit = np.repeat(parts.unit, [b - a for a, b in parts.slices])
     draw = np.random.default_rng(seed)
