@@ -1,4 +1,4 @@
-"""Logs as they are: late, lost, closed, half written, with wrong clocks; nothing passes in silence."""
+"""Logs as they are: late, lost, closed, half written, with wrong clocks. Nothing is silent."""
 
 import json
 import os
