@@ -3,13 +3,14 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.recordings import Recording
 from opamc_cli.storage.history import NightRow
+from opamc_cli.storage.logs import Facts
 
 LEAST_NIGHTS = 2
 """Nights that must be left of a baseline: one says nothing of how much nights differ."""
@@ -103,6 +104,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     now
         What is known besides.
     """
+    recordings = _without_copies(recordings)
     usable = [one for one in recordings if not one.facts.error]
     fixed = {one.sha256 for one in now.fixed}
     judged = [one for one in usable if one.sha256 not in fixed]
@@ -146,6 +148,22 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
     return RobotPlan(tuple(nights), baselines.complete, tuple(baselines.thinned.values()))
+
+
+def _without_copies(recordings: Sequence[Recording]) -> list[Recording]:
+    """Have recordings of an earlier night stand for nothing: a logger that is stuck repeats one."""
+    first: dict[str, Recording] = {}
+    for one in sorted(recordings, key=lambda one: (one.night, one.log.path)):
+        if not one.facts.error:
+            first.setdefault(one.sha256, one)
+    found = []
+    for one in recordings:
+        original = first.get(one.sha256, one)
+        if original.night != one.night and not one.facts.error:
+            error = f"{one.log.path}: is a copy of {original.log.path}; was that night recorded?"
+            one = replace(one, facts=Facts(error=error))
+        found.append(one)
+    return found
 
 
 Series = dict[tuple[str, str], tuple[str, list[Recording]]]

@@ -103,7 +103,8 @@ def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
     said = opamc("nightly", cell, "--quiet").out
     assert said == f"{SILENT}r1, r4, r5 no file of {night(4)}; others have some\n"
     for index in range(5, 12):
-        shutil.copytree(logs / "r3" / night(4), logs / "r3" / night(index))
+        path = shutil.copytree(logs / "r3" / night(4), logs / "r3" / night(index))
+        set_clock(path / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
         said = opamc("nightly", cell, "--quiet").out
         gone = f"r1, r4, r5 no file of {night(4)} to {night(index)}; others have some"
         assert (gone in said) == (index == 11)  # the alarm's remind_after: a week
@@ -140,9 +141,19 @@ def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, 
         assert opamc("nightly", cell).code == ExitCode.DONE
         assert states(cell) == ["baseline"] * (5 - done) + ["done"] * done
     # a night that is filled in moves nothing
-    shutil.copytree(logs / "r1" / night(0), logs / "r1" / "2026-02-28")
+    path = shutil.copytree(logs / "r1" / night(0), logs / "r1" / "2026-02-28")
+    set_clock(path / "cycle.parquet", "2026-02-28T22:00:00+00:00")
     opamc("nightly", cell)
     assert states(cell) == ["done", "baseline", "baseline", "done", "done", "done"]
+
+
+def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc):
+    stuck = logs / "r1" / night(4) / "cycle.parquet"
+    shutil.copy(logs / "r1" / night(3) / "cycle.parquet", stuck)
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert f"r1 {night(4)}: {stuck}: is a copy of {logs / 'r1' / night(3)}" in ended.out
+    assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
 
 
 def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch):
