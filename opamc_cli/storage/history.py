@@ -444,8 +444,13 @@ class History:
         return found
 
     def pin_baseline(self, key: tuple[str, str, str, str], nights: Iterable[str]) -> None:
-        """Remember the nights of a baseline that is complete: it does not move any more."""
+        """Remember the nights of a baseline that is complete: other recordings do not move it."""
         with self.transaction():
+            self._db.execute(
+                "DELETE FROM baseline "
+                "WHERE robot = ? AND program = ? AND condition = ? AND since = ?",
+                key,
+            )
             self._db.executemany(
                 "INSERT OR REPLACE INTO baseline VALUES (?, ?, ?, ?, ?)",
                 [(*key, night) for night in nights],
@@ -472,6 +477,13 @@ class History:
             self._put("verdict", verdicts)
             self._put("measure", measures)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (night.robot,))
+
+    def forget_undated(self, robot: str) -> None:
+        """Forget that a robot had files that tell no night: they are mended, or gone."""
+        with self.transaction():
+            for table, column in (("night", "night"), ("told", "time")):
+                self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND {column} = ''", (robot,))
+            self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (robot,))
 
     # -- trend and alarm ---------------------------------------------------------------------
 
@@ -535,7 +547,7 @@ class History:
 
     def replace_missing(self, events: Iterable[Event]) -> None:
         """Replace what is said of nights without files; it depends on all robots."""
-        found = list(events)
+        found = sorted(events, key=lambda one: (one.time, one.robot))
         if found == [one for one in self.events() if one.kind == "missing"]:
             return
         with self.transaction():

@@ -122,9 +122,27 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
     InputError
         If an address cannot be listed.
     """
+    listed = (_remote if "://" in pattern else _local)(pattern, robots)
+    return sorted(_as_logs(listed, pattern, robots), key=lambda one: (one.robot, one.path))
+
+
+def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
+    """List the folders of some robots that may not be listed: whatever lies there is not missing.
+
+    Parameters
+    ----------
+    pattern, robots
+        As of `find_logs`; of other names a folder may be closed for good (``lost+found``).
+    """
+    folders = () if "://" in pattern else _folders(pattern)
+    return [log for of in folders for log in _as_logs(_closed(of, robots), of, robots)]
+
+
+def _as_logs(
+    listed: Iterator[tuple[str, int, int]], pattern: str, robots: tuple[str, ...] | None
+) -> Iterator[LogFile]:
     expression = _expression(pattern)
-    found = []
-    for path, size, mtime_ns in (_remote if "://" in pattern else _local)(pattern, robots):
+    for path, size, mtime_ns in listed:
         fits = expression.fullmatch(path)
         if fits is None:
             continue
@@ -134,11 +152,9 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
         if robots is not None and robot and robot not in robots:
             continue
         night = _as_night(night)
-        if robot:
-            found.append(LogFile(path, robot, night, size, mtime_ns))
-        else:  # one baseline for several robots
-            found += [LogFile(path, each, night, size, mtime_ns) for each in robots or ()]
-    return sorted(found, key=lambda one: (one.robot, one.path))
+        # one baseline may be of several robots
+        for each in (robot,) if robot else robots or ():
+            yield LogFile(path, each, night, size, mtime_ns)
 
 
 def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
@@ -150,6 +166,11 @@ def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
         The recording.
     at
         Where it, or its copy, can be opened.
+
+    Returns
+    -------
+    tuple of str and Facts
+        The hash is empty if the system refused to read it.
     """
     digest = hashlib.sha256()
     if NO_TEXT in log.path:
@@ -163,7 +184,7 @@ def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
     except OpamcError as error:
         facts = Facts(error=str(error).replace(str(at), log.path))
     except OSError as error:
-        facts = Facts(error=f"{log.path}: cannot be read ({error.strerror or error})")
+        return "", Facts(error=f"{log.path}: cannot be read ({error.strerror or error})")
     return digest.hexdigest(), facts
 
 
@@ -201,17 +222,35 @@ def copy_name(log: LogFile) -> str:
 
 
 def _local(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
+    for path in _fitting(pattern, robots):
+        try:
+            state = os.stat(path)  # noqa: PTH116
+        except OSError:
+            continue  # gone between listing and looking
+        if stat.S_ISREG(state.st_mode):  # a pipe or a folder is no log
+            yield path, state.st_size, state.st_mtime_ns
+
+
+def _folders(pattern: str) -> Iterator[str]:
+    """Yield the patterns of the folders of one robot that recordings lie in."""
+    for end in (at for at, sign in enumerate(pattern) if sign == "/"):
+        if "{robot}" in pattern[:end]:
+            yield pattern[:end]
+
+
+def _closed(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:
+    """Yield folders that may not be listed: whatever lies there is not missing."""
+    for path in _fitting(pattern, robots):
+        if not os.access(path, os.R_OK | os.X_OK) and os.path.isdir(path):  # noqa: PTH112
+            yield path, 0, 0
+
+
+def _fitting(pattern: str, robots: tuple[str, ...] | None) -> Iterator[str]:
     wild = pattern.replace("{night}", "*")
     names = [glob.escape(name) for name in robots] if robots is not None else ["*"]
     for name in names if "{robot}" in wild else ["*"]:
         # plain strings: tens of thousands of Path objects take a second
-        for path in glob.iglob(wild.replace("{robot}", name), recursive=True):  # noqa: PTH207
-            try:
-                state = os.stat(path)  # noqa: PTH116
-            except OSError:
-                continue  # gone between listing and looking
-            if stat.S_ISREG(state.st_mode):  # a pipe or a folder is no log
-                yield path, state.st_size, state.st_mtime_ns
+        yield from glob.iglob(wild.replace("{robot}", name), recursive=True)  # noqa: PTH207
 
 
 def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, int, int]]:

@@ -86,7 +86,7 @@ def run(
         from opamc_cli.stages.nightly import run as stage
     from opamc_cli.commands.nightly.claim import claim
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.morning import ahead, silent, tell
+    from opamc_cli.stages.nightly.morning import silent, tell
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.schemas import files
@@ -111,7 +111,8 @@ def run(
         untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
         if wanted == stage.Wanted():
             today = datetime.now(UTC).date()
-            untold += history.untold([*silent(history, today), *ahead(history, today)])
+            now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
+            untold += history.untold(now)
         morning = tell(summary, untold, outcome, loaded.out, cell)
         if outcome.ended:
             output.failure(outcome.ended)

@@ -176,7 +176,7 @@ def _alarm(
     nights = [row["night"] for row in rows[found.raised : last]]
     events += [
         Event(nights[index], robot, axis, "reminder", f"{name}: alarm since {since}; {text}")
-        for index in _said(nights, [""] * len(nights), rule.remind_after)[1:]
+        for index in said_in(nights, [""] * len(nights), rule.remind_after)[1:]
         if known is None or nights[index] < known.night
     ]
     if found.cleared is not None:
@@ -244,8 +244,9 @@ def _not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int)
                 span = f"from {first['night']} to {last['night']}"
                 span = first["night"] if first is last else span
             nights, reasons = ([row[of] for row in streak] for of in ("night", "reason"))
-            for index, _, why in _told(nights, reasons, remind_after):
-                text = f"{name}: not judged {span}: {why}"
+            row = f" ({len(streak)} nights in a row)" if len(streak) > 1 else ""
+            text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
+            for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 
 
@@ -258,25 +259,29 @@ def _failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterat
         streak = list(part)
         if failing:
             dates, reasons = [row.night for row in streak], [row.why for row in streak]
-            for index, last, why in _told(dates, reasons, remind_after):
-                since = f" ({last + 1} nights in a row)" if last else ""
-                text = f"{dates[last]}{since}: {why}"
+            span = dates[0]
+            if len(dates) > 1:
+                span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights in a row)"
+            text = f"{span}: {_in_one(dates, reasons)}"
+            for index in said_in(dates, reasons, remind_after):
                 yield Event(dates[index], robot, None, "failed", text)
 
 
-def _told(
-    nights: Sequence[str], reasons: Sequence[str], remind_after: int
-) -> Iterator[tuple[int, int, str]]:
-    """Yield when something that lasts is said, the last night that this covers, and why."""
-    said = _said(nights, reasons, remind_after)
-    for index, after in zip(said, [*said[1:], len(nights)], strict=True):
-        last, why = after - 1, reasons[after - 1]
-        if not _kinds(reasons[index]) <= _kinds(why):
-            why += f"; {nights[index]}: {reasons[index]}"
-        yield index, last, why
+def _in_one(nights: Sequence[str], reasons: Sequence[str]) -> str:
+    """Return the last night's reason, and since when there were others.
+
+    It is the same whenever it is said: who hears of it late hears it once.
+    """
+    text = reasons[-1]
+    known = _kinds(text)
+    for night, reason in zip(nights, reasons, strict=True):
+        if not _kinds(reason) <= known:
+            text += f"; {night}: {reason}"
+            known |= _kinds(reason)
+    return text
 
 
-def _said(nights: Sequence[str], reasons: Sequence[str], remind_after: int) -> list[int]:
+def said_in(nights: Sequence[str], reasons: Sequence[str], remind_after: int) -> list[int]:
     """Return in which of the nights that something lasts it is said.
 
     In the first, in those with a reason that was not said yet, and after some nights again.

@@ -8,12 +8,13 @@ from shlex import quote
 from typing import Any
 
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.recordings import some
 from opamc_cli.stages.nightly.run import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
 from opamc_cli.storage.schemas import files
 
-OVER = {"silent": 0, "ahead": 0, "failed": 1, "not-judged": 2, "missing": 3, "cleared": 4}
+OVER = {"silent": 0, "thinned": 1, "failed": 2, "not-judged": 3, "missing": 4, "cleared": 5}
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
@@ -33,23 +34,14 @@ class Morning:
     """The largest concern of the cell."""
 
 
-def silent(history: History, today: date) -> Iterator[Event]:
+def silent(history: History, today: date, remind_after: int) -> Iterator[Event]:
     """Say that the whole cell has no new night: no robot can be said to lack what others have."""
     last = max((night for _, night in history.nights()), default="")
-    if last and date.fromisoformat(last) < today - timedelta(SILENT_DAYS):
-        yield Event(last, "the cell:", None, "silent", f"no recording of any robot since {last}")
-
-
-def ahead(history: History, today: date) -> Iterator[Event]:
-    """Say of robots whose last night is still to come: it hides that they have no new one."""
-    last: dict[str, str] = {}
-    for robot, night in history.nights():
-        if night:  # files that cannot be read may tell none
-            last[robot] = max(night, last.get(robot, ""))
-    for robot, night in sorted(last.items()):
-        if date.fromisoformat(night) > today + timedelta(1):
-            text = f"{night} lies in the future; check the clocks of the logger and of this machine"
-            yield Event(night, robot, None, "ahead", text)
+    days = (today - date.fromisoformat(last)).days if last else 0
+    if days > SILENT_DAYS:
+        told = (days - SILENT_DAYS - 1) // remind_after  # each time is an event of its own
+        time = (date.fromisoformat(last) + timedelta(told * remind_after)).isoformat()
+        yield Event(time, "the cell:", None, "silent", f"no recording of any robot since {last}")
 
 
 def tell(
@@ -80,11 +72,15 @@ def tell(
             if joint.axis in fresh:
                 lines += _alarm_lines(robot, joint, out, cell)
     standing = {(r.name, joint.axis) for r in summary.robots for joint in r.joints if joint.alarm}
+    said: dict[tuple[int, str], list[str]] = {}
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER and not (
             event.kind == "cleared" and (event.robot, event.axis) in standing
         ):
-            lines.append(f"{event.robot} {event.text}")
+            robots = said.setdefault((OVER[event.kind], event.text), [])
+            robots += [] if event.robot in robots[-1:] else [event.robot]
+    # one line for all robots of a hall that was switched off, and for all reminders of one thing
+    lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
     alarms = any(robot.alarms for robot in summary.robots)
     broken = any(robot.broken for robot in summary.robots)
     failed = failed_now or broken or outcome.absent or outcome.ended

@@ -3,13 +3,14 @@
 import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.recordings import Recording
 from opamc_cli.storage.history import NightRow
+from opamc_cli.storage.logs import Facts
 
 LEAST_NIGHTS = 2
 """Nights that must be left of a baseline: one says nothing of how much nights differ."""
@@ -87,6 +88,8 @@ class RobotPlan:
 
     nights: tuple[PlannedNight, ...]
     complete: Mapping[tuple[str, str, str], tuple[str, ...]]
+    thinned: tuple[tuple[str, str], ...] = ()
+    """Of baselines that lost recordings: the last night that is gone, and a sentence."""
 
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
@@ -101,6 +104,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     now
         What is known besides.
     """
+    recordings = _without_copies(recordings)
     usable = [one for one in recordings if not one.facts.error]
     fixed = {one.sha256 for one in now.fixed}
     judged = [one for one in usable if one.sha256 not in fixed]
@@ -143,7 +147,23 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
-    return RobotPlan(tuple(nights), baselines.complete)
+    return RobotPlan(tuple(nights), baselines.complete, tuple(baselines.thinned.values()))
+
+
+def _without_copies(recordings: Sequence[Recording]) -> list[Recording]:
+    """Have recordings of an earlier night stand for nothing: a logger that is stuck repeats one."""
+    first: dict[str, Recording] = {}
+    for one in sorted(recordings, key=lambda one: (one.night, one.log.path)):
+        if not one.facts.error:
+            first.setdefault(one.sha256, one)
+    found = []
+    for one in recordings:
+        original = first.get(one.sha256, one)
+        if original.night != one.night and not one.facts.error:
+            error = f"{one.log.path}: is a copy of {original.log.path}; was that night recorded?"
+            one = replace(one, facts=Facts(error=error))
+        found.append(one)
+    return found
 
 
 Series = dict[tuple[str, str], tuple[str, list[Recording]]]
@@ -173,6 +193,7 @@ class _Baselines:
         self._series = series
         self._usable = usable
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
+        self.thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
         self._there: dict[tuple[str, str, str], list[str]] = {}
         self._used: dict[tuple[str, str, str], tuple[Recording, ...]] = {}
 
@@ -215,21 +236,30 @@ class _Baselines:
         wanted = self._now.baseline.nights or NIGHTS_AGAIN
         key = (program, condition, since)
         there = self._nights_there(key)
-        pinned = self._now.pinned.get(key)
-        members = list(pinned) if pinned else there[:wanted]
-        if len(members) < wanted and not pinned:
+        pinned = list(self._now.pinned.get(key, ()))
+        # the file asks for more nights than before: those that follow, as soon as they are there
+        longer = pinned + [n for n in there if not pinned or n > pinned[-1]]
+        members = pinned if len(longer) < wanted else longer[:wanted]
+        if not members:
             return Comparison(program, condition, targets)
         self.complete[key] = tuple(members)
         if night in members:
             return Comparison(program, condition, targets)
         left = [n for n in members if n in there]
+        gone = ", ".join(n for n in members if n not in left)
         if len(left) < LEAST_NIGHTS:
-            gone = ", ".join(n for n in members if n not in left)
             why = (
                 f"the recordings of the baseline's nights {gone} are gone; put them back, or begin "
                 "a new baseline with `opamc nightly rebaseline`"
             )
             return Comparison(program, condition, targets, missing=why)
+        if gone:
+            self.thinned[key] = (
+                max(set(members) - set(left)),
+                f"the recordings of the baseline's nights {gone} cannot be used any more, "
+                f"{len(left)} nights are left; put them back, with fewer than {LEAST_NIGHTS} "
+                "nothing is judged",
+            )
         if key not in self._used:
             self._used[key] = tuple(one for n in left for one in self._series[program, n][1])
         used = self._used[key]

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from functools import cached_property
 from pathlib import Path
 
@@ -9,8 +10,11 @@ from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings.sessions import night_of
 from opamc_cli.storage.history import FileRow, History
-from opamc_cli.storage.logs import Facts, LogFile, fetch, find_logs, read_facts
+from opamc_cli.storage.logs import Facts, LogFile, fetch, find_closed, find_logs, read_facts
 from opamc_cli.storage.schemas import files
+
+EARLIEST_NIGHT = "2001-01-01"
+"""Clocks that were never set begin in 1970, 1980 or 2000."""
 
 REMEMBER_EVERY = 50
 """Files that are read between two writes to the history: what a kill costs."""
@@ -83,6 +87,7 @@ def find_recordings(
     judged = {robot for robot, _ in history.nights()}
     # a robot whose logs were cleared away, or are out of reach, keeps its alarm
     robots = sorted(named or {log.robot for log in logs} | judged)
+    logs += find_closed(cell.runs, tuple(robots))
     fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
     if not logs and not judged:
         msg = f"{cell.runs}: no file fits this pattern; check `runs` of the cell's file"
@@ -117,6 +122,8 @@ class _Reader:
         self._known = history.files()
         self._new: list[FileRow] = []
         self._day_starts: dict[str, float] = {}
+        # the logger's day may have begun already
+        self._latest_night = (datetime.now(UTC).date() + timedelta(1)).isoformat()
         self._cell = cell
 
     def read(self, log: LogFile) -> Recording:
@@ -132,7 +139,8 @@ class _Reader:
             row = FileRow(
                 log.path, log.robot, log.night, log.size, log.mtime_ns, sha256, facts.to_json()
             )
-            self._new.append(row)
+            if sha256:  # what could not be read for want of permission is tried again
+                self._new.append(row)
             if len(self._new) >= REMEMBER_EVERY:
                 self.finish()
         facts = Facts.from_json(row.facts)
@@ -143,6 +151,14 @@ class _Reader:
                 error=f"{log.path}: nothing says which night it is of: no started_at in its "
                 "metadata; put {night} into `runs`, or record when it began"
             )
+        elif night and not EARLIEST_NIGHT <= night <= self._latest_night:
+            # it would be the first night of the baseline, or hide for years that none is new
+            wrong = "lies in the future" if night > EARLIEST_NIGHT else "is one of a clock not set"
+            facts = Facts(
+                error=f"{log.path}: its night {night} {wrong}; check the clock of the logger, and "
+                "this machine's"
+            )
+            night = None
         return Recording(log, night or "", row.sha256, facts)
 
     def finish(self) -> None:

@@ -34,6 +34,7 @@ from opamc_cli.stages.nightly.workers.workers import Broken, run_all
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history import (
+    Event,
     History,
     MeasureRow,
     NightRow,
@@ -46,6 +47,9 @@ from opamc_cli.storage.schemas import files
 
 WORK, KEPT, COPIES = ".opamc-work", ".kept", ".copies"
 """Folders below `out` that nobody needs to look into."""
+
+MOST_REASONS = 3
+"""Files of a night that are named when they cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,8 @@ class CellOutcome:
     """Robot, night and why; of nights that were judged in part as well."""
     absent: list[str] = field(default_factory=list)
     """Sentences that say of what was asked for that there is no recording of it."""
+    thinned: list[Event] = field(default_factory=list)
+    """Baselines that have lost recordings."""
     ended: str = ""
     """Why the start came to an end before all was done; empty if it did not."""
     robots: tuple[str, ...] = ()
@@ -139,8 +145,13 @@ def run(
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         for key, members in planned.complete.items():
-            if key not in past.pinned.get(robot, {}):
+            if past.pinned.get(robot, {}).get(key) != list(members):
                 history.pin_baseline((robot, *key), members)
+        if "" in past.recorded.get(robot, {}) and all(night.night for night in planned.nights):
+            history.forget_undated(robot)
+        outcome.thinned += [
+            Event(night, robot, None, "thinned", text) for night, text in planned.thinned
+        ]
         for night in planned.nights:
             if not wanted.has(night.night):
                 continue
@@ -312,7 +323,7 @@ def _record_unjudged(
     """Record a night that has nothing to be compared with, or no recording that can be used."""
     reasons = [one.facts.error for one in night.broken]
     reasons += [one.missing for one in night.comparisons]
-    why = "; ".join(dict.fromkeys(filter(None, reasons)))
+    why = "; ".join(_first(list(dict.fromkeys(filter(None, reasons)))))
     status = "baseline" if night.in_baseline else "failed"
     if night.night:  # else it would be the folder of all nights
         remove_folder(cell.out / night.robot / night.night, of=OF_NIGHT)
@@ -340,7 +351,7 @@ def _record(
         history.record_night(row)
         _note(outcome, row)
         return
-    why = [one.facts.error for one in night.broken]
+    why = list(_first([one.facts.error for one in night.broken]))
     why += [sentence for result in answer for sentence in result.failures]
     judged = [result for result in answer if result.files and result.axes]
     notes = [*night.notes, *(note for result in answer for note in result.notes)]
@@ -398,6 +409,13 @@ def _record(
             )
     history.record_night(row, verdicts, measures)
     _note(outcome, row)
+
+
+def _first(reasons: Sequence[str]) -> Iterator[str]:
+    """Yield some of the reasons: hundreds of broken files are one line."""
+    yield from reasons[-MOST_REASONS:]  # paths go with the nights
+    if len(reasons) > MOST_REASONS:
+        yield f"and {len(reasons) - MOST_REASONS} more files"
 
 
 def _note(outcome: CellOutcome, row: NightRow) -> None:

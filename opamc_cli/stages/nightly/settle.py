@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
-from opamc_cli.stages.nightly.alarms import LIMIT, settle_robot
+from opamc_cli.stages.nightly.alarms import LIMIT, said_in, settle_robot
 from opamc_cli.stages.nightly.plan import NIGHTS_AGAIN
 from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page
@@ -57,7 +57,7 @@ def settle_cell(
         )
         history.settle(robot, settled.alarms, settled.standing, settled.events)
     if whole:
-        history.replace_missing(_missing(by_robot, set(robots)))
+        history.replace_missing(_missing(by_robot, set(robots), cell.alarm.remind_after))
     _prune(cell, history)
     summary = summarise(history, robots)
     if cell.robots != "auto":  # what left the cell is no concern of its page
@@ -67,8 +67,10 @@ def settle_cell(
     return summary
 
 
-def _missing(by_robot: Mapping[str, Sequence[NightRow]], robots: set[str]) -> Iterator[Event]:
-    """Say which robots have no file of nights of which others have: once for each gap."""
+def _missing(
+    by_robot: Mapping[str, Sequence[NightRow]], robots: set[str], remind_after: int
+) -> Iterator[Event]:
+    """Say which robots have no file of nights of which others have, and again while they lack."""
     nights = sorted({row.night for rows in by_robot.values() for row in rows})
     for robot in sorted(robots | set(by_robot)):
         own = {row.night for row in by_robot.get(robot, ())}
@@ -81,7 +83,9 @@ def _missing(by_robot: Mapping[str, Sequence[NightRow]], robots: set[str]) -> It
                 gap.append(night)
             elif gap:
                 span = gap[0] if len(gap) == 1 else f"{gap[0]} to {gap[-1]}"
-                yield Event(gap[0], robot, None, "missing", f"no file of {span}; others have some")
+                text = f"no file of {span}; others have some"
+                for index in said_in(gap, [""] * len(gap), remind_after):
+                    yield Event(gap[index], robot, None, "missing", text)
                 gap = []
 
 

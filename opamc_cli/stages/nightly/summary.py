@@ -67,6 +67,8 @@ class RobotSummary:
     """Its joints."""
     last: NightRow | None
     """What became of its last night; None if it has none."""
+    undated: NightRow | None = None
+    """What became of files that tell no night; None without any."""
 
     @property
     def several_programs(self) -> bool:
@@ -79,9 +81,15 @@ class RobotSummary:
         return self.last.night if self.last else ""
 
     @property
+    def failure(self) -> NightRow | None:
+        """Its last night if that could not be judged at all, or files that may be of it."""
+        failed = self.last is not None and self.last.status in ("failed", "broken")
+        return self.undated or (self.last if failed else None)
+
+    @property
     def broken(self) -> bool:
-        """Whether its last night could not be judged at all."""
-        return self.last is None or self.last.status in ("failed", "broken")
+        """Whether nothing of its last night could be judged, or some of it may be lost."""
+        return self.last is None or self.failure is not None
 
     @property
     def alarms(self) -> list[JointSummary]:
@@ -175,7 +183,10 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
         (alarm.robot, alarm.program, alarm.axis): alarm for alarm in history.alarms(standing=True)
     }
     last: dict[str, NightRow] = {}
+    undated: dict[str, NightRow] = {}
     for night in history.nights().values():
+        if not night.night:
+            undated[night.robot] = night
         if night.robot not in last or night.night > last[night.robot].night:
             last[night.robot] = night
     joints: dict[str, list[JointSummary]] = {}
@@ -188,7 +199,10 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
         joints.setdefault(row["robot"], []).append(_joint(row, alarm))
     names = sorted({*last, *joints, *robots})
     return Summary(
-        tuple(RobotSummary(name, tuple(joints.get(name, ())), last.get(name)) for name in names)
+        tuple(
+            RobotSummary(name, tuple(joints.get(name, ())), last.get(name), undated.get(name))
+            for name in names
+        )
     )
 
 

@@ -30,10 +30,12 @@ def said(*states):
 
 def test_a_joint_that_was_judged_again_is_not_said_to_be_unjudged_since():
     lost, judged = "insufficient-data", "healthy"
-    assert said(judged, lost, lost) == ["axis 2: not judged since 2026-03-02: no motion"]
+    assert said(judged, lost, lost) == [
+        "axis 2: not judged since 2026-03-02 (2 nights in a row): no motion"
+    ]
     assert said(lost, judged) == ["axis 2: not judged 2026-03-01: no motion"]
     assert said(lost, lost, judged, lost) == [
-        "axis 2: not judged from 2026-03-01 to 2026-03-02: no motion",
+        "axis 2: not judged from 2026-03-01 to 2026-03-02 (2 nights in a row): no motion",
         "axis 2: not judged since 2026-03-04: no motion",
     ]
 
@@ -50,11 +52,12 @@ def failures(*reasons):
 
 def test_a_new_reason_is_said_and_an_old_one_is_not_said_again():
     slow, odd = "took longer than 5 s (limits.seconds)", "logs/{}/a.parquet: cannot be opened"
-    assert failures(slow, slow) == [("01", f"2026-03-02 (2 nights in a row): {slow}")]
-    assert failures(slow, odd.format(2), odd.format(3), slow) == [
-        ("01", f"2026-03-01: {slow}"),
-        ("02", f"2026-03-04 (4 nights in a row): {slow}; 2026-03-02: {odd.format(2)}"),
-    ]
+    assert failures(slow) == [("01", f"2026-03-01: {slow}")]
+    row = "2026-03-01 to 2026-03-02 (2 nights in a row)"
+    assert failures(slow, slow) == [("01", f"{row}: {slow}")]
+    row = "2026-03-01 to 2026-03-04 (4 nights in a row)"
+    text = f"{row}: {slow}; 2026-03-02: {odd.format(2)}"
+    assert failures(slow, odd.format(2), odd.format(3), slow) == [("01", text), ("02", text)]
     both = f"{odd.format(1)}; {slow}"
     assert [day for day, _ in failures(odd.format(1), both, slow)] == ["01", "02"]
     assert [day for day, _ in failures(*[slow] * 9)] == ["01", "08"]

@@ -351,6 +351,18 @@ def answers(function: str, jobs: list, **limits) -> dict:
     return dict(run_all(f"worker_jobs:{function}", jobs, 2, **chosen))
 
 
+def test_a_worker_does_not_wait_for_who_takes_its_answers(monkeypatch, tmp_path):
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+    marks = [str(tmp_path / name) for name in "ab"]
+    answers = run_all("worker_jobs:leave_a_mark", marks, 1, seconds=60.0, memory_gb=None)
+    assert next(answers) == (marks[0], marks[0])
+    until = time.monotonic() + 30.0
+    while not Path(marks[1]).exists() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert Path(marks[1]).exists()
+    assert [answer for _, answer in answers] == [marks[1]]
+
+
 def test_workers_that_die_are_a_sentence(monkeypatch):
     here = str(Path(__file__).parent)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))

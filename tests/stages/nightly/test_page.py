@@ -17,11 +17,11 @@ NASTY = '</script><b>"r&1'
 
 
 def write_history(path: Path, names: list[str]) -> History:
-    """Write a history in which axis 3 of the first robot wears and the second robot is unknown."""
+    """Write a history: axis 3 of the first robot wears, the second is unknown, the third gone."""
     history = History(path)
     for number, name in enumerate(names):
         status = "failed" if number == 1 else "done"
-        for night in NIGHTS:
+        for night in NIGHTS[: -1 if number == 2 else None]:
             verdicts, measures = [], []
             for axis in range(1, 7):
                 worn = number == 0 and axis == 3
@@ -99,6 +99,7 @@ def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
     assert body.count('class="spark"') == 18
     assert "! alarm" in body.partition("</tr>")[0]  # the worst first
     assert "18 of 18 joints" in dom
+    assert body.count('class="night changed"') == 6  # the robot without the cell's last night
     from matplotlib.image import imread
 
     path = tmp_path / f"{width}-{dark}.png"

@@ -5,7 +5,6 @@ import os
 import shutil
 import sqlite3
 from dataclasses import replace
-from datetime import date, timedelta
 
 import pytest
 from cell_logs import night
@@ -13,7 +12,6 @@ from cell_logs import night
 from opamc_cli.commands.nightly.claim import claim
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode, UsageError
-from opamc_cli.stages.nightly.morning import ahead
 from opamc_cli.storage.history import Event, History, NightRow
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
@@ -160,17 +158,6 @@ def test_declarations_are_checked(small, opamc):
     both = opamc("nightly", small, "--night", night(1), "--since", night(2))
     assert both.code == ExitCode.USAGE
     assert "is before --since" in both.err
-
-
-def test_a_night_to_come_is_said(tmp_path):
-    today = date(2026, 3, 1)
-    with History(tmp_path / "history.sqlite") as history:
-        for robot, days in (("r1", 1), ("r2", 2)):
-            last = (today + timedelta(days)).isoformat()
-            history.record_night(NightRow(robot, last, KEY, "done", 0, "", ""))
-        (event,) = ahead(history, today)
-    assert (event.robot, event.axis) == ("r2", None)
-    assert "lies in the future; check the clocks" in event.text
 
 
 def test_a_robot_called_as_a_file_of_the_results_is_its_own_line(small, opamc):

@@ -30,3 +30,9 @@ def behave(kind: str) -> str:
     if kind == "sleep":
         time.sleep(600)
     return kind.upper()
+
+
+def leave_a_mark(path: str) -> str:
+    """Make a file."""
+    Path(path).touch()
+    return path

@@ -68,7 +68,7 @@
       cell(`state ${row.role}`, `${row.sign} ${said}`),
       cell(`line ${row.role}`, row.spark ? line(row.spark) : ""),
       cell("since", row.since || ""),
-      cell("night", night),
+      cell(row.night < data.nights.at(-1) ? "night changed" : "night", night),
     );
     return made;
   };

@@ -161,12 +161,12 @@ def run_all(
                     if answer.kind == "died" and deaths[id(job)] < DEATHS:
                         pool.hand(pool.start(), job)
                         continue
-                yield job, answer
-                if waiting:
+                if waiting:  # before the answer is recorded, which waits for the disk
                     fresh = isinstance(answer, Broken)
                     pool.hand(pool.start() if fresh else worker, waiting.pop())
                 else:
                     running -= 1
+                yield job, answer
 
 
 def called(name: str) -> Callable[[Any], Any]:

@@ -1,0 +1,180 @@
+"""Logs as they are: late, lost, closed, half written, with wrong clocks. Nothing is silent."""
+
+import json
+import os
+import shutil
+import sqlite3
+from dataclasses import replace
+from datetime import date
+
+import nightly_kills
+import pyarrow.parquet as pq
+import pytest
+from cell_logs import night
+
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.morning import silent
+from opamc_cli.storage.history import History, NightRow
+from opamc_cli.storage.logs import LogFile, read_facts
+from opamc_cli.storage.runs import Run, save_run
+
+KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
+SILENT = f"the cell: no recording of any robot since {night(4)}\n"
+
+
+@pytest.fixture
+def logs(cell, monkeypatch):
+    """The logs of two robots of a cell whose nights are all healthy."""
+    shutil.rmtree(cell.parent / "logs" / "r2")
+    with nightly_kills.with_stand_in():
+        yield cell.parent / "logs"
+
+
+def states(cell):
+    """Return what became of every night of r1."""
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        query = "SELECT night, status FROM night WHERE robot = 'r1' ORDER BY night"
+        return [status for _, status in db.execute(query).fetchall()]
+
+
+def set_clock(path, started_at):
+    """Have a recording say that it began at another time."""
+    with Run(path) as run:
+        info = replace(run.info, started_at=started_at)
+    table = pq.read_table(path)
+    save_run(path, info, {name: table[name].to_numpy() for name in table.column_names})
+
+
+def test_a_clock_that_tells_no_night_is_said_until_it_is_set(cell, logs, opamc):
+    for path in sorted(logs.glob("*/*/*.parquet")):
+        path.rename(logs / path.parent.parent.name / f"{path.parent.name}.parquet")
+    cell.write_text(cell.read_text().replace("{night}/", ""))
+    last = logs / "r1" / f"{night(4)}.parquet"
+    for year, said in (("1970", "is one of a clock not set"), ("2970", "lies in the future")):
+        set_clock(last, f"{year}-03-05T22:00:00+00:00")
+        first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+        assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
+        assert f"r1 {last}: its night {year}-03-05 {said}; check the clock" in first.out
+        assert second.out == ""
+        # neither the first night of the baseline, nor a last one that no other can follow
+        assert states(cell) == ["failed", "baseline", "baseline", "baseline", "done"]
+        assert "could not be judged" in (cell.parent / "nightly" / "index.html").read_text()
+    set_clock(last, f"{night(4)}T22:00:00+00:00")
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, ended.out) == (ExitCode.DONE, "")
+    assert states(cell) == ["baseline", "baseline", "baseline", "done", "done"]
+
+
+def test_a_folder_of_a_night_that_no_clock_tells_is_none_of_the_baseline(cell, logs, opamc):
+    (logs / "r1" / night(0)).rename(logs / "r1" / "1970-01-01")
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert "its night 1970-01-01 is one of a clock not set" in ended.out
+    assert states(cell) == ["failed", "baseline", "baseline", "baseline", "done"]
+
+
+def test_a_long_streak_that_is_heard_of_late_is_one_line(cell, logs, opamc):
+    shutil.rmtree(logs / "r3")
+    for index in range(5, 40):
+        (logs / "r1" / night(index)).mkdir()
+        (logs / "r1" / night(index) / "cycle.parquet").write_text("half a file")
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    silence, line = ended.out.splitlines()
+    assert silence == f"the cell: no recording of any robot since {night(39)}"
+    assert line.startswith(f"r1 {night(5)} to {night(39)} (35 nights in a row): ")
+    assert "cannot be opened" in line
+    assert opamc("nightly", cell, "--quiet").out == ""
+
+
+def test_hundreds_of_broken_files_are_one_short_line(cell, logs, opamc):
+    for index in range(200):
+        (logs / "r1" / night(4) / f"{index:03d}.parquet").write_text("half a file")
+    (line,) = (one for one in opamc("nightly", cell, "--quiet").out.splitlines() if "r1" in one)
+    assert "199.parquet: cannot be opened" in line
+    assert line.endswith("; and 197 more files")
+
+
+def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
+    for name in ("r4", "r5"):
+        shutil.copytree(logs / "r1", logs / name)
+    for name in ("r1", "r4", "r5"):
+        shutil.rmtree(logs / name / night(4))
+    said = opamc("nightly", cell, "--quiet").out
+    assert said == f"{SILENT}r1, r4, r5 no file of {night(4)}; others have some\n"
+    for index in range(5, 12):
+        path = shutil.copytree(logs / "r3" / night(4), logs / "r3" / night(index))
+        set_clock(path / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
+        said = opamc("nightly", cell, "--quiet").out
+        gone = f"r1, r4, r5 no file of {night(4)} to {night(index)}; others have some"
+        assert (gone in said) == (index == 11)  # the alarm's remind_after: a week
+
+
+def test_a_silent_cell_is_said_again(tmp_path):
+    with History(tmp_path / "history.sqlite") as history:
+        history.record_night(NightRow("r1", "2026-03-01", KEY, "done", 0, "", ""))
+        times = [
+            [event.time for event in silent(history, date(2026, 3, day), 7)]
+            for day in (4, 5, 11, 12, 19)
+        ]
+    assert times == [[], ["2026-03-01"], ["2026-03-01"], ["2026-03-08"], ["2026-03-15"]]
+
+
+def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, opamc):
+    opamc("nightly", cell)
+    shutil.move(logs / "r1" / night(1), cell.parent / "aside")
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert first.code == ExitCode.DONE
+    assert first.out == (
+        f"r1 the recordings of the baseline's nights {night(1)} cannot be used any more, 2 nights "
+        "are left; put them back, with fewer than 2 nothing is judged\n"
+    )
+    assert second.out == ""
+
+
+def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, opamc):
+    opamc("nightly", cell)
+    for nights, done in ((4, 1), (6, 1), (2, 3)):  # six nights are not there yet
+        cell.write_text(
+            "runs: logs/{robot}/{night}/*.parquet\n" + f"baseline: {{nights: {nights}}}\n"
+        )
+        assert opamc("nightly", cell).code == ExitCode.DONE
+        assert states(cell) == ["baseline"] * (5 - done) + ["done"] * done
+    # a night that is filled in moves nothing
+    path = shutil.copytree(logs / "r1" / night(0), logs / "r1" / "2026-02-28")
+    set_clock(path / "cycle.parquet", "2026-02-28T22:00:00+00:00")
+    opamc("nightly", cell)
+    assert states(cell) == ["done", "baseline", "baseline", "done", "done", "done"]
+
+
+def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc):
+    stuck = logs / "r1" / night(4) / "cycle.parquet"
+    shutil.copy(logs / "r1" / night(3) / "cycle.parquet", stuck)
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert f"r1 {night(4)}: {stuck}: is a copy of {logs / 'r1' / night(3)}" in ended.out
+    assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
+
+
+def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch):
+    closed = [str(logs / "r1" / night(4))]
+    file = logs / "r1" / night(4) / "cycle.parquet"
+    file.rename(cell.parent / "aside")
+    allowed = os.access
+    monkeypatch.setattr(os, "access", lambda at, mode: at not in closed and allowed(at, mode))
+    (logs / "lost+found").mkdir()
+    closed.append(str(logs / "lost+found"))  # no robot's
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
+    assert f"r1 {night(4)}: {closed[0]}: cannot be read" in first.out
+    assert "lost+found" not in first.out
+    closed.clear()
+    (cell.parent / "aside").rename(file)
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, ended.out) == (ExitCode.DONE, "")
+
+
+def test_a_file_that_the_system_refuses_to_read_is_not_remembered(tmp_path):
+    sha256, facts = read_facts(LogFile(str(tmp_path), "r1", None, 0, 0), tmp_path)
+    assert sha256 == ""
+    assert "cannot be read" in facts.error
