@@ -55,6 +55,16 @@ class Bundle:
     """Its pattern counts, which also say what sessions and cycles there are."""
     witnesses: Mapping[str, Evidence] = field(default_factory=dict)
     """What else tells its sessions apart, by name."""
+    target_sessions: Sequence[str] = ()
+    """Names of the target's sessions, in the order of the cells' rows."""
+
+    def of_target(self, session: int) -> "Bundle":
+        """Return the same with one of the target's sessions alone."""
+        return Bundle(
+            [cell.of_target(session) for cell in self.cells],
+            {name: one.of_target(session) for name, one in self.witnesses.items()},
+            self.target_sessions[session : session + 1],
+        )
 
     def evidence(self) -> dict[str, Evidence]:
         """Return all that the sessions can be told apart by: the patterns first."""

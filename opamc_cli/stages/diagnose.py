@@ -165,7 +165,12 @@ def _diagnose(
             times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
             try:
                 found = cause.explain(
-                    axis, sides.baseline.sources, sides.target.sources, config.joint, times, kept
+                    axis,
+                    sides.baseline.sources,
+                    decided.target_sources(axis),
+                    config.joint,
+                    times,
+                    kept,
                 )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings

@@ -1,14 +1,26 @@
 """How far sessions lie from others, part by part, in units of what healthy ones differ by."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Cell = TypeVar("Cell", bound=Any)
+"""A dataclass with arrays that have one row for each session."""
 
 PRIOR_DOF = 4.0
 """Degrees of freedom that the motion's mean variance counts for in each bin's own."""
+
+
+def chosen(cells: Sequence[Cell], by_session: Sequence[str], rows: Sequence[int]) -> list[Cell]:
+    """Return the cells with some of the sessions; `by_session` names the arrays that have them."""
+    return [
+        replace(cell, **{name: getattr(cell, name)[list(rows)] for name in by_session})
+        for cell in cells
+    ]
 
 
 def variance_within_sessions(

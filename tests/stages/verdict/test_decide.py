@@ -94,3 +94,22 @@ def test_schemas_are_printed(capsys):
     assert ended("config", "schema", "verdict") == 0
     assert json.loads(capsys.readouterr().out) == schema("verdict")
     assert ended("config", "schema", "tables") == 2
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_one_damaged_session_of_three_is_not_diluted(tmp_path):
+    healthy = sorted((SAMPLES / "normal").glob("*.parquet"))
+    damaged = SAMPLES / "fault" / "session-008.parquet"
+    sides = [*(["--baseline", run] for run in healthy[:6])]
+    sides += [["--target", run] for run in (*healthy[6:], damaged)]
+    flat = [part for side in sides for part in side]
+    assert ended("diagnose", *flat, "--out", tmp_path, "--quiet") == 1
+    verdict = verdict_in(tmp_path)
+    jsonschema.validate(verdict, schema("verdict"))
+    states = [axis["state"] for axis in verdict["axes"]]
+    assert states == ["healthy", "healthy", "fault"]
+    only = "Of 3 target sessions only night 2021-01-08 shows it by itself."
+    assert verdict["axes"][2]["reasons"][0] == only
+    assert verdict["axes"][2]["session"] == "night 2021-01-08"
+    assert verdict["axes"][2]["cause"]["effect"] == "ripple"
+    assert "session" not in verdict["axes"][0]

@@ -14,12 +14,16 @@ def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
     return {
         entry["axis"]: (
-            f"It lies {entry['health_index']:.3g} of the baseline's own spreads from the baseline, "
+            f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from the baseline, "
             + (_COMMON if len(far) > 1 else _ALONE),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
     }
+
+
+def _where(entry: Mapping[str, Any]) -> str:
+    return f"In {entry['session']} alone it" if "session" in entry else "It"
 
 
 _COMMON = (
