@@ -26,7 +26,7 @@ class LoneSession:
 
 
 def each_session(
-    bundles: Mapping[int, Bundle], policy: Policy = Policy()
+    bundles: Mapping[int, Bundle], policy: Policy | None = None
 ) -> dict[int, list[LoneSession]]:
     """Decide about every joint by each target session alone.
 
@@ -34,7 +34,7 @@ def each_session(
     ----------
     bundles : mapping of int to Bundle
         As `judge` takes them, with the names of the target's sessions.
-    policy : Policy
+    policy : Policy, optional
         Levels and limits; the level is that of all sessions together.
 
     Returns
@@ -48,6 +48,7 @@ def each_session(
     the number of joints. A session alone makes a fault or nothing: it has to pass the limit of
     effects that are one, at `LONE_SHARE` of the level.
     """
+    policy = policy or Policy()
     names = sorted({name for bundle in bundles.values() for name in bundle.target_sessions})
     found: dict[int, list[LoneSession]] = {axis: [] for axis in bundles}
     if len(names) < 2:

@@ -305,6 +305,7 @@ UNUSABLE = [
     (bad_runs.standing, ["no motion was found"]),
     (bad_runs.short, ["no motion was found"]),
     (bad_runs.current_alone, ["axis1_current", "axis1_position"]),
+    (bad_runs.milliamperes, ["column axis1_a is beyond 1000 A", "mA taken for A"]),
 ]
 
 
@@ -561,6 +562,11 @@ def in_column(name: str, value: float) -> Callable[[dict[str, np.ndarray]], None
             ExitCode.NOT_ENOUGH_DATA,
             ["axis 1 does not move"],
         ),
+        (
+            lambda c: c["axis1_current"].__imul__(np.float32(5000)),
+            ExitCode.BAD_INPUT,
+            ["axis1_current is beyond 1000 A"],
+        ),
     ],
 )
 @pytest.mark.parametrize("command", ["fit", "trace", "close"])
@@ -719,3 +725,14 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path):
         "check space",
     )
     assert not list((tmp_path / "out").glob("*log*"))
+
+
+def test_recordings_that_are_no_runs_are_said_even_if_quiet(opamc, tmp_path):
+    bad_runs.good(tmp_path / "runs" / "a.parquet")
+    (tmp_path / "runs" / "monday.csv").write_text("time,current\n0,1\n")
+    (tmp_path / "runs" / "README.txt").write_text("of monday\n")
+    ended = opamc("segment", tmp_path / "runs", "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.DONE
+    (sentence,) = ended.sentences
+    assert "1 recording is passed over" in sentence
+    assert "monday.csv" in sentence

@@ -57,6 +57,7 @@ def diagnose(
             jobs=jobs,
             progress=progress,
         )
+    output.passed_over([*baseline, *target])
     output.notes(outcome.notes, verbose)
     output.result(
         {

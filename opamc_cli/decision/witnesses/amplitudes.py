@@ -69,7 +69,7 @@ class AmplitudeEvidence:
         return math.sqrt(max(float(np.mean(excess)), 0.0)) if excess else math.nan
 
     def of_target(self, session: int) -> "AmplitudeEvidence":
-        """Return the evidence with one of the target\'s sessions alone."""
+        """Return the evidence with one of the target's sessions alone."""
         rows = [*range(self.n_baseline), self.n_baseline + session]
         return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
 

@@ -127,7 +127,7 @@ class PatternEvidence:
         return float(np.nanmax(effects)) if np.isfinite(effects).any() else float("nan")
 
     def of_target(self, session: int) -> "PatternEvidence":
-        """Return the evidence with one of the target\'s sessions alone."""
+        """Return the evidence with one of the target's sessions alone."""
         return PatternEvidence([cell.of_target(session) for cell in self.cells])
 
 

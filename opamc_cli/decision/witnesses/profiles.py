@@ -106,7 +106,7 @@ class ProfileEvidence:
         return profile_effect(self.cells, self.n_baseline)
 
     def of_target(self, session: int) -> "ProfileEvidence":
-        """Return the evidence with one of the target\'s sessions alone."""
+        """Return the evidence with one of the target's sessions alone."""
         rows = [*range(self.n_baseline), self.n_baseline + session]
         return replace(self, cells=chosen(self.cells, ("course", "cycles", "scale"), rows))
 

@@ -86,7 +86,7 @@ class SpectrumEvidence:
         return size_effect(self.cells, self.n_baseline)
 
     def of_target(self, session: int) -> "SpectrumEvidence":
-        """Return the evidence with one of the target\'s sessions alone."""
+        """Return the evidence with one of the target's sessions alone."""
         rows = [*range(self.n_baseline), self.n_baseline + session]
         return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
 

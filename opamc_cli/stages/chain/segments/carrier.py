@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from opamc_cli.config.models import SegmentConfig
 from opamc_cli.errors import InputError
+from opamc_cli.signal.limits import LIMITS, Size
 from opamc_cli.signal.motion.boundaries import refine_boundaries
 from opamc_cli.signal.motion.motion_signal import MotionBand, MotionStream, join_frames
 from opamc_cli.signal.motion.noise import noise_level
@@ -36,6 +37,7 @@ from opamc_cli.stages.chain.segments.rows import (
     mean_variance,
     read_variance,
 )
+from opamc_cli.stages.recordings.beyond import sized
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, AxisChannels, Run
 
 FRAME_S = 0.008
@@ -169,6 +171,7 @@ def _gather(
     n_missing = dict.fromkeys(names, 0)
     lowest = dict.fromkeys(names, np.inf)
     highest = dict.fromkeys(names, -np.inf)
+    sizes = {name: Size(LIMITS["A"]) for name in names}
 
     def take(z: Complex) -> None:
         frames.append(motion.push(temporal_fine_structure(z, probe.floor_a)))
@@ -186,6 +189,7 @@ def _gather(
                 high = float(x.max(where=known, initial=-np.inf))
                 # A gap counts as no current, and so as no motion.
                 x = np.where(known, x, np.float32(0))
+            sizes[name].add(x)
             lowest[name], highest[name] = min(lowest[name], low), max(highest[name], high)
             phases.append(x)
         if hilbert is None:
@@ -203,6 +207,7 @@ def _gather(
         for name, n in n_missing.items()
         if n
     )
+    notes += tuple(odd for name, size in sizes.items() if (odd := sized(run.path, name, size)))
     joined = join_frames(frames)
     frames.clear()
     evidence = Evidence(

@@ -14,8 +14,8 @@ def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
     return {
         entry["axis"]: (
-            f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from the baseline, "
-            + (_COMMON if len(far) > 1 else _ALONE),
+            f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
+            "the baseline, " + (_COMMON if len(far) > 1 else _ALONE),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
