@@ -42,6 +42,14 @@ so that they are worth five degrees of freedom and not ten."""
 CYCLES_DIFFER = 0.05
 """Level at which cycles of baseline and target count as different where one session is known."""
 
+UNKNOWN_CHANGE = 0.2
+"""Relative change of the current's course or size from the only session of a baseline, from which
+a joint is not called healthy.
+
+How much nights differ by it is not known then. Of pairs of healthy nights 1 of 250 robots of
+another simulator has as much, none of 260 single joints, 1 of 40 fleets.
+"""
+
 
 PATTERNS = "patterns"
 """Name of the witness that every axis has."""
@@ -118,6 +126,9 @@ class Judgement:
     """sessions, relabelled-sessions, one-session or none."""
     unusual_log_ratio: float
     """Log of how unusual the target's conditions are, by its current's course; 0 if unknown."""
+    unknown_change: float
+    """Relative change of the current's course or size, where one baseline session does not tell
+    how much healthy ones differ by it; else NaN."""
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
@@ -133,7 +144,7 @@ class Judgement:
         """
         known = self.effects.items()
         heard = [size for name, size in known if not self.witnesses.get(name, 0.0) > 0.5]
-        return float(np.fmax.reduce(heard or list(self.effects.values()), initial=math.nan))
+        return _largest(heard or list(self.effects.values()))
 
 
 def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int, Judgement]:
@@ -195,6 +206,11 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             witnesses=witnesses[axis],
             method=methods[axis],
             unusual_log_ratio=compared[axis].unusual_log_ratio,
+            unknown_change=(
+                _largest([kind.change() for kind in bundles[axis].witnesses.values()])
+                if methods[axis] == "one-session"
+                else math.nan
+            ),
             n_baseline_sessions=_present(cells[axis], "baseline"),
             n_target_sessions=_present(cells[axis], "target"),
             n_baseline_cycles=max((len(cell.cycles) for cell in cells[axis]), default=0),
@@ -293,6 +309,11 @@ def _cycle_p_value(cells: Sequence[Cell], policy: Policy) -> float:
     return relabelled_p_value(np.mean(distances, axis=0), n_baseline + n_target)
 
 
+def _largest(values: Sequence[float]) -> float:
+    """Return the largest of those that are known; NaN without any."""
+    return float(np.fmax.reduce(values, initial=math.nan))
+
+
 def _method(cells: Sequence[Cell]) -> Method:
     n_baseline, n_target = _present(cells, "baseline"), _present(cells, "target")
     n_cycles = max((len(cell.cycles) for cell in cells), default=0)
@@ -322,5 +343,5 @@ def _state(judgement: Judgement, policy: Policy) -> State:
     level = policy.false_alarm_rate
     improbable = judgement.p_adjusted <= level and judgement.p_alone <= level
     if not improbable or judgement.effect < policy.minimum_effect:
-        return "healthy"
+        return "insufficient-data" if judgement.unknown_change > UNKNOWN_CHANGE else "healthy"
     return "fault" if judgement.effect >= policy.fault_effect else "changed"

@@ -1,5 +1,6 @@
 """Distance between recording sessions by the ordinal patterns of their envelopes."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -125,6 +126,10 @@ class PatternEvidence:
         """Return the relative change of the pattern probabilities where it is largest."""
         effects = effect_by_cell(self.cells)
         return float(np.nanmax(effects)) if np.isfinite(effects).any() else float("nan")
+
+    def change(self) -> float:
+        """Return NaN: what it knows differs between any two sessions."""
+        return math.nan
 
     def of_target(self, session: int) -> "PatternEvidence":
         """Return the evidence with one of the target's sessions alone."""

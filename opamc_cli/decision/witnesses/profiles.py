@@ -12,6 +12,7 @@ from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.departure import Block
 from opamc_cli.decision.witnesses.deviation import (
     change_between,
+    change_beyond_noise,
     chosen,
     clearest_of,
     variance_within_sessions,
@@ -104,6 +105,12 @@ class ProfileEvidence:
     def effect(self) -> float:
         """Return the relative change of the course; see `profile_effect`."""
         return profile_effect(self.cells, self.n_baseline)
+
+    def change(self) -> float:
+        """Return the root-mean-square change beyond the noise of cycles."""
+        return change_beyond_noise(
+            [(cell.course, cell.cycles, cell.within) for cell in self.cells], self.n_baseline
+        )
 
     def of_target(self, session: int) -> "ProfileEvidence":
         """Return the evidence with one of the target's sessions alone."""

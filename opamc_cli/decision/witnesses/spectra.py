@@ -85,6 +85,10 @@ class SpectrumEvidence:
         """Return the relative change of the size of the fluctuations; see `size_effect`."""
         return size_effect(self.cells, self.n_baseline)
 
+    def change(self) -> float:
+        """Return NaN: what it knows differs between any two sessions."""
+        return math.nan
+
     def of_target(self, session: int) -> "SpectrumEvidence":
         """Return the evidence with one of the target's sessions alone."""
         rows = [*range(self.n_baseline), self.n_baseline + session]

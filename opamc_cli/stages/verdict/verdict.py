@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -52,9 +52,9 @@ class Decided:
     bundles: Mapping[int, Bundle]
     judgements: Mapping[int, Judgement]
     """With `bundles`: what is known of each axis, and what was made of it."""
-    each: Mapping[int, Sequence[LoneSession]]
+    each: Mapping[int, Sequence[LoneSession]] = field(default_factory=dict)
     """The same by each of several target sessions alone."""
-    alone: Mapping[int, LoneSession]
+    alone: Mapping[int, LoneSession] = field(default_factory=dict)
     """Those by which an axis is judged, since they are worse than all together."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
@@ -123,10 +123,12 @@ def decide(sides: Sides, config: Config) -> Decided:
 
 def _concern(judgement: Judgement) -> tuple[int, float]:
     """Rank judgements of one joint: by state, then by how improbable."""
-    ranks = {"insufficient-data": -1, "healthy": 0, "changed": 2, "fault": 3}
-    far = judgement.state == "healthy" and judgement.health_index > FAR
-    rank = 1 if far else ranks[judgement.state]
-    return rank, -judgement.p_adjusted
+    if judgement.state in ("changed", "fault"):
+        return 3 if judgement.state == "fault" else 2, -judgement.p_adjusted
+    if math.isnan(judgement.p_adjusted):
+        return -1, 0.0
+    doubtful = judgement.state == "insufficient-data" or judgement.health_index > FAR
+    return int(doubtful), -judgement.p_adjusted
 
 
 def write(
@@ -186,6 +188,8 @@ def content(
         final = _with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
+        if final.state == "insufficient-data":
+            final = replace(final, health_index=math.nan, p_value=math.nan, p_adjusted=math.nan)
         bundle = decided.bundles[axis]
         motions = [
             {
