@@ -20,6 +20,7 @@ from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.common import far_together
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
+from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
@@ -188,7 +189,8 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        named = with_reasons(judged, {**far_together(judged), **unjudged.axes})
+        odd = far_together(judged) | exchanged_joints(decided, judged)
+        named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))

@@ -94,6 +94,7 @@ _UNKNOWN: Mapping[str, Any] = {
     "p_value": None,
     "p_adjusted": None,
     "cause": None,
+    "brief": None,
 }
 _EMPTY: Mapping[str, Any] = {
     "features": {"delta_mu": None, "delta_var": None, "ks": None},
