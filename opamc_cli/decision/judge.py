@@ -42,9 +42,12 @@ so that they are worth five degrees of freedom and not ten."""
 CYCLES_DIFFER = 0.05
 """Level at which cycles of baseline and target count as different where one session is known."""
 
+HEARD_FROM = 3
+"""Sessions of the baseline from which all witnesses are asked: fewer show no spread."""
+
 UNKNOWN_CHANGE = 0.2
-"""Relative change of the current's course or size from the only session of a baseline, from which
-a joint is not called healthy.
+"""Relative change of the current's course or size from a baseline of one or two sessions, from
+which a joint is not called healthy.
 
 How much nights differ by it is not known then. Of pairs of healthy nights 1 of 250 robots of
 another simulator has as much, none of 260 single joints, 1 of 40 fleets.
@@ -78,7 +81,7 @@ class Bundle:
         """Return all that the sessions can be told apart by: the patterns first."""
         kinds: dict[str, Evidence] = {PATTERNS: PatternEvidence(self.cells)}
         # Two sessions show no spread, and the one that stands in for it is that of divergences.
-        if self.cells and len(self.cells[0].baseline) > 2:
+        if self.cells and len(self.cells[0].baseline) >= HEARD_FROM:
             kinds |= self.witnesses
         return kinds
 
@@ -127,8 +130,8 @@ class Judgement:
     unusual_log_ratio: float
     """Log of how unusual the target's conditions are, by its current's course; 0 if unknown."""
     unknown_change: float
-    """Relative change of the current's course or size, where one baseline session does not tell
-    how much healthy ones differ by it; else NaN."""
+    """Relative change of the current's course or size, where one or two baseline sessions do not
+    tell how much healthy ones differ by it; else NaN."""
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
@@ -208,7 +211,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             unusual_log_ratio=compared[axis].unusual_log_ratio,
             unknown_change=(
                 _largest([kind.change() for kind in bundles[axis].witnesses.values()])
-                if methods[axis] == "one-session"
+                if 0 < _present(cells[axis], "baseline") < HEARD_FROM
                 else math.nan
             ),
             n_baseline_sessions=_present(cells[axis], "baseline"),

@@ -358,9 +358,9 @@ NO_RUNS = {ending for ending in FORMAT_OF_ENDING if ending not in (".txt", ".dat
 
 
 def passed_over(paths: Sequence[Path]) -> list[str]:
-    """Say in one sentence for each folder what recordings in it are no runs.
+    """Say in one sentence for each folder what recordings in it are no runs, and of links in it.
 
-    One that lies beside a run of its name was made into it.
+    A recording that lies beside a run of its name was made into it.
     """
     said = []
     for folder in dict.fromkeys(path for path in expand_patterns(paths) if path.is_dir()):
@@ -378,6 +378,11 @@ def passed_over(paths: Sequence[Path]) -> list[str]:
                 f"{', …' if len(left) > 1 else ''}): only *.parquet are runs; "
                 "`opamc ingest` turns others into runs"
             )
+        said += [
+            f"{link}: is a link to a folder, which is passed over; name it beside {folder}"
+            for link in sorted(folder.rglob("*"))
+            if link.is_symlink() and link.is_dir() and not link.name.startswith(".")
+        ]
     return said
 
 

@@ -201,3 +201,7 @@ def test_recordings_that_are_no_runs_are_told_from_other_files(tmp_path):
     assert "3 recordings are passed over (a.csv, …)" in said
     assert "`opamc ingest`" in said
     assert passed_over([tmp_path / "c.parquet"]) == []
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "monday").symlink_to(tmp_path / "night")
+    (said,) = passed_over([tmp_path / "runs"])
+    assert "monday: is a link to a folder" in said

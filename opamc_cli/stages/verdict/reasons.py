@@ -275,9 +275,10 @@ def _conditions(judgement: Judgement) -> list[str]:
 def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:
     if judgement.unknown_change > UNKNOWN_CHANGE:
         return [
-            f"Its current differs by {judgement.unknown_change:.0%} from the only baseline session "
-            "(root mean square of course or size), and how much healthy sessions differ is not "
-            "known: neither healthy nor changed; record the baseline on some more days."
+            f"Its current differs by {judgement.unknown_change:.0%} from "
+            f"{_count(judgement.n_baseline_sessions, 'baseline session')} (root mean square of "
+            "course or size), and how much healthy sessions differ is not known: neither healthy "
+            "nor changed; record the baseline on some more days."
         ]
     if not cells:
         return [

@@ -43,5 +43,5 @@ def test_what_one_baseline_session_cannot_tell_is_said():
     bundle = known_fleet.bundle(4, 1, 1, (), 0.0)
     judged = judge({4: bundle})[4]
     (said,) = reasons(judged, bundle, [], {"baseline": [], "target": []})
-    assert said.startswith("Its current differs by 30% from the only baseline session")
+    assert said.startswith("Its current differs by 30% from 1 baseline session")
     assert "neither healthy nor changed" in said
