@@ -736,3 +736,19 @@ def test_recordings_that_are_no_runs_are_said_even_if_quiet(opamc, tmp_path):
     (sentence,) = ended.sentences
     assert "1 recording is passed over" in sentence
     assert "monday.csv" in sentence
+
+
+def test_sweep_of_delays_longer_than_any_motion(opamc, tmp_path):
+    run = bad_runs.good(tmp_path / "a.parquet")
+    ended = opamc("sweep", "--baseline", run, "--tau", "2000:2001", "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "no motion is long enough", "delay 2000")
+    assert not (tmp_path / "out" / "sweep.parquet").exists()
+
+
+def test_tables_of_the_same_recordings_are_no_comparison(opamc, tmp_path):
+    run = bad_runs.good(tmp_path / "a.parquet")
+    for command in (("segment", run), ("identify",), ("patterns",)):
+        assert opamc(*command, "--out", tmp_path / "out", "--quiet").code == ExitCode.DONE
+    table = tmp_path / "out" / "patterns.parquet"
+    ended = opamc("score", "--baseline", table, "--target", table, "--out", tmp_path / "scored")
+    check_refusal(ended, ExitCode.BAD_INPUT, "same recording")
