@@ -58,6 +58,8 @@ class DiagnoseOutcome:
     """One for each run, or axis of a run, that could not be used."""
     notes: tuple[str, ...]
     """What is worth knowing besides."""
+    conditions: tuple[str, ...] = ()
+    """Those of the notes that say what differs between the recordings of both sides."""
 
 
 def run(
@@ -203,7 +205,11 @@ def _diagnose(
         report_path=page.path,
         exit_code=written.exit_code,
         n_runs=len(normal.runs_done) + len(other.runs_done),
-        errors=(*normal.errors, *other.errors, *unjudged.errors),
+        errors=(
+            *(*normal.errors, *other.errors, *unjudged.errors),
+            *unjudged.sessions_at_rest(sides),
+        ),
+        conditions=check_comparable(sides.baseline.sources, sides.target.sources),
         notes=every_note,
     )
 

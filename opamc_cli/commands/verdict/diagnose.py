@@ -58,7 +58,9 @@ def diagnose(
             progress=progress,
         )
     output.passed_over([*baseline, *target])
-    output.notes(outcome.notes, verbose)
+    for condition in outcome.conditions:
+        output.failure(condition)
+    output.notes([note for note in outcome.notes if note not in outcome.conditions], verbose)
     output.result(
         {
             **outcome.verdict,
