@@ -42,6 +42,11 @@ so that they are worth five degrees of freedom and not ten."""
 CYCLES_DIFFER = 0.05
 """Level at which cycles of baseline and target count as different where one session is known."""
 
+FAR = 20.0
+"""Health index beyond which nothing is called healthy because other joints have moved as far:
+warmth, supply and load move all joints by a few of the baseline's own spreads; what moves them
+by more (a wrong unit, another controller, a changed logger) hides any fault."""
+
 HEARD_FROM = 3
 """Sessions of the baseline from which all witnesses are asked: fewer show no spread."""
 

@@ -191,7 +191,7 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = far_together(judged) | exchanged_joints(decided, judged)
+        odd = far_together(judged) | exchanged_joints(sides, decided.target_runs(), judged)
         named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 

@@ -13,13 +13,12 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.each_session import LoneSession, each_session
-from opamc_cli.decision.judge import Bundle, Judgement, Policy, judge
+from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy, judge
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import Sessions, started
-from opamc_cli.stages.verdict.agreement.common import FAR
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.stages.verdict.reasons import reasons
@@ -72,6 +71,10 @@ class Decided:
             return sources
         of_run = self.sides.sessions[1].of_run
         return [s for s in sources if of_run[s.name] == self.alone[axis].session]
+
+    def target_runs(self) -> dict[int, list[str]]:
+        """Return the names of the target's recordings by which each axis is judged."""
+        return {axis: [s.name for s in self.target_sources(axis)] for axis in self.judgements}
 
     def named(self, axis: int) -> str:
         """Return the session by which alone an axis is judged."""

@@ -8,7 +8,6 @@ import numpy.typing as npt
 
 from opamc_cli.config.models import SegmentConfig
 from opamc_cli.errors import InputError
-from opamc_cli.signal.limits import LIMITS, Size
 from opamc_cli.signal.motion.boundaries import refine_boundaries
 from opamc_cli.signal.motion.motion_signal import MotionBand, MotionStream, join_frames
 from opamc_cli.signal.motion.noise import noise_level
@@ -22,7 +21,7 @@ from opamc_cli.signal.motion.segmentation import (
 )
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.offset import turning_means, turning_offset
-from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.quality import LIMITS, Size, clipped_share
 from opamc_cli.signal.transform.analytic import (
     AnalyticStream,
     clarke,

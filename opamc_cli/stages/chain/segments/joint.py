@@ -5,7 +5,6 @@ import numpy.typing as npt
 
 from opamc_cli.config.models import JointConfig, SegmentConfig
 from opamc_cli.errors import InputError
-from opamc_cli.signal.limits import LIMITS
 from opamc_cli.signal.motion.reported import (
     JointMotion,
     find_joint_motions,
@@ -14,7 +13,7 @@ from opamc_cli.signal.motion.reported import (
     quiet_velocity,
 )
 from opamc_cli.signal.motion.windows import carrier_windows
-from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
     AxisSegments,
     Segment,

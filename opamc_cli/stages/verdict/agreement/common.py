@@ -3,10 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-FAR = 20.0
-"""Health index beyond which nothing is called healthy because other joints have moved as far:
-warmth, supply and load move all joints by a few of the baseline's own spreads; what moves them
-by more (a wrong unit, another controller, a changed logger) hides any fault."""
+from opamc_cli.decision.judge import FAR
 
 
 def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from opamc_cli.stages.verdict.verdict import Decided
+from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.storage.schemas import files
 
 Courses = dict[int, dict[int, npt.NDArray[np.float64]]]
@@ -21,19 +21,22 @@ its own course, not both to each other's: 0.97 at least of 5000 pairs of two sim
 healthy and at fault."""
 
 
-def exchanged_joints(decided: Decided, verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
+def exchanged_joints(
+    sides: Sides, targets: Mapping[int, Collection[str]], verdict: Mapping[str, Any]
+) -> dict[int, tuple[str, ...]]:
     """Return pairs of axes of which each follows the other's course, with the reason.
 
     Parameters
     ----------
-    decided
-        The decision and what it was made of.
+    sides
+        Tables of baseline and target.
+    targets
+        Runs of the target by which each axis is judged.
     verdict
         Content of verdict.json: nothing is asked unless a joint is changed or at fault.
     """
     bad = {e["axis"] for e in verdict["axes"] if e["state"] in ("changed", "fault")}
-    sides = decided.sides.baseline, decided.sides.target
-    tables = [side.witnesses.get(files.PROFILES) for side in sides]
+    tables = [side.witnesses.get(files.PROFILES) for side in (sides.baseline, sides.target)]
     if not bad or tables[0] is None or tables[1] is None:
         return {}
     known = _courses(tables[0])
@@ -42,9 +45,7 @@ def exchanged_joints(decided: Decided, verdict: Mapping[str, Any]) -> dict[int, 
         if not bad & set(pair):
             continue
         # one night alone may have them exchanged
-        axis = next((axis for axis in pair if axis in decided.alone), pair[0])
-        runs = {source.name for source in decided.target_sources(axis)}
-        new = _courses(tables[1], runs)
+        new = _courses(tables[1], min((targets[axis] for axis in pair if axis in targets), key=len))
         ways = [(_away(new, one, known, other), _away(new, one, known, one))
                 for one, other in (pair, pair[::-1])]  # fmt: skip
         if all(across <= NEARER * own for across, own in ways):
