@@ -81,16 +81,15 @@ class Decided:
         return self.sides.sessions[1].named(self.alone[axis].session)
 
     def sessions_at_fault(self, axis: int) -> str | None:
-        """Say which of the target's sessions show a change by themselves; None if all or none."""
-        each = self.each[axis]
+        """Say which of the target's sessions are at fault by themselves; None if all or none."""
+        each = self.each.get(axis, ())
         bad = [one.session for one in each if one.judgement.state in ("changed", "fault")]
         if not 0 < len(bad) < len(each):
             return None
-        names = [self.sides.sessions[1].named(session) for session in bad]
-        if len(names) == 1:
-            return f"Of {len(each)} target sessions only {names[0]} shows it by itself."
-        shown = ", ".join(names)
-        return f"Of {len(each)} target sessions {len(names)} show it by themselves: {shown}."
+        shown = ", ".join(self.sides.sessions[1].named(session) for session in bad)
+        if axis in self.alone and len(bad) == 1:
+            return f"Of {len(each)} target sessions only {shown} shows it by itself."
+        return f"At fault by itself, of {len(each)} target sessions: {shown}."
 
     def notes(self) -> list[str]:
         """Say which axes were judged without some of the witnesses."""
@@ -125,9 +124,9 @@ def decide(sides: Sides, config: Config) -> Decided:
 
 
 def _concern(judgement: Judgement) -> tuple[int, float]:
-    """Rank judgements of one joint: by state, then by how improbable."""
+    """Rank judgements of one joint: unhealthy, doubtful, healthy, then by how improbable."""
     if judgement.state in ("changed", "fault"):
-        return 3 if judgement.state == "fault" else 2, -judgement.p_adjusted
+        return 2, -judgement.p_adjusted
     if math.isnan(judgement.p_adjusted):
         return -1, 0.0
     doubtful = judgement.state == "insufficient-data" or judgement.health_index > FAR
