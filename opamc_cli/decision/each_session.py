@@ -10,7 +10,7 @@ LONE_SHARE = 1 / 30
 
 Tails of single nights are heavier than they are taken for (three or four baseline nights do not
 know all conditions): at the whole level 1.7 % of 2000 healthy folders alarm by one night alone, at
-a 30th 0.3 %.
+a 30th 0.2 %.
 """
 
 
