@@ -55,7 +55,7 @@ UNKNOWN_CHANGE = 0.2
 which a joint is not called healthy.
 
 How much nights differ by it is not known then. Of pairs of healthy nights 1 of 250 robots of
-another simulator has as much, none of 120 single joints, 5 of 150 fleets.
+another simulator has as much, none of 220 single joints, 5 of 150 fleets.
 """
 
 
