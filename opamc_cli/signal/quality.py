@@ -1,8 +1,11 @@
 """Signs that a channel cannot be trusted."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
+FloatArray = NDArray[np.float64]
 MOST_BRIDGED = 3
 """Samples of a gap that is filled: a packet or two that a logger lost, less than any pattern
 spans."""
@@ -68,3 +71,102 @@ def is_constant(x: NDArray[np.floating]) -> bool:
     """Whether all known samples of a channel are equal (true if there are none)."""
     known = x[np.isfinite(x)]
     return not known.size or bool(known.min() == known.max())
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Of one quantity of a joint, by its size."""
+
+    impossible: float
+    """More is of no joint."""
+    unusual: float
+    """More is of few."""
+    unit: str
+    """Of both."""
+    looks_like: str
+    """What it probably is instead."""
+
+
+LIMITS = {
+    "A": Limit(1000.0, 200.0, "A", "mA taken for A"),
+    "Nm": Limit(1e5, 3e4, "Nm", "mNm taken for Nm"),
+    "velocity": Limit(100.0, 60.0, "rad/s", "degrees or rpm taken for rad/s, or the motor's side"),
+    "position": Limit(100.0, 60.0, "rad/s", "degrees taken for rad, or the motor's side"),
+}
+"""By unit of the current, or by channel; of a position its speed counts.
+
+The largest drives of robots peak at some 150 A, and their first joints hold 20 kNm; the fastest
+joint, the last one of a small arm, turns at 50 rad/s.
+"""
+
+SELDOM = 0.01
+"""Share of the samples up to which they are disturbances of a log that is right."""
+
+STRIDE_S = 0.05
+"""Over which a position's speed is taken: steps and noise of the encoder do not count."""
+
+WRAPPED = 0.5
+"""Rad by which a jump may miss a whole turn to be one: a wrist that passes half a turn."""
+
+
+@dataclass
+class Size:
+    """How large a channel's numbers are, counted block by block."""
+
+    limit: Limit
+    """What they are held against."""
+    known: int = 0
+    """Samples that were seen."""
+    impossible: int = 0
+    unusual: int = 0
+    """With `impossible`: those beyond."""
+    largest: float = 0.0
+    """Of their sizes."""
+
+    def add(self, values: NDArray[np.floating]) -> None:
+        """Count a block; NaN is no large number."""
+        extremes = (np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0))
+        self.known += values.size
+        self.largest = max(self.largest, float(extremes[0]), -float(extremes[1]))
+        if self.largest <= self.limit.unusual:
+            return
+        sizes = np.abs(values)
+        self.impossible += int(np.count_nonzero(sizes > self.limit.impossible))
+        self.unusual += int(np.count_nonzero(sizes > self.limit.unusual))
+
+    @property
+    def is_impossible(self) -> bool:
+        """Whether so many are beyond any joint's that it is no disturbance."""
+        return self.impossible > SELDOM * self.known
+
+    def doubt(self) -> str | None:
+        """Say what is odd about them; None if nothing is."""
+        limit = self.limit
+        if self.is_impossible:
+            return (
+                f"is beyond {limit.impossible:g} {limit.unit} in {self.impossible / self.known:.0%}"
+                f" of its samples (up to {self.largest:.3g}), which no robot's joint is: "
+                f"{limit.looks_like}?"
+            )
+        if self.unusual > SELDOM * self.known:
+            return (
+                f"is beyond {limit.unusual:g} {limit.unit} in {self.unusual / self.known:.0%} of "
+                f"its samples (up to {self.largest:.3g}), as few robots' joints are: "
+                f"{limit.looks_like}?"
+            )
+        if self.impossible:
+            return (
+                f"has {self.impossible} samples beyond {limit.impossible:g} {limit.unit} (up to "
+                f"{self.largest:.3g}), which are no measurement"
+            )
+        return None
+
+
+def strided_speed(position_rad: FloatArray, fs_hz: float) -> FloatArray:
+    """Return the mean speeds of a position over `STRIDE_S`, whole turns' jumps left out, rad/s."""
+    steps = np.diff(position_rad)
+    turns = np.round(steps / (2 * np.pi))
+    wrapped = (np.abs(turns) == 1) & (np.abs(np.abs(steps) - 2 * np.pi) < WRAPPED)
+    path = np.cumsum(np.where(wrapped, steps - turns * 2 * np.pi, np.nan_to_num(steps)))
+    stride = max(1, round(STRIDE_S * fs_hz))
+    return np.asarray((path[stride:] - path[:-stride]) * fs_hz / stride)

@@ -20,6 +20,7 @@ from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.common import far_together
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
+from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
@@ -57,6 +58,8 @@ class DiagnoseOutcome:
     """One for each run, or axis of a run, that could not be used."""
     notes: tuple[str, ...]
     """What is worth knowing besides."""
+    conditions: tuple[str, ...] = ()
+    """Those of the notes that say what differs between the recordings of both sides."""
 
 
 def run(
@@ -130,7 +133,7 @@ def _diagnose(
         baseline,
         config,
         out / "baseline",
-        without=repeats,
+        without=repeats["baseline"],
         check=partial(agreement.check, "baseline", kept=kept),
         jobs=jobs,
         kept=kept,
@@ -141,7 +144,7 @@ def _diagnose(
         config,
         out / "target",
         reference=normal.motions,
-        without=repeats,
+        without=repeats["target"],
         check=partial(agreement.check, "target", motions=normal.motions),
         jobs=jobs,
         progress=lambda stage: progress(f"target: {stage}"),
@@ -165,7 +168,12 @@ def _diagnose(
             times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
             try:
                 found = cause.explain(
-                    axis, sides.baseline.sources, sides.target.sources, config.joint, times, kept
+                    axis,
+                    sides.baseline.sources,
+                    decided.target_sources(axis),
+                    config.joint,
+                    times,
+                    kept,
                 )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings
@@ -183,7 +191,8 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        named = with_reasons(judged, {**far_together(judged), **unjudged.axes})
+        odd = far_together(judged) | exchanged_joints(sides, decided.target_runs(), judged)
+        named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))
@@ -196,7 +205,11 @@ def _diagnose(
         report_path=page.path,
         exit_code=written.exit_code,
         n_runs=len(normal.runs_done) + len(other.runs_done),
-        errors=(*normal.errors, *other.errors, *unjudged.errors),
+        errors=(
+            *(*normal.errors, *other.errors, *unjudged.errors),
+            *unjudged.sessions_at_rest(sides),
+        ),
+        conditions=check_comparable(sides.baseline.sources, sides.target.sources),
         notes=every_note,
     )
 

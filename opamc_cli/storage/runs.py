@@ -25,6 +25,7 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
+from opamc_cli.storage.ingest.formats import FORMAT_OF_ENDING
 from opamc_cli.storage.schemas.channels import (
     COLUMN,
     CURRENTS,
@@ -350,6 +351,44 @@ def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
         # two folders with equal file names: the whole path tells them apart
         runs = [(path.with_suffix("").as_posix(), path) for _, path in runs]
     return sorted(runs)
+
+
+NO_RUNS = {ending for ending in FORMAT_OF_ENDING if ending not in (".txt", ".dat", ".parquet")}
+"""Of files that are recordings, if not runs: a text beside them may be anything."""
+
+
+def passed_over(paths: Sequence[Path]) -> list[str]:
+    """Say in one sentence for each folder what recordings in it are no runs, and of links in it.
+
+    A recording that lies beside a run of its name was made into it.
+    """
+    said = []
+    for folder in dict.fromkeys(path for path in expand_patterns(paths) if path.is_dir()):
+        left = [
+            file.relative_to(folder)
+            for file in sorted(folder.rglob("*"))
+            if _ending(file) in NO_RUNS or file.suffix == ".PARQUET"
+            if not any(part.startswith(".") for part in file.relative_to(folder).parts)
+            if file.is_file() and not file.with_suffix(".parquet").exists()
+        ]
+        if left:
+            count = f"{len(left)} recordings are" if len(left) > 1 else "1 recording is"
+            said.append(
+                f"{folder}: {count} passed over ({shown(left[0])}"
+                f"{', …' if len(left) > 1 else ''}): only *.parquet are runs; "
+                "`opamc ingest` turns others into runs"
+            )
+        said += [
+            f"{link}: is a link to a folder, which is passed over; name it beside {folder}"
+            for link in sorted(folder.rglob("*"))
+            if link.is_symlink() and link.is_dir() and not link.name.startswith(".")
+        ]
+    return said
+
+
+def _ending(file: Path) -> str:
+    suffixes = [suffix.lower() for suffix in file.suffixes if suffix.lower() != ".gz"]
+    return suffixes[-1] if suffixes else ""
 
 
 def _may_be_run(folder: Path, file: Path) -> bool:

@@ -143,9 +143,17 @@ def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource])
     Raises
     ------
     InputError
-        If rate or program differ where both are known.
+        If rate or program differ where both are known, or a recording is on both sides.
     """
     runs = [*baseline, *target]
+    known = {run.sha256: run for run in baseline if run.sha256}
+    for run in target:
+        if run.sha256 in known:
+            msg = (
+                f"{run.path}: is the same recording as {known[run.sha256].path} of the baseline; "
+                "a baseline needs other recordings than those that it judges"
+            )
+            raise InputError(msg)
     for key in REQUIRED_EQUAL:
         difference = _first_difference(runs, key)
         if difference is not None:

@@ -51,6 +51,11 @@ def with_metadata(path: Path, metadata: dict[str, str] | None, **columns: object
     return path
 
 
+def milliamperes(path: Path) -> Path:
+    save_run(path, INFO, {name: 1000 * x for name, x in phases().items()})
+    return path
+
+
 def stage_table(path: Path) -> Path:
     """Write what a later stage reads, under a run's name."""
     record = {"opamc_table": json.dumps({"stage": "segment", "schema_version": 1})}

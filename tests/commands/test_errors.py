@@ -305,6 +305,7 @@ UNUSABLE = [
     (bad_runs.standing, ["no motion was found"]),
     (bad_runs.short, ["no motion was found"]),
     (bad_runs.current_alone, ["axis1_current", "axis1_position"]),
+    (bad_runs.milliamperes, ["column axis1_a is beyond 1000 A", "mA taken for A"]),
 ]
 
 
@@ -561,6 +562,11 @@ def in_column(name: str, value: float) -> Callable[[dict[str, np.ndarray]], None
             ExitCode.NOT_ENOUGH_DATA,
             ["axis 1 does not move"],
         ),
+        (
+            lambda c: c["axis1_current"].__imul__(np.float32(5000)),
+            ExitCode.BAD_INPUT,
+            ["axis1_current is beyond 1000 A"],
+        ),
     ],
 )
 @pytest.mark.parametrize("command", ["fit", "trace", "close"])
@@ -719,3 +725,39 @@ def test_a_full_disk_leaves_nothing_half_written(tmp_path):
         "check space",
     )
     assert not list((tmp_path / "out").glob("*log*"))
+
+
+def test_recordings_that_are_no_runs_are_said_even_if_quiet(opamc, tmp_path):
+    bad_runs.good(tmp_path / "runs" / "a.parquet")
+    (tmp_path / "runs" / "monday.csv").write_text("time,current\n0,1\n")
+    (tmp_path / "runs" / "README.txt").write_text("of monday\n")
+    ended = opamc("segment", tmp_path / "runs", "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.DONE
+    (sentence,) = ended.sentences
+    assert "1 recording is passed over" in sentence
+    assert "monday.csv" in sentence
+
+
+def test_sweep_of_delays_longer_than_any_motion(opamc, tmp_path):
+    run = bad_runs.good(tmp_path / "a.parquet")
+    ended = opamc("sweep", "--baseline", run, "--tau", "2000:2001", "--out", tmp_path / "out")
+    check_refusal(ended, ExitCode.NOT_ENOUGH_DATA, "no motion is long enough", "delay 2000")
+    assert not (tmp_path / "out" / "sweep.parquet").exists()
+
+
+def test_tables_of_the_same_recordings_are_no_comparison(opamc, tmp_path):
+    run = bad_runs.good(tmp_path / "a.parquet")
+    for command in (("segment", run), ("identify",), ("patterns",)):
+        assert opamc(*command, "--out", tmp_path / "out", "--quiet").code == ExitCode.DONE
+    table = tmp_path / "out" / "patterns.parquet"
+    ended = opamc("score", "--baseline", table, "--target", table, "--out", tmp_path / "scored")
+    check_refusal(ended, ExitCode.BAD_INPUT, "same recording")
+
+
+def test_another_robots_baseline_is_said_even_if_quiet(opamc, tmp_path):
+    own = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(2)]
+    other = bad_runs.good(tmp_path / "other.parquet", seed=2, robot="R2")
+    sides = ("--baseline", own[0], "--baseline", own[1], "--target", other)
+    ended = opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.DONE
+    assert [text for text in ended.sentences if "robot differs" in text]

@@ -1,5 +1,6 @@
 """Pattern tables with the counts of a made-up fleet."""
 
+import hashlib
 from pathlib import Path
 
 import pyarrow as pa
@@ -49,7 +50,7 @@ def write_patterns(folder: Path, plan: Fleet, seed: int, **info) -> tuple[Path, 
             RunSource(
                 name=f"{role}-{session}",
                 path=folder / "runs" / f"{role}-{session}.parquet",
-                sha256="0" * 64,
+                sha256=hashlib.sha256(f"{folder}{role}-{session}".encode()).hexdigest(),
                 n_samples=100_000,
                 info=RunInfo(
                     **{

@@ -197,14 +197,14 @@ healthy 4.016e-05 8.845e-05 1 1.764 4.655 4.708 0.07622 0 0.08286 4.017e-06 0.42
 healthy 0.7767 1 1 0 0.6534 -1.056 0.1325 0 0.09458 0.787
 healthy 0.003542 0.01771 0.01771 0 9.803 19.41 0.5761 0.05654 0.1022 0.003542
 healthy 0.5158 1 1 0 0.6686 -1.016 0.136 0.3937 0.1105 0.7731
-healthy 0.553 1 1 0 0.6907 -0.9592 0.136 0.01837 0.3623 0.7529
+insufficient-data 0.553 1 1 0 0.6907 -0.9592 0.136 0.01837 0.3623 0.7529
 healthy 0.6275 1 1 0 0.9277 -0.4439 0.1723 0 0.1037 0.5567
 """,
     "one session": """
 healthy 0.4489 1 1 0 1.033 0.01236 0.2308 nan nan 0.4489
 fault 5.395e-05 0.0002697 0.0002697 0 7.651 28.81 0.5543 nan nan 5.395e-05
 healthy 0.541 1 1 0 0.9679 -0.2732 0.2296 nan nan 0.541
-healthy 0.5687 1 1 0 0.9488 -0.3406 0.2251 nan nan 0.5687
+insufficient-data 0.5687 1 1 0 0.9488 -0.3406 0.2251 nan nan 0.5687
 healthy 0.5543 1 1 0 0.9576 -0.3084 0.2003 nan nan 0.5543
 """,
     "three and two": """
@@ -312,3 +312,14 @@ def test_the_patterns_are_a_witness_by_name_and_alone_for_two_sessions():
         plan = Fleet(n_baseline=n_baseline)
         witness = SpectrumEvidence(spectra(plan, 0)[1], n_baseline)
         assert list(Bundle(cells(plan, 0)[1], {"spectrum": witness}).evidence()) == names
+
+
+def test_a_gross_change_from_one_or_two_baseline_sessions_is_not_called_healthy():
+    """How much nights differ by it is not known: a course that changed by 40 % may be a fault."""
+    plans = ("one session", "two sessions", "six sessions")
+    found = {name: known_fleet.judged(name)[4] for name in plans}
+    assert found["two sessions"].state == "insufficient-data"
+    assert found["one session"].state == "insufficient-data"
+    assert found["one session"].unknown_change == pytest.approx(0.303, abs=1e-3)
+    assert np.isnan(found["six sessions"].unknown_change)
+    assert known_fleet.judged("one session")[5].state == "healthy"

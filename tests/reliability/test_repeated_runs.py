@@ -60,3 +60,15 @@ def test_a_run_against_itself_is_refused(opamc, tonight, tmp_path):
     ended = opamc("diagnose", "--baseline", tonight, "--target", tonight, "--out", tmp_path / "out")
     assert ended.code == ExitCode.BAD_INPUT
     assert "a baseline needs other recordings" in ended.sentences[0]
+
+
+def test_a_run_of_the_folder_of_the_baseline_is_judged_by_the_others(opamc, baseline, tmp_path):
+    """The very same path on both sides was left out of both: a bug, or a night that nobody saw."""
+    ended = opamc(
+        *("diagnose", "--baseline", baseline, "--target", baseline / "night-2.parquet"),
+        *("--out", tmp_path / "out", "--set", "joint.explain=false"),
+    )
+    assert ended.code == ExitCode.DONE, ended
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["baseline"]["runs"] == ["night-0", "night-1"]
+    assert verdict["target"]["runs"] == ["night-2"]

@@ -33,7 +33,13 @@ def one_phase(columns):
     columns.pop("axis2_c")
 
 
+def hundredfold(columns):
+    for name in "abc":
+        columns[f"axis2_{name}"] *= np.float32(100)
+
+
 def milliampere(columns):
+    """Set more than any robot's joint takes: its motions are not even looked for."""
     for name in "abc":
         columns[f"axis2_{name}"] *= np.float32(1000)
 
@@ -72,6 +78,7 @@ REASONS = {
     dead: "its sensor is dead",
     exchanged: "are two of its phases exchanged?",
     one_phase: "axis 2 is recorded as axis2_a, the baseline has axis2_a, axis2_b, axis2_c",
+    hundredfold: "another unit (mA for A)?",
     milliampere: "another unit (mA for A)?",
     frozen: "axis2_b keeps one value from",
     inverted: "do not add up to zero",
@@ -111,7 +118,7 @@ def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp
 
 
 @pytest.mark.parametrize(
-    "wrong", [long(milliampere), frozen, long(one_phase)], ids=lambda w: w.__name__
+    "wrong", [long(hundredfold), frozen, long(one_phase)], ids=lambda w: w.__name__
 )
 def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     opamc, baseline, tonight, tmp_path, wrong
@@ -258,7 +265,7 @@ def test_reported_joints_that_are_healthy(opamc, tmp_path):
 def test_a_target_of_which_nothing_can_be_judged(opamc, baseline, tmp_path):
     def every_axis(columns):
         for name in columns:
-            columns[name] *= np.float32(1000)
+            columns[name] *= np.float32(100)
 
     target = record(tmp_path / "tonight.parquet", 9, every_axis)
     ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
@@ -269,7 +276,7 @@ def test_a_target_of_which_nothing_can_be_judged(opamc, baseline, tmp_path):
 def test_a_baseline_in_another_unit_does_not_make_all_healthy(opamc, tonight, tmp_path):
     def every_axis(columns):
         for name in columns:
-            columns[name] *= np.float32(1000)
+            columns[name] *= np.float32(100)
 
     for seed in range(3):
         record(tmp_path / "baseline" / f"{seed}.parquet", seed, every_axis)
@@ -412,3 +419,17 @@ def test_a_gain_of_ten_per_cent_is_a_change_without_its_name(opamc, tmp_path):
     assert ended.code == ExitCode.UNHEALTHY
     axes = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
     assert {axis["state"] for axis in axes} == {"changed"}
+
+
+@pytest.mark.parametrize("wrong", [gone, dead], ids=lambda w: w.__name__)
+def test_a_joint_that_one_night_of_several_lacks_is_said(opamc, baseline, tmp_path, wrong):
+    week = [record(tmp_path / f"{k}.parquet", k, wrong if k == 10 else bool) for k in (9, 10)]
+    named = [part for run in week for part in ("--target", run)]
+    ended = opamc(
+        *("diagnose", "--baseline", baseline, *named, "--out", tmp_path / "out", "--quiet"),
+        *("--set", "joint.explain=false"),
+    )
+    assert ended.code == ExitCode.PARTIAL, ended
+    (sentence,) = ended.sentences
+    assert "10.parquet: " in sentence
+    assert "axis 2" in sentence

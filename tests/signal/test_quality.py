@@ -5,7 +5,14 @@ import pytest
 from carriers import Move, record
 
 from opamc_cli.signal.motion.noise import noise_level
-from opamc_cli.signal.quality import bridged, clipped_share, is_constant
+from opamc_cli.signal.quality import (
+    LIMITS,
+    Size,
+    bridged,
+    clipped_share,
+    is_constant,
+    strided_speed,
+)
 from opamc_cli.signal.transform.analytic import clarke
 
 
@@ -59,3 +66,26 @@ def test_constants():
     assert is_constant(np.array([np.nan, 1.0, np.nan]))
     assert is_constant(np.zeros(0))
     assert not is_constant(np.array([1.0, 1.1]))
+
+
+def test_numbers_that_no_joint_has_are_told_from_disturbances():
+    current = np.sin(np.arange(1000.0))
+    for values, impossible, words in (
+        (current, False, None),
+        (3000 * current, True, "mA taken for A"),
+        (300 * current, False, "as few robots' joints are"),
+        (np.where(np.arange(1000) == 7, 5e5, current), False, "1 samples beyond 1000 A"),
+        (np.full(10, np.nan), False, None),
+    ):
+        size = Size(LIMITS["A"])
+        for block in np.split(values, 2):
+            size.add(block)
+        assert size.is_impossible is impossible
+        assert (size.doubt() is None) if words is None else (words in size.doubt())
+
+
+def test_a_turn_passed_is_no_speed():
+    path = 4 * np.arange(0, 10, 0.01)
+    wrapped = (path + np.pi) % (2 * np.pi) - np.pi
+    np.testing.assert_allclose(strided_speed(wrapped, 100.0), 4.0)
+    assert strided_speed(np.zeros(3), 100.0).size == 0

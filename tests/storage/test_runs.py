@@ -15,6 +15,7 @@ from opamc_cli.storage.runs import (
     file_sha256,
     find_runs,
     know_sha256,
+    passed_over,
     save_run,
     write_run,
 )
@@ -181,3 +182,26 @@ def test_a_sum_that_is_known_is_not_taken_again(tmp_path):
     other = saved(tmp_path / "s.parquet")
     know_sha256(other, other.stat().st_mtime_ns, other.stat().st_size, "known")
     assert file_sha256(other) == "known"
+
+
+def test_recordings_that_are_no_runs_are_told_from_other_files(tmp_path):
+    for name in (
+        "a.csv",
+        "night/b.MAT",
+        "c.tdms",
+        "d.csv.gz",
+        "README.txt",
+        "truth.json",
+        ".e.csv",
+    ):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("1,2\n")
+    save_run(tmp_path / "c.parquet", RunInfo(100.0), {"axis1_a": np.zeros(3, np.float32)})
+    (said,) = passed_over([tmp_path, tmp_path / "c.parquet", tmp_path])
+    assert "3 recordings are passed over (a.csv, …)" in said
+    assert "`opamc ingest`" in said
+    assert passed_over([tmp_path / "c.parquet"]) == []
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "monday").symlink_to(tmp_path / "night")
+    (said,) = passed_over([tmp_path / "runs"])
+    assert "monday: is a link to a folder" in said

@@ -30,6 +30,7 @@ def segment(
     settings = load_config(config, overrides or ())
     with output_lock(out), output.steps() as steps:
         outcome = stage.run(runs, settings, out, jobs=jobs, watch=steps("segment"))
+    output.passed_over(runs)
     found = outcome.by_axis()
     for note in outcome.notes:
         output.note(note)

@@ -117,6 +117,7 @@ def close(
         outcome = stage.close(
             declared, find_runs(runs), axis or (), staged, seed, jobs=jobs, watch=steps("close")
         )
+    output.passed_over(runs)
     output.result(
         {"axes": list(outcome.results)},
         *(shown for result in outcome.results for shown in loop_tables(result)),
@@ -166,6 +167,7 @@ def _on_axes(
     declared = load_joint_model(model, overrides or ())
     with output_lock(out), _naming(model), output.steps() as steps:
         outcome = work(declared, find_runs(runs), axis or (), out, jobs=jobs, watch=steps(step))
+    output.passed_over(runs)
     output.result(
         {"axes": list(outcome.results), "written": [str(path) for path in outcome.written]},
         *(line for result in outcome.results for line in shown(result)),

@@ -70,6 +70,9 @@ def ingest(
     rates = stage.rates_note(outcome.results)
     if rates is not None:
         output.note(rates)
+    for item in outcome.results:
+        for doubt in item.doubts:
+            output.failure(doubt)
     failures = [str(error) for error in outcome.errors]
     output.result(
         {
@@ -174,6 +177,7 @@ def _as_json(item: "Ingested") -> dict[str, Any]:
         "n_samples": item.n_samples,
         "duration_s": item.n_samples / item.sampling_rate_hz,
         "missing": dict(item.missing),
+        "doubts": list(item.doubts),
         "time_stamps": None if item.stamps is None else asdict(item.stamps),
         "sources": dict(item.sources),
         "skipped": item.skipped,

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from opamc_cli.commands.terminal.streams import complain, printable, say
@@ -41,6 +42,13 @@ class Output:
     def failure(self, text: str) -> None:
         """Print why one of several runs could not be used."""
         complain(text)
+
+    def passed_over(self, paths: Sequence[Path]) -> None:
+        """Print which folders of runs hold recordings that are none: they are not judged."""
+        from opamc_cli.storage.runs import passed_over
+
+        for text in passed_over(paths):
+            complain(text)
 
     def steps(self) -> "AbstractContextManager[Steps]":
         """Show which step is how far, on a terminal only."""

@@ -81,8 +81,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     Returns
     -------
     list of Text
-        One line if all is well, one more of few baseline sessions, and of several of the target;
-        a faulty joint has five at most.
+        One line if all is well, one more of few baseline sessions; a faulty joint has five at most.
     """
     from rich.text import Text
 
@@ -119,10 +118,6 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
         text = "1 baseline session says" if sessions == 1 else f"{sessions} baseline sessions say"
         text += " little of how much healthy ones vary, and damage may not show: record more, "
         lines.append(Text(f"{text}on other days", style="dim"))
-    judged = (verdict.get("target") or {}).get("sessions")
-    if healthy and not unhealthy and isinstance(judged, int) and judged > 1:
-        text = f"{judged} target sessions are judged as one: what a single one shows is diluted; "
-        lines.append(Text(f"{text}diagnose the last alone, too", style="dim"))
     return lines
 
 

@@ -76,6 +76,7 @@ def sweep(
             watch=steps("sweep"),
         )
         write_figure(outcome.table, staged / files.SWEEP_FIGURE)
+    output.passed_over([*baseline, *(target or ())])
     errors += outcome.errors
     best = outcome.best()
     output.result(

@@ -57,7 +57,10 @@ def diagnose(
             jobs=jobs,
             progress=progress,
         )
-    output.notes(outcome.notes, verbose)
+    output.passed_over([*baseline, *target])
+    for condition in outcome.conditions:
+        output.failure(condition)
+    output.notes([note for note in outcome.notes if note not in outcome.conditions], verbose)
     output.result(
         {
             **outcome.verdict,

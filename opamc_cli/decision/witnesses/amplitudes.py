@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -10,7 +10,12 @@ from numpy.typing import NDArray
 
 from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.departure import Block
-from opamc_cli.decision.witnesses.deviation import change_between, clearest_of
+from opamc_cli.decision.witnesses.deviation import (
+    change_between,
+    change_beyond_noise,
+    chosen,
+    clearest_of,
+)
 from opamc_cli.decision.witnesses.evidence import Kind
 
 FloatArray = NDArray[np.float64]
@@ -67,6 +72,17 @@ class AmplitudeEvidence:
             if known.any():
                 excess.append(float((change[known] ** 2 - variance[known]).mean()))
         return math.sqrt(max(float(np.mean(excess)), 0.0)) if excess else math.nan
+
+    def change(self) -> float:
+        """Return the root-mean-square change beyond the noise of cycles."""
+        return change_beyond_noise(
+            [(cell.sessions, cell.cycles, cell.within) for cell in self.cells], self.n_baseline
+        )
+
+    def of_target(self, session: int) -> "AmplitudeEvidence":
+        """Return the evidence with one of the target's sessions alone."""
+        rows = [*range(self.n_baseline), self.n_baseline + session]
+        return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
 
 
 @dataclass(frozen=True)

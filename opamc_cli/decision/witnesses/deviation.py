@@ -1,14 +1,27 @@
 """How far sessions lie from others, part by part, in units of what healthy ones differ by."""
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
+Cell = TypeVar("Cell", bound=Any)
+"""A dataclass with arrays that have one row for each session."""
 
 PRIOR_DOF = 4.0
 """Degrees of freedom that the motion's mean variance counts for in each bin's own."""
+
+
+def chosen(cells: Sequence[Cell], by_session: Sequence[str], rows: Sequence[int]) -> list[Cell]:
+    """Return the cells with some of the sessions; `by_session` names the arrays that have them."""
+    return [
+        replace(cell, **{name: getattr(cell, name)[list(rows)] for name in by_session})
+        for cell in cells
+    ]
 
 
 def variance_within_sessions(
@@ -59,6 +72,36 @@ def change_between(sessions: FloatArray, n_baseline: int) -> tuple[FloatArray, F
     enough = (n > 1) & (n_target > 0)
     per_session = np.divide(squares, n - 1, out=np.full(n.shape, np.nan), where=enough)
     return target - mean, per_session * (1 / np.maximum(n, 1) + 1 / np.maximum(n_target, 1))
+
+
+def change_beyond_noise(
+    motions: Sequence[tuple[FloatArray, FloatArray, FloatArray]], n_baseline: int
+) -> float:
+    """Root-mean-square change of the mean session, less what the scatter of cycles explains.
+
+    Parameters
+    ----------
+    motions : sequence of (ndarray, ndarray, ndarray)
+        Of each motion the sessions, shape (B + T, F), the cycles of each, and the variance of a
+        single cycle, shape (F,), NaN if unknown.
+    n_baseline : int
+        B.
+
+    Returns
+    -------
+    float
+        NaN if nothing is known.
+    """
+    excess = []
+    for sessions, cycles, within in motions:
+        own, n_own = mean_of_known(sessions[:n_baseline])
+        other, n_other = mean_of_known(sessions[n_baseline:])
+        both = (n_own > 0) & (n_other > 0)
+        if both.any():
+            total = cycles[:n_baseline].sum(), cycles[n_baseline:].sum()
+            noise = np.nan_to_num(within) * (1 / total[0] + 1 / total[1])
+            excess.append(float(((other - own) ** 2 - noise)[both].mean()))
+    return math.sqrt(max(float(np.mean(excess)), 0.0)) if excess else math.nan
 
 
 def clearest_part(

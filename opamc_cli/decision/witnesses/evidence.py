@@ -47,6 +47,12 @@ class Evidence(Protocol):
     def effect(self) -> float:
         """Return the relative change beyond the baseline's own; NaN if unknown."""
 
+    def change(self) -> float:
+        """Return the relative change beyond the noise of cycles; NaN if it tells no such."""
+
+    def of_target(self, session: int) -> "Evidence":
+        """Return the same with one of the target's sessions alone, counted from 0."""
+
 
 @dataclass(frozen=True)
 class SessionDistances:

@@ -1,7 +1,8 @@
 """Distance between recording sessions by the ordinal patterns of their envelopes."""
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -41,6 +42,18 @@ class Cell:
     """With `cycles`: counts of each cycle of the baseline and of the target; shape (C, K)."""
     inflation: float
     """φ of `divergence.chance_inflation`, from the cycles within baseline sessions."""
+    session_of_target_cycle: NDArray[np.int64] | None = None
+    """Row of `target` that each of `target_cycles` belongs to; None: not known."""
+
+    def of_target(self, session: int) -> "Cell":
+        """Return the cell with one of the target's sessions alone."""
+        cycles, of = self.target_cycles, self.session_of_target_cycle
+        return replace(
+            self,
+            target=self.target[session : session + 1],
+            target_cycles=cycles if of is None else cycles[of == session],
+            session_of_target_cycle=None,
+        )
 
 
 def inflation_within_sessions(cycles: FloatArray, session_of_cycle: NDArray[np.int64]) -> float:
@@ -113,6 +126,14 @@ class PatternEvidence:
         """Return the relative change of the pattern probabilities where it is largest."""
         effects = effect_by_cell(self.cells)
         return float(np.nanmax(effects)) if np.isfinite(effects).any() else float("nan")
+
+    def change(self) -> float:
+        """Return NaN: what it knows differs between any two sessions."""
+        return math.nan
+
+    def of_target(self, session: int) -> "PatternEvidence":
+        """Return the evidence with one of the target's sessions alone."""
+        return PatternEvidence([cell.of_target(session) for cell in self.cells])
 
 
 def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -12,6 +12,8 @@ from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.departure import Block
 from opamc_cli.decision.witnesses.deviation import (
     change_between,
+    change_beyond_noise,
+    chosen,
     clearest_of,
     variance_within_sessions,
 )
@@ -103,6 +105,17 @@ class ProfileEvidence:
     def effect(self) -> float:
         """Return the relative change of the course; see `profile_effect`."""
         return profile_effect(self.cells, self.n_baseline)
+
+    def change(self) -> float:
+        """Return the root-mean-square change beyond the noise of cycles."""
+        return change_beyond_noise(
+            [(cell.course, cell.cycles, cell.within) for cell in self.cells], self.n_baseline
+        )
+
+    def of_target(self, session: int) -> "ProfileEvidence":
+        """Return the evidence with one of the target's sessions alone."""
+        rows = [*range(self.n_baseline), self.n_baseline + session]
+        return replace(self, cells=chosen(self.cells, ("course", "cycles", "scale"), rows))
 
 
 @dataclass(frozen=True)

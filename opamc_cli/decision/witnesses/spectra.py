@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.departure import Block, noise_share
-from opamc_cli.decision.witnesses.deviation import change_between, clearest_of
+from opamc_cli.decision.witnesses.deviation import change_between, chosen, clearest_of
 from opamc_cli.decision.witnesses.evidence import Kind
 
 FloatArray = NDArray[np.float64]
@@ -84,6 +84,15 @@ class SpectrumEvidence:
     def effect(self) -> float:
         """Return the relative change of the size of the fluctuations; see `size_effect`."""
         return size_effect(self.cells, self.n_baseline)
+
+    def change(self) -> float:
+        """Return NaN: what it knows differs between any two sessions."""
+        return math.nan
+
+    def of_target(self, session: int) -> "SpectrumEvidence":
+        """Return the evidence with one of the target's sessions alone."""
+        rows = [*range(self.n_baseline), self.n_baseline + session]
+        return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
 from opamc_cli.signal.motion.reported import lacks_sign, signed_by_speed, velocity_from_position
+from opamc_cli.signal.quality import LIMITS, strided_speed
+from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs import Array, Run
 from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
@@ -74,6 +76,13 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         )
     for channel, values in samples.items():
         _check_channel(run, channel, values)
+        if quantity_of(channel) == "current":
+            limited(run.path, channel, values, LIMITS[run.info.current_unit])
+        elif quantity_of(channel) == "velocity":
+            limited(run.path, channel, values, LIMITS["velocity"])
+        elif quantity_of(channel) == "position":
+            speed = strided_speed(values, run.sampling_rate_hz)
+            limited(run.path, f"{channel} (its speed)", speed, LIMITS["position"])
     _check_units(run, axis, arrays.get("position_rad"), arrays.get("velocity_rad_s"))
     recording = Recording(
         name=run.name,

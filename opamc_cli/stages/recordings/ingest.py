@@ -11,6 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError, OpamcError, UsageError
+from opamc_cli.signal.quality import LIMITS, Size, strided_speed
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.files.parquet import read_schema
@@ -71,6 +72,8 @@ class Ingested:
     """The run was there already, made from the same recording by the same map."""
     replaced: bool = False
     """The run was there already, made from another recording or by another map."""
+    doubts: tuple[str, ...] = ()
+    """One sentence for each column whose numbers are larger than most robots'."""
 
 
 @dataclass(frozen=True)
@@ -197,17 +200,18 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             source_sha256=sha256,
             map_sha256=map_digest(task.channels),
         )
-        n_samples, missing = _write(path, task.run, channels, info, blocks)
+        written = _write(path, task.run, channels, info, blocks)
         labels = {each.name: each.labels for each in source.channels() if each.labels}
     return Ingested(
         task.source,
         task.run,
         rate,
-        n_samples,
-        missing,
+        written.n_samples,
+        written.missing,
         clock.clock.account if clock and channels.time else None,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
+        doubts=written.doubts,
     )
 
 
@@ -376,18 +380,37 @@ def _number(value: object) -> float | None:
     return number if np.isfinite(number) else None
 
 
+@dataclass(frozen=True)
+class _Written:
+    """What was written of a recording; see `Ingested`."""
+
+    n_samples: int
+    missing: dict[str, int]
+    doubts: tuple[str, ...]
+
+
 def _write(
     path: Path, run: Path, channels: IngestMap, info: RunInfo, blocks: Iterable[Block]
-) -> tuple[int, dict[str, int]]:
+) -> _Written:
     names = list(channels.columns)
     schema = pa.schema([(name, _width(name)) for name in names])
     missing = dict.fromkeys(names, 0)
+    sizes = {
+        name: Size(LIMITS[key])
+        for name in names
+        if (key := _limited(name, info.current_unit)) is not None
+    }
     n_samples = 0
     groups = _row_groups(blocks, schema)
     with closing(groups), write_run(run, info, schema) as writer:
         for table in groups:
             for name in names:
-                missing[name] += int(np.isnan(table.column(name).to_numpy()).sum())
+                values = table.column(name).to_numpy()
+                missing[name] += int(np.isnan(values).sum())
+                if name in sizes:
+                    of_position = quantity_of(name) == "position"
+                    rate = info.sampling_rate_hz
+                    sizes[name].add(strided_speed(values, rate) if of_position else values)
             n_samples += table.num_rows
             writer.write_table(table)
         if n_samples == 0:
@@ -400,7 +423,23 @@ def _write(
                     f"value in {n_samples} rows; name another source in the map"
                 )
                 raise InputError(msg)
-    return n_samples, {name: count for name, count in missing.items() if count}
+        doubts = []
+        for name, size in sizes.items():
+            source = channels.columns[name].source
+            speed = "the speed of " if quantity_of(name) == "position" else ""
+            doubt = f"{path}: {speed}column {name} (source {source!r}) {size.doubt()}"
+            if size.is_impossible:
+                msg = f"{doubt} Correct its unit or scale in the map"
+                raise InputError(msg)
+            doubts += [doubt] if size.doubt() else []
+    return _Written(n_samples, {name: n for name, n in missing.items() if n}, tuple(doubts))
+
+
+def _limited(name: str, current_unit: str) -> str | None:
+    """Return which limit a column is held against."""
+    quantity = quantity_of(name)
+    key = current_unit if quantity == "current" else quantity
+    return key if key in LIMITS else None
 
 
 def _width(name: str) -> pa.DataType:

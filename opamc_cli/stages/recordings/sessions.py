@@ -24,6 +24,10 @@ class Sessions:
     unread_clocks: int = 0
     """Recordings whose `started_at` is no time."""
 
+    def named(self, session: str) -> str:
+        """Return a session's name with its kind: "night 2026-03-12"."""
+        return f"{self.told_by[0]} {session}" if len(self.told_by) == 1 else session
+
     def __len__(self) -> int:
         """Return the number of sessions."""
         return len(set(self.of_run.values()))

@@ -18,7 +18,7 @@ from opamc_cli.decision.divergence.jensen_shannon import (
     divergences_from_pool,
     leave_cycle_out_divergences,
 )
-from opamc_cli.errors import OpamcError
+from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.signal.ordinal.patterns import ordinal_counts, time_delay
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
@@ -123,6 +123,8 @@ def run(
     ------
     InputError
         If a table or run cannot be used.
+    NotEnoughDataError
+        If no motion holds a pattern of any delay.
     """
     tables = {"baseline": baseline} | ({"target": target} if target else {})
     sources = {role: read_sources(path) for role, path in tables.items()}
@@ -139,6 +141,12 @@ def run(
     own = sources["baseline"]
     sessions = sessions_of(own, config.score.day_starts_at, lie_in_folders(own))
     table = pa.Table.from_pylist(_rows(counted, sessions, config), schema=SWEEP)
+    if table.num_rows and table["jsd"].null_count == table.num_rows:
+        msg = (
+            f"{baseline}: no motion is long enough for a pattern of delay {min(taus)}, or none has "
+            "two cycles to compare; sweep smaller delays, or more recordings"
+        )
+        raise NotEnoughDataError(msg)
     path = out / files.SWEEP
     write_table(
         path,

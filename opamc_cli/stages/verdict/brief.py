@@ -23,9 +23,15 @@ COMMON = 1.5
 
 
 def brief(
-    judgement: Judgement, bundle: Bundle, cause: Mapping[str, Any] | None, unit: str = "A"
+    judgement: Judgement,
+    bundle: Bundle,
+    cause: Mapping[str, Any] | None,
+    unit: str = "A",
+    which: str | None = None,
 ) -> dict[str, Any] | None:
     """Return what a maintainer needs of an unhealthy joint; None for any other.
+
+    `which` says which of several target sessions show it.
 
     Returns
     -------
@@ -37,7 +43,9 @@ def brief(
         return None
     return {
         "inspect": _inspect(cause, judgement, bundle),
-        "evidence": _evidence(judgement, bundle, unit),
+        "evidence": [*([which] if which else []), *_evidence(judgement, bundle, unit)][
+            :MOST_EVIDENCE
+        ],
         "against": _against(judgement, cause),
     }
 

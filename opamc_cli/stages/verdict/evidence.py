@@ -35,7 +35,7 @@ def bundles(sides: Sides) -> dict[int, Bundle]:
                 evidence = witness.evidence(tables[0], tables[1], axis, names)
                 if evidence.cells:
                     witnesses[witness.NAME] = evidence
-        result[axis] = Bundle(cells, witnesses)
+        result[axis] = Bundle(cells, witnesses, names.sessions[1])
     return result
 
 
@@ -56,6 +56,8 @@ def cells_by_axis(sides: Sides) -> dict[int, list[Cell]]:
         own = [key for key in keys if key[0] == axis]
         names = session_names(axis, baseline, target)
         for key in own:
+            target_cycles, of_cycle = cycle_counts(target[key])
+            number = np.searchsorted(names[1], np.unique(target[key].sessions))
             result[axis].append(
                 Cell(
                     motion=key[1],
@@ -64,8 +66,9 @@ def cells_by_axis(sides: Sides) -> dict[int, list[Cell]]:
                     baseline=_by_session(baseline[key], names[0]),
                     target=_by_session(target[key], names[1]),
                     cycles=sides.baseline_cycles[key][0],
-                    target_cycles=cycle_counts(target[key])[0],
+                    target_cycles=target_cycles,
                     inflation=sides.inflations[key],
+                    session_of_target_cycle=number[of_cycle],
                 )
             )
     return result

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
+from opamc_cli.decision.judge import PATTERNS, UNKNOWN_CHANGE, Bundle, Judgement
 from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_amplitude
 from opamc_cli.decision.witnesses.patterns import Cell, effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
@@ -273,6 +273,13 @@ def _conditions(judgement: Judgement) -> list[str]:
 
 
 def _missing(judgement: Judgement, cells: Sequence[Cell]) -> list[str]:
+    if judgement.unknown_change > UNKNOWN_CHANGE:
+        return [
+            f"Its current differs by {judgement.unknown_change:.0%} from "
+            f"{_count(judgement.n_baseline_sessions, 'baseline session')} (root mean square of "
+            "course or size), and how much healthy sessions differ is not known: neither healthy "
+            "nor changed; record the baseline on some more days."
+        ]
     if not cells:
         return [
             "No motion of this joint occurs in both baseline and target; record both with the "

@@ -2,8 +2,8 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,8 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.decision.judge import Bundle, Judgement, Policy, judge
+from opamc_cli.decision.each_session import LoneSession, each_session
+from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy, judge
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
@@ -23,7 +24,7 @@ from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.stages.verdict.reasons import reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.sources import current_unit
+from opamc_cli.storage.sources import RunSource, current_unit
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
@@ -50,6 +51,10 @@ class Decided:
     bundles: Mapping[int, Bundle]
     judgements: Mapping[int, Judgement]
     """With `bundles`: what is known of each axis, and what was made of it."""
+    each: Mapping[int, Sequence[LoneSession]] = field(default_factory=dict)
+    """The same by each of several target sessions alone."""
+    alone: Mapping[int, LoneSession] = field(default_factory=dict)
+    """Those by which an axis is judged, since they are worse than all together."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
         """Return the axes whose change asks for a cause."""
@@ -58,6 +63,33 @@ class Decided:
             for axis, judgement in self.judgements.items()
             if judgement.state in ("changed", "fault") or is_excused(judgement, config)
         ]
+
+    def target_sources(self, axis: int) -> Sequence[RunSource]:
+        """Return the target's recordings by which an axis is judged."""
+        sources = self.sides.target.sources
+        if axis not in self.alone:
+            return sources
+        of_run = self.sides.sessions[1].of_run
+        return [s for s in sources if of_run[s.name] == self.alone[axis].session]
+
+    def target_runs(self) -> dict[int, list[str]]:
+        """Return the names of the target's recordings by which each axis is judged."""
+        return {axis: [s.name for s in self.target_sources(axis)] for axis in self.judgements}
+
+    def named(self, axis: int) -> str:
+        """Return the session by which alone an axis is judged."""
+        return self.sides.sessions[1].named(self.alone[axis].session)
+
+    def sessions_at_fault(self, axis: int) -> str | None:
+        """Say which of the target's sessions are at fault by themselves; None if all or none."""
+        each = self.each.get(axis, ())
+        bad = [one.session for one in each if one.judgement.state in ("changed", "fault")]
+        if not 0 < len(bad) < len(each):
+            return None
+        shown = ", ".join(self.sides.sessions[1].named(session) for session in bad)
+        if axis in self.alone and len(bad) == 1:
+            return f"Of {len(each)} target sessions only {shown} shows it by itself."
+        return f"At fault by itself, of {len(each)} target sessions: {shown}."
 
     def notes(self) -> list[str]:
         """Say which axes were judged without some of the witnesses."""
@@ -75,9 +107,30 @@ class Decided:
 
 
 def decide(sides: Sides, config: Config) -> Decided:
-    """Decide about every joint; of the options those of section `score` are used."""
+    """Decide about every joint, by all target sessions together and by each of them alone.
+
+    Of the options those of section `score` are used.
+    """
+    policy = policy_of(config.score)
     known = bundles(sides)
-    return Decided(sides, known, judge(known, policy_of(config.score)))
+    judgements = judge(known, policy)
+    each, alone = each_session(known, policy), {}
+    for axis, by_session in each.items():
+        worst = max(by_session, key=lambda one: _concern(one.judgement), default=None)
+        if worst is not None and _concern(worst.judgement)[0] > _concern(judgements[axis])[0]:
+            alone[axis] = worst
+            known[axis], judgements[axis] = worst.bundle, worst.judgement
+    return Decided(sides, known, judgements, each, alone)
+
+
+def _concern(judgement: Judgement) -> tuple[int, float]:
+    """Rank judgements of one joint: unhealthy, doubtful, healthy, then by how improbable."""
+    if judgement.state in ("changed", "fault"):
+        return 2, -judgement.p_adjusted
+    if math.isnan(judgement.p_adjusted):
+        return -1, 0.0
+    doubtful = judgement.state == "insufficient-data" or judgement.health_index > FAR
+    return int(doubtful), -judgement.p_adjusted
 
 
 def write(
@@ -137,6 +190,8 @@ def content(
         final = _with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
+        if final.state == "insufficient-data":
+            final = replace(final, health_index=math.nan, p_value=math.nan, p_adjusted=math.nan)
         bundle = decided.bundles[axis]
         motions = [
             {
@@ -149,15 +204,20 @@ def content(
             for cell in bundle.cells
         ]
         runs = {
-            role: [source for source in side.sources if source.name in _runs_of(axis, rows)]
-            for role, side, rows in zip(
-                ("baseline", "target"), sides, decided.sides.rows, strict=True
+            role: [source for source in sources if source.name in _runs_of(axis, rows)]
+            for role, sources, rows in zip(
+                ("baseline", "target"),
+                (sides[0].sources, decided.target_sources(axis)),
+                decided.sides.rows,
+                strict=True,
             )
         }
+        which = decided.sessions_at_fault(axis)
         axes.append(
             {
                 "axis": axis,
                 "state": final.state,
+                **({"session": decided.named(axis)} if axis in decided.alone else {}),
                 "health_index": _finite(final.health_index),
                 "p_value": _finite(final.p_value),
                 "p_adjusted": _finite(final.p_adjusted),
@@ -170,8 +230,11 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "brief": brief(final, bundle, cause, unit),
-                "reasons": reasons(final, bundle, motions, runs, cause, config.score),
+                "brief": brief(final, bundle, cause, unit, which),
+                "reasons": [
+                    *([which] if which else []),
+                    *reasons(final, bundle, motions, runs, cause, config.score),
+                ],
             }
         )
     return {

@@ -8,6 +8,7 @@ import jsonschema
 import pytest
 
 from opamc_cli.__main__ import main
+from opamc_cli.storage.runs import Run, save_run
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
 
@@ -94,3 +95,41 @@ def test_schemas_are_printed(capsys):
     assert ended("config", "schema", "verdict") == 0
     assert json.loads(capsys.readouterr().out) == schema("verdict")
     assert ended("config", "schema", "tables") == 2
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_one_damaged_session_of_three_is_not_diluted(tmp_path):
+    healthy = sorted((SAMPLES / "normal").glob("*.parquet"))
+    damaged = SAMPLES / "fault" / "session-008.parquet"
+    sides = [*(["--baseline", run] for run in healthy[:6])]
+    sides += [["--target", run] for run in (*healthy[6:], damaged)]
+    flat = [part for side in sides for part in side]
+    assert ended("diagnose", *flat, "--out", tmp_path, "--quiet") == 1
+    verdict = verdict_in(tmp_path)
+    jsonschema.validate(verdict, schema("verdict"))
+    states = [axis["state"] for axis in verdict["axes"]]
+    assert states == ["healthy", "healthy", "fault"]
+    only = "Of 3 target sessions only night 2021-01-08 shows it by itself."
+    assert verdict["axes"][2]["reasons"][0] == only
+    assert verdict["axes"][2]["session"] == "night 2021-01-08"
+    assert verdict["axes"][2]["cause"]["effect"] == "ripple"
+    assert "session" not in verdict["axes"][0]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_two_joints_of_like_size_exchanged_are_no_fault(tmp_path):
+    healthy = sorted((SAMPLES / "normal").glob("*.parquet"))
+    with Run(healthy[7]) as run:
+        columns = run.read(run.columns)
+        other = {"axis1": "axis2", "axis2": "axis1", "axis3": "axis3"}
+        turned = {other[name[:5]] + name[5:]: values for name, values in columns.items()}
+        save_run(tmp_path / "exchanged.parquet", run.info, turned)
+    flat = [part for run in healthy[:6] for part in ("--baseline", run)]
+    target = ("--target", tmp_path / "exchanged.parquet", "--out", tmp_path / "out", "--quiet")
+    assert ended("diagnose", *flat, *target) == 5
+    entries = verdict_in(tmp_path / "out")["axes"]
+    states = [entry["state"] for entry in entries]
+    assert states == ["insufficient-data", "insufficient-data", "healthy"]
+    for entry in entries[:2]:
+        assert entry["reasons"][0].endswith("are the two exchanged?")
+        assert entry["brief"] is None

@@ -6,6 +6,7 @@ from dataclasses import replace
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.stages.verdict.reasons import reasons
 from opamc_cli.stages.verdict.verdict import Decided
+from tests.decision import known_fleet
 from tests.decision.fleet import Fleet, cells
 
 
@@ -36,3 +37,11 @@ def test_a_witness_that_could_not_be_heard_is_said():
     notes = Decided(None, {}, {1: whole, 2: part, 3: unknown}).notes()
     assert len(notes) == 1
     assert notes[0].startswith("axis 2: judged without its spectrum:")
+
+
+def test_what_one_baseline_session_cannot_tell_is_said():
+    bundle = known_fleet.bundle(4, 1, 1, (), 0.0)
+    judged = judge({4: bundle})[4]
+    (said,) = reasons(judged, bundle, [], {"baseline": [], "target": []})
+    assert said.startswith("Its current differs by 30% from 1 baseline session")
+    assert "neither healthy nor changed" in said

@@ -309,3 +309,50 @@ def test_ingesting_again_or_with_more_workers_gives_the_same_bytes(tmp_path):
     assert [item.run.name for item in two.results] == ["a.parquet", "b.parquet", "c.parquet"]
     for first, second in zip(one.results, two.results, strict=True):
         assert first.run.read_bytes() == second.run.read_bytes()
+
+
+def logged(tmp_path, unit="A", angle="rad", current=3.0, turn=1.5, scale=1.0):
+    """Ingest ten seconds of a joint that swings by `turn` at 100 Hz."""
+    t = np.arange(1000) / 100
+    swing = np.sin(2 * np.pi * 0.2 * t)
+    np.savetxt(tmp_path / "r.csv", np.column_stack([current * swing, turn * swing]), delimiter=",")
+    text = f"""sampling_rate_hz: 100
+header: false
+columns:
+  axis1_current: {{source: 0, unit: {unit}}}
+  axis1_position: {{source: 1, unit: {angle}, scale: {scale}}}
+"""
+    return run_map(tmp_path, text, [tmp_path / "r.csv"])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "parts"),
+    [
+        ({"current": 3000.0}, ["axis1_current (source 0)", "1000 A", "mA taken for A"]),
+        ({"unit": "Nm", "current": 3e5}, ["100000 Nm", "mNm taken for Nm"]),
+        ({"turn": 1.5 * 57.3 * 2}, ["speed of column axis1_position", "100 rad/s", "degrees"]),
+        ({"scale": 160.0}, ["the motor's side"]),
+    ],
+)
+def test_what_no_joint_does_is_another_unit(tmp_path, wrong, parts):
+    said = refusal(logged(tmp_path, **wrong))
+    for part in parts:
+        assert part in said
+    assert not (tmp_path / "out" / "r.parquet").exists()
+
+
+def test_what_few_joints_do_is_said(tmp_path):
+    assert logged(tmp_path).results[0].doubts == ()
+    (doubt,) = logged(tmp_path, current=300.0).results[0].doubts
+    assert "beyond 200 A" in doubt
+
+
+def test_a_wrist_that_passes_half_a_turn_is_no_wonder(tmp_path):
+    t = np.arange(1000) / 100
+    wrapped = (4 * t + np.pi) % (2 * np.pi) - np.pi
+    np.savetxt(tmp_path / "r.csv", np.column_stack([np.cos(t), wrapped]), delimiter=",")
+    text = (
+        "sampling_rate_hz: 100\nheader: false\ncolumns:\n  axis1_current: {source: 0, unit: A}\n"
+        "  axis1_position: {source: 1, unit: rad}\n"
+    )
+    assert run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts == ()

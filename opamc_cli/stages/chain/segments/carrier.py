@@ -21,7 +21,7 @@ from opamc_cli.signal.motion.segmentation import (
 )
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.offset import turning_means, turning_offset
-from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.quality import LIMITS, Size, clipped_share
 from opamc_cli.signal.transform.analytic import (
     AnalyticStream,
     clarke,
@@ -36,6 +36,7 @@ from opamc_cli.stages.chain.segments.rows import (
     mean_variance,
     read_variance,
 )
+from opamc_cli.stages.recordings.beyond import sized
 from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, AxisChannels, Run
 
 FRAME_S = 0.008
@@ -169,6 +170,7 @@ def _gather(
     n_missing = dict.fromkeys(names, 0)
     lowest = dict.fromkeys(names, np.inf)
     highest = dict.fromkeys(names, -np.inf)
+    sizes = {name: Size(LIMITS["A"]) for name in names}
 
     def take(z: Complex) -> None:
         frames.append(motion.push(temporal_fine_structure(z, probe.floor_a)))
@@ -186,6 +188,7 @@ def _gather(
                 high = float(x.max(where=known, initial=-np.inf))
                 # A gap counts as no current, and so as no motion.
                 x = np.where(known, x, np.float32(0))
+            sizes[name].add(x)
             lowest[name], highest[name] = min(lowest[name], low), max(highest[name], high)
             phases.append(x)
         if hilbert is None:
@@ -203,6 +206,7 @@ def _gather(
         for name, n in n_missing.items()
         if n
     )
+    notes += tuple(odd for name, size in sizes.items() if (odd := sized(run.path, name, size)))
     joined = join_frames(frames)
     frames.clear()
     evidence = Evidence(

@@ -13,8 +13,14 @@ from opamc_cli.signal.motion.reported import (
     quiet_velocity,
 )
 from opamc_cli.signal.motion.windows import carrier_windows
-from opamc_cli.signal.quality import clipped_share
-from opamc_cli.stages.chain.segments.rows import AxisSegments, Segment, make_rows, mean_variance
+from opamc_cli.signal.quality import LIMITS, clipped_share
+from opamc_cli.stages.chain.segments.rows import (
+    AxisSegments,
+    Segment,
+    make_rows,
+    mean_variance,
+)
+from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs import AxisChannels, Run
 
 USUAL_GEAR_RATIO = 100.0
@@ -46,6 +52,12 @@ def joint_segments(
             "check the drive's log or leave the axis out"
         )
         raise InputError(msg)
+    speed_of = channels.velocity or f"{channels.position} (its speed)"
+    kind = "position" if channels.velocity is None else "velocity"
+    beyond = [
+        limited(run.path, name, known, LIMITS[run.info.current_unit]),
+        limited(run.path, speed_of, velocity, LIMITS[kind]),
+    ]
     motions = find_joint_motions(
         velocity,
         run.sampling_rate_hz,
@@ -59,7 +71,7 @@ def joint_segments(
             "the joint moves; check the drive's log or leave the axis out"
         )
         raise InputError(msg)
-    notes = []
+    notes = [note for note in beyond if note]
     if known.size < current.size:
         notes.append(
             f"{run.path}: column {name} has {current.size - known.size} samples that are no "

@@ -3,10 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-FAR = 20.0
-"""Health index beyond which nothing is called healthy because other joints have moved as far:
-warmth, supply and load move all joints by a few of the baseline's own spreads; what moves them
-by more (a wrong unit, another controller, a changed logger) hides any fault."""
+from opamc_cli.decision.judge import FAR
 
 
 def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
@@ -14,12 +11,16 @@ def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
     return {
         entry["axis"]: (
-            f"It lies {entry['health_index']:.3g} of the baseline's own spreads from the baseline, "
-            + (_COMMON if len(far) > 1 else _ALONE),
+            f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
+            "the baseline, " + (_COMMON if len(far) > 1 else _ALONE),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
     }
+
+
+def _where(entry: Mapping[str, Any]) -> str:
+    return f"In {entry['session']} alone it" if "session" in entry else "It"
 
 
 _COMMON = (

@@ -13,8 +13,8 @@ from opamc_cli.storage.runs import Run, find_runs
 
 def repeated(
     baseline: Sequence[Path], target: Sequence[Path], kept: KeptResults | None = None
-) -> tuple[frozenset[Path], tuple[str, ...]]:
-    """Return the runs to be left out, and one sentence for each.
+) -> tuple[dict[str, set[Path]], tuple[str, ...]]:
+    """Return the runs to be left out of "baseline" and "target", and one sentence for each.
 
     Of equal recordings, the target's is kept rather than the baseline's, and the first name of
     one side. A copy, a link, or the same samples written by another program are equal.
@@ -32,7 +32,7 @@ def repeated(
         If nothing is left of the baseline.
     """
     seen: dict[str, tuple[str, Path]] = {}
-    left_out: set[Path] = set()
+    left_out: dict[str, set[Path]] = {"baseline": set(), "target": set()}
     notes = []
     sides = (
         ("target", target, _fingerprint),
@@ -51,16 +51,16 @@ def repeated(
                 seen[key] = role, path
                 continue
             first_role, first = seen[key]
-            left_out.add(path)
+            left_out[role].add(path)
             where = f"{role}'s {path} is the same recording as the {first_role}'s {first}"
             notes.append(f"left out: the {where}")
-        if runs and all(path in left_out for _, path in runs):
+        if runs and all(path in left_out[role] for _, path in runs):
             msg = (
                 f"{runs[0][1]}: every run of the {role} is also one of the target; a baseline "
                 "needs other recordings than those that it judges"
             )
             raise InputError(msg)
-    return frozenset(left_out), tuple(notes)
+    return left_out, tuple(notes)
 
 
 def _fingerprint(path: Path) -> str | None:

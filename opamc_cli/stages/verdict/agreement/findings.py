@@ -187,6 +187,11 @@ def _other_unit(own: Measured, reference: Reference) -> str | None:
     return None
 
 
+def _far_too_large(own: Measured, reference: Reference) -> str | None:
+    usual = reference.size.get((own.axis, "current"), 0.0)
+    return _other_unit(own, reference) if own.size["current"] > LARGEST_RATIO * usual else None
+
+
 def _unbalanced(own: Measured, reference: Reference) -> str | None:
     limit = max(LARGEST_IMBALANCE, 2 * reference.imbalance[own.axis])
     dead = own.size["current"] <= DEAD_SHARE * reference.size[own.axis, "current"]
@@ -261,7 +266,7 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
 )
 """In the order in which they are asked."""
 
-RULES_AT_REST = (_other_signal, _frozen, _unbalanced, _incomplete)
+RULES_AT_REST = (_other_signal, _frozen, _far_too_large, _unbalanced, _incomplete)
 """Of an axis in which no motion was found, since its current may be why."""
 
 

@@ -1,15 +1,17 @@
 """Which axes cannot be judged, and the true reason: what no verdict may be silent about."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.compute as pc
 
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
+from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
+from opamc_cli.stages.verdict.evidence import session_names
 
 
 @dataclass(frozen=True)
@@ -43,12 +45,31 @@ class Unjudged:
     """Sentences for each axis of which nothing is left on one side."""
     errors: tuple[OpamcError, ...]
     """One for each axis of a run that was left out while others serve."""
+    at_rest: Mapping[int, Mapping[str, InputError]] = field(default_factory=dict)
+    """By axis and run of the target, why it has none, which is usual where axes move in turn."""
+
+    def sessions_at_rest(self, sides: Sides) -> list[InputError]:
+        """Return one for each axis that rests in all of a target session, if in no other.
+
+        Of several target sessions one may lack what all of the baseline have: a sensor that died.
+        """
+        of_run = sides.sessions[1].of_run
+        found = []
+        for axis, runs in self.at_rest.items():
+            own, other = session_names(axis, *sides.rows)
+            if not other or len(own) < len(sides.sessions[0]):
+                continue
+            lacking = sorted({*of_run.values()} - {*other})
+            for session in lacking:
+                found += [why for run, why in runs.items() if of_run.get(run) == session][:1]
+        return found
 
 
 def unjudged(baseline: Side, target: Side) -> Unjudged:
     """Find the axes that move on either side but cannot be compared."""
     axes: dict[int, tuple[str, ...]] = {}
     errors: list[OpamcError] = []
+    at_rest: dict[int, dict[str, InputError]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
             lost = _lost(axis, side)
@@ -60,7 +81,9 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
                 continue
             paths = {own.run: own.path for own in side.measured}
             errors += [InputError(f"{paths[run]}: {why}") for run, why in lost.items()]
-    return Unjudged(axes, tuple(errors))
+            if side is target:
+                at_rest[axis] = {run: InputError(f"{paths[run]}: {idle[run]}") for run in idle}
+    return Unjudged(axes, tuple(errors), at_rest)
 
 
 def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
@@ -94,6 +117,7 @@ _UNKNOWN: Mapping[str, Any] = {
     "p_value": None,
     "p_adjusted": None,
     "cause": None,
+    "brief": None,
 }
 _EMPTY: Mapping[str, Any] = {
     "features": {"delta_mu": None, "delta_var": None, "ks": None},
