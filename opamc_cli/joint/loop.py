@@ -101,25 +101,18 @@ def close_loop(
     of docs/loop.md can be switched off.
     """
     start = chain_of(before, 0)
-    dataset = before.dataset
-    unnamed = Pool.of(dataset, unnamed_library(), without=without_rules)
+    unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
     explained = saturated(start, unnamed)
-    pool = Pool.of(dataset, library, without=without_rules)
+    pool = Pool.of(before.dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     # Beside a function without a name an effect may no longer be worth its price.
     final = worth_their_price(beam(best, unnamed, width=1))
-    held, drop = (start.mean_square - one.mean_square for one in (final, explained))
-    helped = any(term.effect.unnamed for term in final.terms)
-    clearly = explained.score < final.score - LEAST_SHARE and (helped or held < EXACT * drop)
-    if clearly and "unnamed" not in without_rules:
-        # All the names together, and what was added to them, hold less than no names do, or hold
-        # it no better with a function without a name beside them.
-        final, named = explained, []
-    only_named = final
-    for place in reversed(range(final.added)):
-        if final.terms[place].effect.unnamed:
-            only_named = without(only_named, place)
+    if "unnamed" not in without_rules:  # Or beside the functions that explain most.
+        beside = worth_their_price(extended(explained, *(one.term for one in named)))
+        if beside.score < final.score - LEAST_SHARE:
+            final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
+    only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
