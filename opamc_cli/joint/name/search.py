@@ -140,7 +140,14 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         for term, gain in zip(batch.terms, slow.gains(batch), strict=True):
             if term.effect.name in names:
                 note(judged(term, float(gain), batch.width))
-    fast = Beside(chain, fine=True) if any(effect.fast for effect in free) else slow
+    among_fast = any(term.effect.fast for term in chain.fit.terms)
+    fine = among_fast or any(effect.fast for effect in free)
+    fast = Beside(chain, fine=True) if fine else slow
+    if among_fast:
+        # What a drive makes of a ripple takes up friction, too: beside it as it was fitted without
+        # a slow effect, that may show as little.
+        for candidate in list(found.values()):
+            note(fast.candidate(candidate.term))
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
         if effect.fast and not effect.untestable(dataset.fine.track):
@@ -152,6 +159,8 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
         trial = beside.candidate(refined(candidate.term, beside))
+        if among_fast and beside is slow:
+            trial = max(trial, fast.candidate(trial.term), key=lambda one: one.gain)
         # A parameter that was moved to a value with a meaning may cost a trifle.
         better.append(trial if trial.gain > (1 - PRICE) * candidate.gain else candidate)
     chain.fit.forget()
