@@ -210,6 +210,27 @@ def test_names_that_hold_no_more_than_no_names_do_give_way(monkeypatch, beside):
     assert [step.term.effect.name for step in kept.steps[: len(names)]] == [*names]
 
 
+def test_names_stay_beside_the_functions_that_explain_most(monkeypatch):
+    def both(q, v, a, t):
+        shapes = [SHAPES[name](q, v, a, t) for name in ("position_drag", "mains_hum")]
+        return sum(shape / np.std(shape) for shape in shapes)
+
+    library = {"mains_hum": built_in_library()["mains_hum"]}
+    fitted = fit_declared([joint_of("cyclic", both, strength=5.0)])
+    found = loop_module.beam
+
+    def without_further_functions(chain, pool, width=2):
+        return chain if width == 1 else found(chain, pool, width)
+
+    monkeypatch.setattr(loop_module, "beam", without_further_functions)
+    loop = close_loop(fitted, library)
+    first, *others = loop.steps
+    assert (first.named, first.term.effect.name) == (True, "mains_hum")
+    assert [step.term.effect.domain for step in others] == ["joint-angle"]
+    assert loop.verdict == "partial"
+    assert loop.rmse_after_a < 1.05 * loop.floor_a
+
+
 def test_a_model_that_predicts_nothing_is_not_said_to_lack_nothing():
     recording = joint_of("cyclic", None)
     noise = np.random.default_rng(5).normal(0, 1.0, recording.current_a.size)

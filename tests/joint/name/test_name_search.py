@@ -11,8 +11,9 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name import search
+from opamc_cli.joint.name.candidates import Beside
 from opamc_cli.joint.name.chain import chain_of, extended
-from opamc_cli.joint.name.search import Pool, beam, objection, trials
+from opamc_cli.joint.name.search import Pool, beam, candidates, objection, trials
 
 LIBRARY = built_in_library()
 
@@ -164,3 +165,19 @@ def test_one_chain_is_followed_as_far_as_its_score_falls(monkeypatch, width, fou
 
     monkeypatch.setattr(search, "_possible", possible)
     assert beam(chains[0], Pool([], {}), width).score == found
+
+
+def test_a_slow_effect_is_judged_beside_a_ripple_that_is_fitted_with_it():
+    def friction(q, v, a, t):
+        return np.sign(v) * np.abs(v) ** 0.3
+
+    fit = plain_fit(joint_of("steps of torque", friction, rate=2000.0, seconds=24.0))
+    # Fitted by itself, what a drive makes of this ripple takes up most of the friction.
+    forms = {"order": 2.0, "direction": 1.0, "answer": 1.0, "top_hz": 20.0}
+    chain = extended(chain_of(fit, 0), Term(LIBRARY["ripple"], forms))
+    assert chain.fit.dataset.factor > 1
+    (found,) = candidates(chain, pool_of(chain, "sublinear_friction"))
+    assert found.gain == pytest.approx(extended(chain, found.term).gain_over(chain)[0], abs=1e-4)
+    assert found.gain > 0.98
+    # As it was fitted without the friction, it leaves little to explain.
+    assert Beside(chain, fine=False).candidate(found.term).gain < 0.6
