@@ -54,7 +54,8 @@ class TimeDelay(Effect):
         factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
         if parameters.get("filtered"):
-            late = [lagging(columns[start:stop], samples) for start, stop in full.bounds]
+            pole = np.exp(-1.0 / max(samples, 1e-3))
+            late = [lagging(columns[start:stop], pole) for start, stop in full.bounds]
             shifted = block_mean(np.concatenate(late), full.bounds, factor)
         else:
             shifted = late_means(track.static_sums, full.bounds, samples, factor)
@@ -97,15 +98,11 @@ def late_means(
     return np.concatenate(means)
 
 
-def lagging(columns: Floats, samples: float) -> Floats:
-    """Put columns, (n, k), through a filter of first order, from rest at their first values."""
-    return np.asarray(_lagging(columns.T.copy(), np.exp(-1.0 / max(samples, 1e-3))).T)
-
-
 @njit(cache=True)
-def _lagging(rows: Floats, pole: float) -> Floats:
-    """Overwrite each row."""
-    for row in rows:
-        for n in range(1, row.size):
-            row[n] += pole * (row[n - 1] - row[n])
-    return rows
+def lagging(columns: Floats, pole: float) -> Floats:
+    """Put columns, (n, k), through a filter of first order, from rest at their first values."""
+    late = columns.copy()
+    for n in range(1, len(late)):
+        for k in range(late.shape[1]):
+            late[n, k] += pole * (late[n - 1, k] - late[n, k])
+    return late

@@ -212,8 +212,11 @@ class Fit:
     """With the fitted load and model currents."""
     residual_a: Floats
     """Current less model on the whole fine grid (it means something where samples move); (n,)."""
-    sums: Sums
-    """Of the fine grid's open samples."""
+
+    @cached_property
+    def sums(self) -> Sums:
+        """Products of all terms on the fine grid's open samples."""
+        return self.dataset.sums(self.terms, True)
 
     @cached_property
     def coarse_sums(self) -> tuple[Sums, list[Floats], Floats]:
@@ -250,7 +253,8 @@ class Fit:
         """Drop what is computed again where it is asked for: a search keeps many fits."""
         self.dataset.fine.track.forget()
         self.dataset.coarse.track.forget()
-        self.__dict__.pop("coarse_sums", None)
+        for name in ("sums", "coarse_sums"):
+            self.__dict__.pop(name, None)
 
     @cached_property
     def opened(self) -> "Fit":
@@ -365,7 +369,9 @@ def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     parts = (grid.spread(block @ values) for block, values in pairs)
     total, model, load = currents(terms, parts, current.size)
     dataset = dataset.with_model(load, model, static_terms(terms))
-    return Fit(terms, coefficients, dataset, current - total, sums)
+    fitted = Fit(terms, coefficients, dataset, current - total)
+    fitted.__dict__["sums"] = sums
+    return fitted
 
 
 def static_terms(terms: Sequence[Term]) -> tuple[Term, ...]:

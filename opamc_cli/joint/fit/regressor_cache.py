@@ -71,12 +71,10 @@ class RegressorCache:
         return self._taken[key][1]
 
     def _bounded(self) -> None:
-        """Forget all regressors where they take too much memory.
-
-        A block's rows are kept with it, so that no other one gets its place in memory and its
-        products.
-        """
-        blocks = sum(block.nbytes for block in self._columns.values())
-        taken = sum(block.nbytes + rows.nbytes for block, rows in self._taken.values())
-        if blocks + taken > MOST_BYTES:
+        """Forget everything where it takes too much memory: products are known by their blocks."""
+        pairs = self._taken.values()
+        every = (*self._columns.values(), *(one for pair in pairs for one in pair))
+        # Rows may be a view of the block, and both of what was computed.
+        owners = (block if block.base is None else block.base for block in every)
+        if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()

@@ -141,8 +141,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
             if term.effect.name in names:
                 note(judged(term, float(gain), batch.width))
     among_fast = any(term.effect.fast for term in chain.fit.terms)
-    fine = among_fast or any(effect.fast for effect in free)
-    fast = Beside(chain, fine=True) if fine else slow
+    fast = Beside(chain, fine=True) if among_fast or any(one.fast for one in free) else slow
     if among_fast:
         # What a drive makes of a ripple takes up friction, too: beside it as it was fitted without
         # a slow effect, that may show as little.

@@ -128,12 +128,11 @@ def test_hum_has_a_phase_for_every_clock(starts, columns):
 
 def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
     rng = np.random.default_rng(3)
-    columns, samples = rng.normal(size=(50, 2)), 2.5
-    pole = np.exp(-1 / samples)
+    columns, pole = rng.normal(size=(50, 2)), np.exp(-1 / 2.5)
     expected = columns.copy()
     for i in range(1, 50):
         expected[i] = pole * expected[i - 1] + (1 - pole) * columns[i]
-    np.testing.assert_allclose(lagging(columns, samples), expected)
+    np.testing.assert_allclose(lagging(columns, pole), expected)
 
 
 @pytest.mark.parametrize("samples", [0.0, 3.0, 7.4, -2.6, 55.0])
