@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress
 
 import numpy as np
 
@@ -325,26 +326,30 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     if not follow or not any(term.effect.carries_load for term in terms):
         return dataset
     parts = dataset.fine.parts
-    taken = np.argsort(parts.rows)[:: max(parts.rows.size // COARSE_SAMPLES, 1)]
-    rows = parts.rows[taken]
+    rows, current = parts.rows, track.current_a[parts.rows]
     blocks = [dataset.columns(term, fine=True) for term in terms]
-    widths = [block.shape[1] for block in blocks]
     carries, follows = (
-        np.repeat([getattr(term.effect, name) for term in terms], widths)
+        np.repeat([getattr(term.effect, name) for term in terms], [b.shape[1] for b in blocks])
         for name in ("carries_load", "follows_load")
     )
-    carriers = np.concatenate(
-        [b for b, t in zip(blocks, terms, strict=True) if t.effect.carries_load], axis=1
-    )
-    columns = np.concatenate([parts.taken(block)[taken] for block in blocks], axis=1)
+    mine = [t.effect.carries_load or t.effect.follows_load for t in terms]
+    carriers = [b for b, t in zip(blocks, terms, strict=True) if t.effect.carries_load]
+    columns = np.concatenate([parts.taken(b) for b in compress(blocks, mine)], axis=1)
+    # All else, of which a drive's answers to ripples have hundreds, stays as it is.
+    others = [parts.taken(b) for b, own in zip(blocks, mine, strict=True) if not own]
+    moving, fixed = (np.flatnonzero((carries | follows) == way) for way in (True, False))
+    carries, follows = carries[moving], follows[moving]
+    gram = dataset.sums((), True, *blocks).gram.sum(axis=0)
     solution = np.concatenate(fitted.coefficients)
     best, least = track.load_a, np.inf
     for _ in range(MOST_ROUNDS):
-        load = carriers @ solution[carries]
+        own = solution[moving]
+        load = np.concatenate(carriers, axis=1) @ own[carries]
         moved = replace(track, load_a=load)
         following = [t.columns(moved)[rows] for t in terms if t.effect.follows_load]
         columns[:, follows] = np.concatenate(following, axis=1)
-        rest = track.current_a[rows] - columns @ solution
+        values = np.split(solution[fixed], np.cumsum([block.shape[1] for block in others])[:-1])
+        rest = current - columns @ own - sum(map(np.matmul, others, values))
         error = float(rest @ rest)
         if least - error <= SETTLED * least < np.inf:
             break
@@ -352,8 +357,15 @@ def _with_newton_load(fitted: Fit) -> Dataset:
         # Proportional to the load's magnitude, so that by it is to divide by the load.
         over = np.where(load[rows] == 0, np.inf, load[rows])
         jacobian = columns.copy()
-        jacobian[:, carries] *= 1 + (columns[:, follows] @ solution[follows] / over)[:, None]
-        solution = solution + solve(jacobian.T @ jacobian, jacobian.T @ rest)
+        jacobian[:, carries] *= 1 + (columns[:, follows] @ own[follows] / over)[:, None]
+        right = np.concatenate([jacobian, rest[:, None]], axis=1)
+        inside = jacobian.T @ right
+        across = np.concatenate([block.T @ right for block in (*others, right[:, :0])])
+        gram[np.ix_(moving, moving)] = inside[:, :-1]
+        gram[np.ix_(fixed, moving)], gram[np.ix_(moving, fixed)] = across[:, :-1], across[:, :-1].T
+        asked = np.empty(solution.size)
+        asked[moving], asked[fixed] = inside[:, -1], across[:, -1]
+        solution = solution + solve(gram, asked)
     return dataset.with_model(best, track.model_a, static_terms(terms))
 
 
