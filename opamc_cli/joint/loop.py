@@ -188,11 +188,9 @@ def _opened(
     # Where functions without a name explain nothing, all of the error may be there to explain.
     reach = rmse_before**2 * (found.share or 1.0)
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
-    has_name = any(step.named for step in steps)
-    without_name = [step for step in steps if not step.named]
     # A model that predicts no better than the mean lacks something, whatever was found.
     predicts = after.sealed_r2 > 0
-    if has_name:
+    if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
@@ -200,7 +198,7 @@ def _opened(
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None
     if verdict in ("partial", "not-in-library"):
-        left = without_name or [step for step in steps if step.approximate]
+        left = [s for s in steps if not s.named] or [s for s in steps if s.approximate]
         unexplained = [term.effect.domain for term in explained.terms if term.effect.unnamed]
         domain = left[0].term.effect.domain if left else next(iter(unexplained), None)
     track = after.dataset.fine.track
@@ -242,6 +240,5 @@ def _rejected(tried: list[tuple[int, Tried]], added: set[str]) -> list[Tried]:
 
 def untestable(before: Fit, library: Library) -> dict[str, str]:
     """Say of the effects that the recordings cannot show why."""
-    track = before.dataset.fine.track
-    reasons = {name: effect.untestable(track) for name, effect in library.items()}
+    reasons = {n: effect.untestable(before.dataset.fine.track) for n, effect in library.items()}
     return {name: why for name, why in reasons.items() if why is not None}

@@ -46,12 +46,11 @@ def certainty(fit: Fit) -> Certainty:
     covariance = inverse @ meat @ inverse
     errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale
     widths = [values.size for values in fit.coefficients]
-    values = np.linalg.eigvalsh(scaled) if flat.size else np.ones(1)
-    condition = float(np.sqrt(values[-1] / max(values[0], 1e-16 * values[-1])))
+    sizes = np.linalg.eigvalsh(scaled) if flat.size else np.ones(1)
     return Certainty(
         tuple(np.split(errors, np.cumsum(widths)[:-1])) if widths else (),
         float(stdtrit(max(units - 1, 1), 0.975)),
-        condition,
+        float(np.sqrt(sizes[-1] / max(sizes[0], 1e-16 * sizes[-1]))),
         _inseparable(scaled, fit, widths),
     )
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import compress
 
 import numpy as np
 
@@ -320,52 +319,46 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     taken up the friction which grows with the load leave that load's zero in the wrong place.
     """
     dataset, terms = fitted.dataset, fitted.terms
-    track = dataset.fine.track
-    follow = any(term.effect.follows_load for term in terms)
+    track, parts = dataset.fine.track, dataset.fine.parts
+    roles = [(term.effect.carries_load, term.effect.follows_load) for term in terms]
     # What carried the load may have been taken out again.
-    if not follow or not any(term.effect.carries_load for term in terms):
+    if not all(map(any, zip(*roles, strict=True))):
         return dataset
-    parts = dataset.fine.parts
-    rows, current = parts.rows, track.current_a[parts.rows]
     blocks = [dataset.columns(term, fine=True) for term in terms]
+    known = list(zip(roles, blocks, fitted.coefficients, strict=True))
+    carriers = np.concatenate([block for role, block, _ in known if role[0]], axis=1)
+    columns = np.concatenate([parts.taken(b) for role, b, _ in known if any(role)], axis=1)
+    own = np.concatenate([values for role, _, values in known if any(role)])
     carries, follows = (
-        np.repeat([getattr(term.effect, name) for term in terms], [b.shape[1] for b in blocks])
-        for name in ("carries_load", "follows_load")
+        np.repeat(some, [values.size for role, _, values in known if any(role)])
+        for some in zip(*filter(any, roles), strict=True)
     )
-    mine = [t.effect.carries_load or t.effect.follows_load for t in terms]
-    carriers = [b for b, t in zip(blocks, terms, strict=True) if t.effect.carries_load]
-    columns = np.concatenate([parts.taken(b) for b in compress(blocks, mine)], axis=1)
-    # All else, of which a drive's answers to ripples have hundreds, stays as it is.
-    others = [parts.taken(b) for b, own in zip(blocks, mine, strict=True) if not own]
-    moving, fixed = (np.flatnonzero((carries | follows) == way) for way in (True, False))
-    carries, follows = carries[moving], follows[moving]
-    gram = dataset.sums((), True, *blocks).gram.sum(axis=0)
-    solution = np.concatenate(fitted.coefficients)
+    # All else, of which a drive's answers to ripples have hundreds of columns, stays as it is.
+    fixed = [block for role, block, _ in known if not any(role)]
+    held = [values for role, _, values in known if not any(role)]
+    others, kept = [parts.taken(b) for b in fixed], dataset.sums((), True, *fixed).gram.sum(axis=0)
     best, least = track.load_a, np.inf
     for _ in range(MOST_ROUNDS):
-        own = solution[moving]
-        load = np.concatenate(carriers, axis=1) @ own[carries]
+        load = carriers @ own[carries]
         moved = replace(track, load_a=load)
-        following = [t.columns(moved)[rows] for t in terms if t.effect.follows_load]
+        following = [t.columns(moved)[parts.rows] for t in terms if t.effect.follows_load]
         columns[:, follows] = np.concatenate(following, axis=1)
-        values = np.split(solution[fixed], np.cumsum([block.shape[1] for block in others])[:-1])
-        rest = current - columns @ own - sum(map(np.matmul, others, values))
+        rest = track.current_a[parts.rows] - columns @ own - sum(map(np.matmul, others, held))
         error = float(rest @ rest)
         if least - error <= SETTLED * least < np.inf:
             break
         best, least = load, error
         # Proportional to the load's magnitude, so that by it is to divide by the load.
-        over = np.where(load[rows] == 0, np.inf, load[rows])
+        over = np.where(load == 0, np.inf, load)[parts.rows]
         jacobian = columns.copy()
         jacobian[:, carries] *= 1 + (columns[:, follows] @ own[follows] / over)[:, None]
         right = np.concatenate([jacobian, rest[:, None]], axis=1)
         inside = jacobian.T @ right
         across = np.concatenate([block.T @ right for block in (*others, right[:, :0])])
-        gram[np.ix_(moving, moving)] = inside[:, :-1]
-        gram[np.ix_(fixed, moving)], gram[np.ix_(moving, fixed)] = across[:, :-1], across[:, :-1].T
-        asked = np.empty(solution.size)
-        asked[moving], asked[fixed] = inside[:, -1], across[:, -1]
-        solution = solution + solve(gram, asked)
+        gram = np.block([[inside[:, :-1], across[:, :-1].T], [across[:, :-1], kept]])
+        steps = solve(gram, np.concatenate([inside[:, -1], across[:, -1]]))
+        first, *more = np.split(steps, np.cumsum([own.size, *map(np.size, held)])[:-1])
+        own, held = own + first, list(map(np.add, held, more))
     return dataset.with_model(best, track.model_a, static_terms(terms))
 
 

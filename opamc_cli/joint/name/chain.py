@@ -54,8 +54,8 @@ class Chain:
     @cached_property
     def price(self) -> float:
         """Logarithm of the mean square error by which the added terms have to pay."""
-        declared = len(self.fit.terms) - self.added
-        return sum(price_of(term, values.size) for term, values in self._valued[declared:])
+        added = self._valued[len(self.fit.terms) - self.added :]
+        return sum(price_of(term, values.size) for term, values in added)
 
     @property
     def score(self) -> float:
@@ -149,8 +149,8 @@ def extended(chain: Chain, *terms: Term) -> Chain:
 
 def without(chain: Chain, place: int) -> Chain:
     """Take one of the added terms out, and fit the rest anew."""
-    declared = len(chain.fit.terms) - chain.added
-    terms = [term for i, term in enumerate(chain.fit.terms) if i != declared + place]
+    terms = list(chain.fit.terms)
+    del terms[len(terms) - chain.added + place]
     return chain_of(fit_terms(chain.fit.dataset, tuple(terms)), chain.added - 1)
 
 

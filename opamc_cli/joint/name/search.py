@@ -201,8 +201,7 @@ def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
         refused = {one.term.effect.name for one in found if one.gain >= pool.least_share}
         if possible or not refused:
             return possible
-        library = {name: one for name, one in pool.library.items() if name not in refused}
-        pool = replace(pool, library=library)
+        pool = replace(pool, library={n: e for n, e in pool.library.items() if n not in refused})
     return []
 
 
