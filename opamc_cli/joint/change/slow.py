@@ -107,7 +107,8 @@ def estimates(sums: Sums, population: Population) -> tuple[Floats, Floats]:
     moment = sums.moment - sums.gram[:, :, :own] @ population.mean
     precision = population.variance * np.linalg.pinv(population.covariance, hermitian=True)
     held = np.swapaxes(cross, 1, 2) @ np.linalg.inv(sums.gram[:, :own, :own] + precision)
-    information = (products - held @ cross) / population.variance
+    # A bump leaves 1e-310 in a unit that never comes near its place; the inverse would be infinite.
+    information = np.where(abs(products) > 1e-200, products - held @ cross, 0) / population.variance
     asked = moment[:, own:] - (held @ moment[:, :own, None])[..., 0]
     inverse = np.linalg.pinv(information, rcond=1e-9, hermitian=True) / population.variance
     return (inverse @ asked[..., None])[..., 0], information
@@ -146,8 +147,7 @@ def shifts(
 
 def _sizes(sums: Sums) -> Floats:
     """Mean square of each column in each unit, (units, k)."""
-    sizes: Floats = np.diagonal(sums.gram, axis1=1, axis2=2) / sums.parts.counts[:, None]
-    return sizes
+    return np.asarray(np.diagonal(sums.gram, axis1=1, axis2=2) / sums.parts.counts[:, None])
 
 
 def _spread_ratio(sample: Floats, information: Floats) -> float:

@@ -1,5 +1,6 @@
 """Slow effects by generalised least squares, against the same with the whole covariance."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -139,6 +140,21 @@ def test_beside_what_was_chosen_only_the_last_term_is_judged(units, population):
     assert both.last.coefficients.tolist() == both.coefficients[2:].tolist()
     (other,) = shifts(units, population, (QUADRATIC,), [SPRING])
     assert other.p_value < 1e-4
+
+
+def test_a_unit_that_never_comes_near_a_bump_has_no_coefficient_of_it(units, population):
+    sums = units.sums((*population.terms, SPRING))
+    near, information = estimates(sums, population)
+    faint = np.ones(sums.gram.shape[-1])
+    faint[-1] = 1e-160  # its square is no normal number any more, and has no finite inverse
+    gram, moment = sums.gram.copy(), sums.moment.copy()
+    gram[2] *= np.outer(faint, faint)
+    moment[2] *= faint
+    far, known = estimates(replace(sums, gram=gram, moment=moment), population)
+    assert (far[2, -1], known[2, -1, -1]) == (0.0, 0.0)
+    others = np.arange(len(far)) != 2
+    np.testing.assert_array_equal(far[others], near[others])
+    np.testing.assert_array_equal(known[others], information[others])
 
 
 def slow_shift(units, population, term, inflation):
