@@ -364,9 +364,10 @@ def passed_over(paths: Sequence[Path]) -> list[str]:
     """
     said = []
     for folder in dict.fromkeys(path for path in expand_patterns(paths) if path.is_dir()):
+        inside = sorted(folder.rglob("*"))
         left = [
             file.relative_to(folder)
-            for file in sorted(folder.rglob("*"))
+            for file in inside
             if _ending(file) in NO_RUNS or file.suffix == ".PARQUET"
             if not any(part.startswith(".") for part in file.relative_to(folder).parts)
             if file.is_file() and not file.with_suffix(".parquet").exists()
@@ -380,7 +381,7 @@ def passed_over(paths: Sequence[Path]) -> list[str]:
             )
         said += [
             f"{link}: is a link to a folder, which is passed over; name it beside {folder}"
-            for link in sorted(folder.rglob("*"))
+            for link in inside
             if link.is_symlink() and link.is_dir() and not link.name.startswith(".")
         ]
     return said

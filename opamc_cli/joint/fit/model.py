@@ -375,7 +375,7 @@ def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     total, model, load = currents(terms, parts, current.size)
     dataset = dataset.with_model(load, model, static_terms(terms))
     fitted = Fit(terms, coefficients, dataset, current - total)
-    fitted.__dict__["sums"] = sums
+    fitted.__dict__["sums"] = sums  # until it is forgotten
     return fitted
 
 

@@ -14,12 +14,7 @@ from opamc_cli.signal.motion.reported import (
 )
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.quality import LIMITS, clipped_share
-from opamc_cli.stages.chain.segments.rows import (
-    AxisSegments,
-    Segment,
-    make_rows,
-    mean_variance,
-)
+from opamc_cli.stages.chain.segments.rows import AxisSegments, Segment, make_rows, mean_variance
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs import AxisChannels, Run
 
