@@ -22,13 +22,9 @@ def energy_of(
 ) -> tuple[float, float]:
     """Change of the mean square residual, after a shift, if given, is taken from the target.
 
-    Returns
-    -------
-    slow : float
-        In the declared effects' coefficients: what the baseline's mean model leaves more in the
-        target than a unit's own fit, less the same in the baseline, A^2.
-    fast : float
-        In the residual of every unit's own fit, A^2.
+    First in the declared effects' coefficients (what the baseline's mean model leaves more in the
+    target than a unit's own fit, less the same in the baseline), then in the residual of every
+    unit's own fit; both in A^2.
     """
     after = compared.after
     sums = compared.sums(population.terms, True, shift_current(compared, shift))

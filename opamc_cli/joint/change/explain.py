@@ -80,17 +80,9 @@ def explain_change(
     Every recording is fitted by itself: its coefficients, and its power by motor order, are one
     sample. An effect is a cause where the target's samples lie outside what the baseline's differ
     by. With fewer than three baseline recordings their cycles are the samples, and an allowance
-    is made for what sessions differ by.
-
-    Parameters
-    ----------
-    baseline, target : list of Recording
-        Recordings of one joint at one rate, each with a signed current and its motion, or three
-        phases.
-    library : Library, optional
-        Effects that may be causes; the built-in ones by default.
-    follow : callable
-        How the baseline's recordings are followed: `units.follow`, or what remembers its results.
+    is made for what sessions differ by. Recordings are of one joint at one rate, each with a signed
+    current and its motion, or three phases; effects of the library, by default the built-in one,
+    may be causes; `follow` tells how the baseline's are followed, or remembers it.
     """
     library = library or built_in_library()
     cycles = len(baseline) < FEWEST_SESSIONS

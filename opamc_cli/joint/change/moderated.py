@@ -10,25 +10,12 @@ PRIOR_WEIGHT = 4.0
 
 
 def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Floats, Floats]:
-    """One-sided comparison of many features at once; larger after is positive.
+    """One-sided t and p values, (k,), of k features at once; larger after is positive.
 
-    Parameters
-    ----------
-    before : array of shape (n, k), n at least 2
-        Features of the baseline's units.
-    after : array of shape (m, k)
-        Of the target's.
-    between : float
-        Variance between sessions that units of one session cannot show.
-
-    Returns
-    -------
-    t_values, p_values : arrays of shape (k,)
-        The variance of each feature is drawn towards the median of all features.
-
-    References
-    ----------
-    Smyth, Statistical Applications in Genetics and Molecular Biology 3, 2004.
+    Of the baseline's units, (n, k) with n at least 2, and of the target's, (m, k). The variance of
+    each feature is drawn towards the median of all; `between` is that between sessions, which
+    units of one session cannot show. Smyth, Statistical Applications in Genetics and Molecular
+    Biology 3, 2004.
     """
     n, m = before.shape[0], after.shape[0]
     variance = np.var(before, axis=0, ddof=1)

@@ -126,11 +126,7 @@ def own_fit(
 ) -> tuple[Floats, Floats]:
     """Least squares of terms on each unit's samples alone; arguments are those of `Compared.sums`.
 
-    Returns
-    -------
-    coefficients : array of shape (units, k)
-    left : array of shape (units,)
-        Mean square of what they leave.
+    Coefficients, (units, k), and the mean square of what they leave, (units,).
     """
     sums = compared.sums(terms, fine, taken)
     coefficients = solve(sums.gram, sums.moment)

@@ -17,24 +17,13 @@ def answers(
     rows: Ints | None = None,
     out: Floats | None = None,
 ) -> Floats:
-    """Put signals through the low-pass and the band-pass of one resonance.
+    """Put k signals of shape (n,) through the low-pass and the band-pass of one resonance.
 
-    Parameters
-    ----------
-    signals : sequence of arrays of shape (n,)
-        As if each recording's first value had lasted for ever: no ringing from the start.
-    rad_per_s, damping : float
-        Undamped angular frequency, below pi times the rate, and damping ratio.
-    rows : int array of shape (m,), optional
-        Samples that somebody looks at; else all n of them.
-    out : array of shape (2 k, m), optional
-        Where to write.
-
-    Returns
-    -------
-    array of shape (2 k, m)
-        All k signals through the low-pass, of gain 1 at rest; then through the band-pass, the
-        low-pass's rate of change in units of the resonance.
+    Of an undamped angular frequency below pi times the rate, and a damping ratio; as if each
+    recording's first value had lasted for ever, so that nothing rings from the start. Returned are,
+    at all samples or at some `rows`, int (m,), and written to `out` where it is given, the signals
+    through the low-pass, of gain 1 at rest, then through the band-pass, the low-pass's rate of
+    change in units of the resonance; shape (2 k, m).
     """
     # The bilinear transform bends frequencies; start from the bent one, as a share of twice the
     # rate.

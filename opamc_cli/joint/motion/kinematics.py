@@ -34,8 +34,6 @@ LEAST_CORNER = 0.05 / 3
 SLOWEST_SHARE = 0.02
 """Samples below this share of the top speed do not count: their direction is not certain. Another
 joint that goes less than this share of the way beside is held still."""
-
-
 LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
 
 

@@ -130,9 +130,6 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
     """Savitzky-Golay derivative of a path (cubic; edges by the outermost polynomial), (n,).
 
     Derivative 0 is the smoothed path itself. The window has an odd number of samples, 5 to n.
-
-    References
-    ----------
     Savitzky and Golay, Analytical Chemistry 36, 1964.
     """
     half = window // 2

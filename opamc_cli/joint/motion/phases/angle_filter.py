@@ -81,30 +81,12 @@ def smoothed_angle(
 
     The acceleration is a random walk whose size sets the smoother's bandwidth.
 
-    Parameters
-    ----------
-    angle_rad : array of shape (n,)
-        Measured angle, known modulo pi.
-    strong : bool array of shape (n,)
-        Samples whose angle counts.
-    rough_rad_s : array of shape (n,)
-        Rough speed, for the lock.
-    sure : bool array of shape (n,)
-        Samples whose rough speed counts.
-    rate_hz, bandwidth_hz : float
-        Sampling rate and bandwidth: slower than an electrical period at working speed, so that
-        errors of sensors and inverter are not followed.
-    spread : array of shape (n,), optional
-        Variance of each measured angle, in units of the best; 1 where not given.
-    free : bool array of shape (n,), optional
-        Samples before which the angle may have changed by any amount: angles on both sides do
-        not bind each other there, speeds and accelerations do.
-    turn_rad : float
-        The measured angle is known modulo this; 0 where it is known for good.
-
-    Returns
-    -------
-    angle, speed, acceleration : arrays of shape (n,)
+    Arrays are of shape (n,). The measured angle is known modulo `turn_rad`, for good where that is
+    0, and counts where it is `strong`; its variance is given by `spread`, in units of the best. The
+    rough speed, for the lock, counts where it is `sure`. The bandwidth is slower than an electrical
+    period at working speed, so that errors of sensors and inverter are not followed. Before `free`
+    samples the angle may have changed by any amount: angles on both sides do not bind each other
+    there, speeds and accelerations do.
 
     References
     ----------

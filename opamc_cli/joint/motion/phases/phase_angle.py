@@ -48,20 +48,10 @@ class PhaseAngle:
     ) -> tuple[Floats, float]:
         """Electrical angle from the logged position, with ratio, zero and delay from the phases.
 
-        Parameters
-        ----------
-        position_rad, velocity_rad_s : array of shape (n,)
-            Joint angle and speed.
-        ratio : float or None
-            Electrical radians per joint radian, if known.
-
-        Returns
-        -------
-        electrical_rad : array of shape (n,)
-            The phases' own angle where the position does not follow it within half a radian.
-        lag_s : float
-            By how much the phases come later than the position, within 60 ms; 0 where that
-            cannot be told. Filters and loggers make it: at 300 Hz a millisecond is two radians.
+        Of the joint's angle and speed, (n,), and electrical radians per joint radian, if known. The
+        angle, (n,), is the phases' own where the position does not follow it within half a radian;
+        with it comes by how much the phases are later than the position, within 60 ms, 0 where that
+        cannot be told. Filters and loggers make it: at 300 Hz a millisecond is two radians.
         """
         rows = np.flatnonzero(self.strong)
         if not rows.size:
