@@ -5,7 +5,7 @@ from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Ints, Track, block_mean
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -87,15 +87,28 @@ def late_means(
     Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
     no more than there are blocks; between samples it is what a straight line between them gives.
     """
-    means = []
-    for number, (start, stop) in enumerate(bounds):
+    blocks = sum((stop - start) // factor for start, stop in bounds)
+    means = np.empty((blocks, sums.shape[1]))
+    _late_means(sums, np.array(bounds), samples, factor, means)
+    return means
+
+
+@njit(cache=True)
+def _late_means(sums: Floats, bounds: Ints, samples: float, factor: int, means: Floats) -> None:
+    place = 0
+    for number in range(len(bounds)):
+        start, stop = bounds[number]
         own = sums[start + number : stop + number + 1]
-        edges = factor * np.arange((stop - start) // factor + 1) - samples
-        # Beyond the ends the nearest step goes on.
-        whole = np.clip(edges.astype(np.int64), 0, stop - start - 1)
-        at = own[whole] + (edges - whole)[:, None] * (own[whole + 1] - own[whole])
-        means.append(np.diff(at, axis=0) / factor)
-    return np.concatenate(means)
+        for block in range((stop - start) // factor):
+            for side, sign in ((0, -1.0), (1, 1.0)):
+                edge = factor * (block + side) - samples
+                # Beyond the ends the nearest step goes on.
+                whole = min(max(int(edge), 0), stop - start - 1)
+                for k in range(sums.shape[1]):
+                    step = own[whole + 1, k] - own[whole, k]
+                    at = sign * (own[whole, k] + (edge - whole) * step) / factor
+                    means[place, k] = at + (means[place, k] if side else 0.0)
+            place += 1
 
 
 @njit(cache=True)

@@ -15,8 +15,6 @@ ROUNDING = 1e-12
 """Share of a sum of products below which a difference of two is their rounding."""
 PARTS_PER_UNIT = 4
 """So many drops per unit make the standard error of a drop: 9 units have 36."""
-
-
 BOTH_WAYS = 0.25
 """Share of a stretch of time that moves the one way, and the other: nearly two strokes."""
 FEWEST_STRETCHES = 4
@@ -184,6 +182,7 @@ class Sums:
         moment = (self.moment - among)[:, :-1]
         return Sums(self.gram[:, :-1, :-1], moment, power, self.parts)
 
+    @cached_property
     def inverses(self) -> Floats:
         """Pseudo-inverse of the products outside each unit, shape (units, k, k)."""
         rest = self.parts.elsewhere(self.gram)
@@ -196,7 +195,7 @@ class Sums:
     def coefficients(self) -> Floats:
         """Fit to all units but each one, shape (units, k)."""
         moment = self.parts.elsewhere(self.moment)
-        found: Floats = np.einsum("uij,uj->ui", self.inverses(), moment)
+        found: Floats = np.einsum("uij,uj->ui", self.inverses, moment)
         return found
 
     def held_out(self) -> Floats:

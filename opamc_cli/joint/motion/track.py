@@ -42,6 +42,10 @@ NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """Those of which a block has something else than the mean, or nothing."""
 
 
+ENOUGH_ROWS = 4000
+"""By which the load's shapes are told apart: built-in effects' loads are sums of them."""
+
+
 @dataclass(frozen=True)
 class Joint:
     """Constants of the joint; None where nobody knows them."""
@@ -151,7 +155,8 @@ class Track:
     @cached_property
     def load_inertia(self) -> float:
         """Current of the fitted load that follows the acceleration, in A by rad/s²."""
-        rows = self.moving
+        rows = np.flatnonzero(self.moving)
+        rows = rows[:: max(rows.size // ENOUGH_ROWS, 1)]
         place = self.position_rad[rows]
         shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, place**0)
         columns = np.stack(shapes, axis=0).T
@@ -237,12 +242,7 @@ def ranges(lengths: Iterable[int]) -> tuple[tuple[int, int], ...]:
 
 
 def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int) -> Floats:
-    """Average runs of `factor` samples inside each recording; a shorter rest is dropped.
-
-    Returns
-    -------
-    array of shape (n // factor per recording,) or with m columns
-    """
+    """Average runs of `factor` samples, (n,) or (n, m), in each recording; a rest is dropped."""
     if factor == 1:
         return values
     # By products: nine times as fast as means over so short an axis.

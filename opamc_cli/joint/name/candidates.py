@@ -101,7 +101,7 @@ class Beside:
             blocks = [dataset.columns(term, True) for term in chain.fit.terms]
             self.sums = dataset.sums((), True, *blocks)
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
-        self.before, self.inverses = self.sums.held_out(), self.sums.inverses()
+        self.before, self.inverses = self.sums.held_out(), self.sums.inverses
 
     def products(self, columns: Floats) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k)."""
@@ -110,8 +110,15 @@ class Beside:
 
     def candidate(self, term: Term) -> Candidate:
         """Judge one guess."""
-        (batch,) = batches_of(self.dataset, [term], self.fine)
-        return judged(term, float(self.gains(batch)[0]), batch.width)
+        return self.candidates(batches_of(self.dataset, [term], self.fine))[0]
+
+    def candidates(self, batches: Sequence[Batch]) -> list[Candidate]:
+        """Judge guesses, many at once: the chain's own regressors are read once for all."""
+        return [
+            judged(term, float(gain), batch.width)
+            for batch in batches
+            for term, gain in zip(batch.terms, self.gains(batch), strict=True)
+        ]
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""

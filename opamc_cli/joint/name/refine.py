@@ -18,12 +18,15 @@ LOGARITHMIC = 5.0
 
 def refined(term: Term, beside: Beside) -> Term:
     """Refine the searched parameters of a candidate beside a chain."""
-    track = beside.dataset.grid_of(beside.fine).track
+    track, given = beside.dataset.grid_of(beside.fine).track, term.parameters.keys()
     limits = {k: v for k, v in term.effect.limits(track).items() if k in term.parameters}
     if not limits:
         return term
     steps = term.effect.first_steps(track, term.parameters)
     names = list(limits)
+    # Where a line is shows as well with the fewest filters of a drive's answer.
+    alike = (form for form, _ in term.effect.variants(term.parameters) if form.keys() == given)
+    sketch = next(alike, term.parameters) if term.effect.fast else term.parameters
     logs = [low > 0 and high > LOGARITHMIC * low for low, high in limits.values()]
 
     def outwards(values: Floats) -> Parameters:
@@ -34,7 +37,9 @@ def refined(term: Term, beside: Beside) -> Term:
         return moved
 
     def lost(values: Floats) -> float:
-        return -beside.candidate(Term(term.effect, outwards(values), term.keep)).gain
+        moved = outwards(values)
+        tried = sketch | {name: moved[name] for name in names}
+        return -beside.candidate(Term(term.effect, tried, term.keep)).gain
 
     start, step = np.empty((2, len(names)))
     for i, (name, log) in enumerate(zip(names, logs, strict=True)):
