@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.explain.saturated import saturated, unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
@@ -13,6 +14,9 @@ from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
 
+ENOUGH = 12_500
+"""Moving samples by which two ways are told apart by what can be explained: a quarter of all that
+the loop takes of a long recording."""
 BETTER = 0.97
 """Of the held-out mean square error: another window than the noise asks for must be worth it."""
 
@@ -60,11 +64,20 @@ def _best_of(
         sums = declared_fit(dataset_of(track, grouping), model).sums
         return float(sums.held_out()[sums.parts.judged].sum())
 
-    error, best = held_out(track), None
+    def unexplained(track: Track) -> float:
+        fit = declared_fit(dataset_of(track, grouping, ENOUGH), model)
+        library = unnamed_library()
+        return saturated(chain_of(fit, 0), Pool.of(fit.dataset, library)).mean_square
+
+    first, error, best = track, held_out(track), None
     for smoothing in ways:
-        found = held_out(_judged_alike(build_track(recordings, joint, smoothing), track))
+        other = _judged_alike(build_track(recordings, joint, smoothing), first)
+        found = held_out(other)
         if found < BETTER * error:
-            error, best = found, smoothing
+            track, error, best = other, found, smoothing
+    # What fits best as declared may have smoothed away what something missing answers to.
+    if best is not None and unexplained(first) < BETTER * unexplained(track):
+        return None
     return best
 
 

@@ -22,6 +22,10 @@ every round costs as many."""
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
+ENOUGH_ROWS = 10_000
+"""Samples by which a load is found that friction follows; all are fitted beside it."""
+TINY = 1e-6
+"""Share of the largest load by which it is moved for its derivatives."""
 SMALLEST_KERNEL = 5
 """A moving average of up to 5 samples needs no counterpart."""
 
@@ -152,15 +156,15 @@ class Dataset:
         return replace(self, fine=fine, coarse=coarse)
 
 
-def dataset_of(track: Track, grouping: Grouping) -> Dataset:
-    """Arrange a track for the loop."""
+def dataset_of(track: Track, grouping: Grouping, most: int = MOST_SAMPLES) -> Dataset:
+    """Arrange a track for the loop; of more than so many moving samples by some of them."""
     track = replace(track, group=grouping.group)
     if track.kernel.size <= SMALLEST_KERNEL:
         track = replace(track, kernel=np.ones(1))
-    if int(np.count_nonzero(track.moving & (track.group >= 0))) <= MOST_SAMPLES:
+    if int(np.count_nonzero(track.moving & (track.group >= 0))) <= most:
         return _dataset(track, grouping)
-    pieces = thinned(track, grouping, grouping.open)
-    sealed = thinned(track, grouping, grouping.sealed)
+    pieces = thinned(track, grouping, grouping.open, most)
+    sealed = thinned(track, grouping, grouping.sealed, most)
     grid = grid_of(cut(track, sorted((*pieces, *sealed))), grouping.sealed)
     dataset = _dataset(cut(track, pieces), grouping)
     return replace(dataset, opened=Dataset(grid, grid, 1, grouping))
@@ -297,10 +301,9 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     """Fit all terms jointly; where some scale with the load or the model, until that settles."""
-    track = dataset.fine.track
-    dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
+    dataset = _with_first_load(dataset, terms)
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
-    fewest = 2 if np.any(track.model_a) else 3
+    fewest = 2 if np.any(dataset.fine.track.model_a) else 3
     before = np.inf
     for number in range(1, MOST_ROUNDS + 1):
         fitted = _fit_once(dataset, terms)
@@ -310,6 +313,31 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
             break
         dataset, before = _with_newton_load(fitted), error
     return fitted
+
+
+def _with_first_load(dataset: Dataset, terms: tuple[Term, ...]) -> Dataset:
+    """Return the dataset with these static terms, and a load that begins near its place.
+
+    One that was fitted without friction that follows it has taken that up, and leads nowhere.
+    """
+    track = dataset.fine.track
+    known = {term.key for term in track.static_terms}
+    others = tuple(term for term in terms if not term.effect.follows_load)
+    if any(term.effect.follows_load and term.key not in known for term in terms):
+        track = _fit_once(dataset, (*others, Term(_FreeFriction(), {}))).dataset.fine.track
+    return dataset.with_model(track.load_a, track.model_a, static_terms(terms))
+
+
+class _FreeFriction(Effect):
+    """Friction that may be anything over the place, beside which a load shows as it is."""
+
+    name = "free_friction"
+    from_motion = True
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        place = track.position_rad
+        angle = np.pi * (place - place[track.moving].min()) / max(track.travel_rad, 1e-12)
+        return track.direction[:, None] * np.cos(np.outer(angle, np.arange(5)))
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:
@@ -324,10 +352,12 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     # What carried the load may have been taken out again.
     if not all(map(any, zip(*roles, strict=True))):
         return dataset
+    every = max(parts.rows.size // ENOUGH_ROWS, 1)
+    rows = parts.rows[::every]
     blocks = [dataset.columns(term, fine=True) for term in terms]
     known = list(zip(roles, blocks, fitted.coefficients, strict=True))
     carriers = np.concatenate([block for role, block, _ in known if role[0]], axis=1)
-    columns = np.concatenate([parts.taken(b) for role, b, _ in known if any(role)], axis=1)
+    columns = np.concatenate([parts.taken(b)[::every] for role, b, _ in known if any(role)], axis=1)
     own = np.concatenate([values for role, _, values in known if any(role)])
     carries, follows = (
         np.repeat(some, [values.size for role, _, values in known if any(role)])
@@ -335,30 +365,38 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     )
     # All else, of which a drive's answers to ripples have hundreds of columns, stays as it is.
     fixed = [block for role, block, _ in known if not any(role)]
+    kept = dataset.sums((), True, *fixed).gram.sum(axis=0) / every
+    others = np.concatenate([columns[:, :0], *(parts.taken(b)[::every] for b in fixed)], axis=1)
     held = [values for role, _, values in known if not any(role)]
-    others, kept = [parts.taken(b) for b in fixed], dataset.sums((), True, *fixed).gram.sum(axis=0)
-    best, least = track.load_a, np.inf
-    for _ in range(MOST_ROUNDS):
-        load = carriers @ own[carries]
+
+    def following(load: Floats) -> Floats:
         moved = replace(track, load_a=load)
-        following = [t.columns(moved)[parts.rows] for t in terms if t.effect.follows_load]
-        columns[:, follows] = np.concatenate(following, axis=1)
-        rest = track.current_a[parts.rows] - columns @ own - sum(map(np.matmul, others, held))
+        return np.concatenate([t.columns(moved, rows) for t in terms if t.effect.follows_load], 1)
+
+    values = start = np.concatenate([own, *held])
+    best, least, step = track.load_a, np.inf, 0.0 * values
+    for _ in range(MOST_ROUNDS):
+        own = values[: own.size]
+        load = carriers @ own[carries]
+        columns[:, follows] = following(load)
+        rest = track.current_a[rows] - columns @ own - others @ values[own.size :]
         error = float(rest @ rest)
-        if least - error <= SETTLED * least < np.inf:
+        settled = abs(least - error) <= SETTLED * least < np.inf
+        if error < least:
+            best, least, start = load, error, values
+            jacobian = columns.copy()
+            tiny = TINY * np.abs(load).max() / np.maximum(np.abs(carriers).max(axis=0), 1e-300)
+            for place, size, carrier in zip(np.flatnonzero(carries), tiny, carriers.T, strict=True):
+                aside = (following(load + size * carrier) - columns[:, follows]) @ own[follows]
+                jacobian[:, place] += aside / max(size, 1e-300)
+            inside, across = jacobian.T @ jacobian, others.T @ jacobian
+            gram = np.block([[inside, across.T], [across, kept]])
+            step = 2 * solve(gram, np.concatenate([jacobian.T @ rest, others.T @ rest]))
+        if settled:
             break
-        best, least = load, error
-        # Proportional to the load's magnitude, so that by it is to divide by the load.
-        over = np.where(load == 0, np.inf, load)[parts.rows]
-        jacobian = columns.copy()
-        jacobian[:, carries] *= 1 + (columns[:, follows] @ own[follows] / over)[:, None]
-        right = np.concatenate([jacobian, rest[:, None]], axis=1)
-        inside = jacobian.T @ right
-        across = np.concatenate([block.T @ right for block in (*others, right[:, :0])])
-        gram = np.block([[inside[:, :-1], across[:, :-1].T], [across[:, :-1], kept]])
-        steps = solve(gram, np.concatenate([inside[:, -1], across[:, -1]]))
-        first, *more = np.split(steps, np.cumsum([own.size, *map(np.size, held)])[:-1])
-        own, held = own + first, list(map(np.add, held, more))
+        # A step that was too long is halved.
+        step = step / 2
+        values = start + step
     return dataset.with_model(best, track.model_a, static_terms(terms))
 
 

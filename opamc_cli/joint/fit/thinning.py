@@ -23,16 +23,18 @@ TAIL_S = 0.15
 Pieces = list[tuple[int, int]]
 
 
-def thinned(track: Track, grouping: Grouping, groups: Sequence[int]) -> Pieces:
+def thinned(
+    track: Track, grouping: Grouping, groups: Sequence[int], most: int = MOST_SAMPLES
+) -> Pieces:
     """Let a sample of some groups stand for all of them in a long recording.
 
     Cycles are taken whole: a part of a cycle is not like the rest. Of recordings and blocks the
     first and the last part is taken, so that whatever changes at some time is seen on its own side
-    of a sealed neighbour. The half-open pieces hold some 50 000 moving samples times these groups'
+    of a sealed neighbour. The half-open pieces hold some `most` moving samples times these groups'
     share, more where whole cycles are long.
     """
     member = track.moving & (track.group >= 0)
-    share = MOST_SAMPLES / max(int(np.count_nonzero(member)), 1)
+    share = most / max(int(np.count_nonzero(member)), 1)
     sizes = np.bincount(track.group[member], minlength=len(grouping.names))
     count = min(max(int(len(groups) * share), FEWEST_GROUPS), len(groups))
     whole = grouping.kind == "cycles"

@@ -8,7 +8,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Dataset, Term
-from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form, judged
+from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import p_value
@@ -136,17 +136,17 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         for term in guessed(effect, dataset)
     ]
     names = {effect.name for effect in free}
-    for batch in (*pool.slow, *batches_of(dataset, following, fine=False)):
-        for term, gain in zip(batch.terms, slow.gains(batch), strict=True):
-            if term.effect.name in names:
-                note(judged(term, float(gain), batch.width))
+    for candidate in slow.candidates((*pool.slow, *batches_of(dataset, following, fine=False))):
+        if candidate.term.effect.name in names:
+            note(candidate)
     among_fast = any(term.effect.fast for term in chain.fit.terms)
     fast = Beside(chain, fine=True) if among_fast or any(one.fast for one in free) else slow
     if among_fast:
         # What a drive makes of a ripple takes up friction, too: beside it as it was fitted without
         # a slow effect, that may show as little.
-        for candidate in list(found.values()):
-            note(fast.candidate(candidate.term))
+        again = [candidate.term for candidate in found.values()]
+        for candidate in fast.candidates(batches_of(dataset, again, fine=True)):
+            note(candidate)
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
         if effect.fast and not effect.untestable(dataset.fine.track):
@@ -182,10 +182,8 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         if not signatures.isdisjoint(tried):
             continue
         tried |= signatures
-        child = extended(chain, forms[0])
-        if child.gain_over(chain)[0] >= pool.least_share:
-            others = (extended(chain, term) for term in forms[1:])
-            child = min((child, *others), key=lambda one: one.score)
+        children = [extended(chain, term) for term in forms]
+        child = min(children, key=lambda one: (not one.plausible_beside(chain), one.score))
         found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found
 
@@ -240,20 +238,14 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
 
 
 def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
-    """Follow `width` chains side by side; return the one that is worth its price.
-
-    One alone is followed as far as its score falls.
-    """
-    width = 1 if "beam" in pool.without else width
+    """Follow `width` chains side by side as far as the score falls; return the best."""
     chains = [start]
-    best = start
+    best, width = start, 1 if "beam" in pool.without else width
     known: set[Signature] = set()
-    for _ in range(MOST_STEPS):
+    while best.added < MOST_STEPS:
         following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
-        if not following:
-            break
         chains = sorted(following, key=lambda chain: chain.score)[:width]
-        if width == 1 and chains[0].score >= best.score:
-            break  # What a step that is not worth its price leads to is found beside others only.
-        best = min((best, *chains), key=lambda chain: chain.score)
+        if not chains or chains[0].score >= best.score:
+            break
+        best = chains[0]
     return best

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from closing import MODEL, joint_of, plain_fit
+from closing import MODEL, close_on, joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import best_fit, declared_fit
@@ -76,9 +76,8 @@ def test_a_joint_at_rest_has_no_fit():
     assert best_fit([rest()], Joint(), lambda dataset: declared(*BASE)) is None
 
 
-@pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
-def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(motion):
-    made = joint_of(motion, None, noise_a=1e-3, seconds=20.0)
+def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples():
+    made = joint_of("cyclic", None, noise_a=1e-3, seconds=20.0)
     seen = 1e-4 * np.round(made.position_rad / 1e-4)
     recording = Recording("run", made.rate_hz, current_a=made.current_a, position_rad=seen)
     ask = [recording], Joint(), lambda dataset: declared(*BASE)
@@ -90,6 +89,18 @@ def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(m
     parts = best.sums.parts
     errors = [fit.sums.held_out()[parts.judged].sum() for fit in (best, plain)]
     assert errors[0] < 0.97 * errors[1]
+
+
+@pytest.mark.parametrize(
+    ("hidden", "size", "rate", "seed"),
+    [("time_delay", 15.0, 100.0, 14000014), ("elasticity", 5.0, 2000.0, 14000013)],
+)
+def test_a_window_does_not_smooth_away_what_something_missing_answers_to(hidden, size, rate, seed):
+    # With the declared model alone a window of 120 ms predicts better by 4 % of the error and more.
+    _, loop = close_on(seed, (hidden,), size, rate=rate)
+    assert [step.term.effect.name for step in loop.steps] == [hidden]
+    assert loop.before.dataset.fine.track.kernel.size < 0.1 * rate
+    assert loop.rmse_after_a < 0.5 * loop.rmse_before_a
 
 
 def test_without_a_reason_the_window_stays():

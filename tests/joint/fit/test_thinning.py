@@ -6,7 +6,7 @@ from simulator import simulate
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import declared_fit
-from opamc_cli.joint.fit import model, thinning
+from opamc_cli.joint.fit import thinning
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.loop import close_loop
@@ -17,12 +17,6 @@ from opamc_cli.joint.motion.track import Joint
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous")
 LIMIT = 20_000
-
-
-@pytest.fixture
-def low_limit(monkeypatch):
-    monkeypatch.setattr(thinning, "MOST_SAMPLES", LIMIT)
-    monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
 
 
 def long_track(seed=5, effects=("load_friction",), cycles=12, kind="trapezoid"):
@@ -36,9 +30,9 @@ def terms(*effects):
     return tuple(Term(library[name], parameters) for name, parameters in effects)
 
 
-def test_cycles_are_taken_whole(low_limit):
+def test_cycles_are_taken_whole():
     track, grouping = long_track(cycles=30)
-    dataset = dataset_of(track, grouping)
+    dataset = dataset_of(track, grouping, LIMIT)
     taken = np.unique(dataset.fine.track.group[dataset.fine.fit])
     assert grouping.kind == "cycles"
     assert thinning.FEWEST_GROUPS <= taken.size < len(dataset.grouping.open)
@@ -47,11 +41,11 @@ def test_cycles_are_taken_whole(low_limit):
         assert there == np.count_nonzero(track.moving & (grouping.group == group))
 
 
-def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
+def test_of_blocks_the_first_and_the_last_part_is_taken():
     track, _ = long_track(cycles=30, kind="sines")
     blocks = group_samples(track.moving, track.bounds, None, track.rate_hz, ("run",))
     assert blocks.kind == "blocks"
-    dataset = dataset_of(track, blocks)
+    dataset = dataset_of(track, blocks, LIMIT)
     fine = dataset.fine
     assert np.count_nonzero(fine.fit) == pytest.approx(LIMIT * 0.75, rel=0.02)
     for group in dataset.grouping.open:
@@ -69,9 +63,9 @@ def test_of_blocks_the_first_and_the_last_part_is_taken(low_limit):
         assert held[0] >= thinning.LEAD_S * track.rate_hz - 1
 
 
-def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end(low_limit):
+def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end():
     track, grouping = long_track(cycles=20)
-    dataset = dataset_of(track, grouping)
+    dataset = dataset_of(track, grouping, LIMIT)
     assert not dataset.fine.sealed.any()
     fitted = fit_terms(dataset, terms(*((name, {}) for name in DECLARED)))
     opened = fitted.opened
@@ -85,14 +79,12 @@ def test_nothing_sealed_is_on_the_grids_and_all_of_it_is_opened_at_the_end(low_l
 
 
 @pytest.mark.long
-def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells(monkeypatch):
+def test_a_sample_of_a_long_recording_tells_what_all_of_it_tells():
     track, grouping = long_track(cycles=20)
     library = built_in_library()
     declared = tuple((library[name], None) for name in DECLARED)
     whole = close_loop(declared_fit(dataset_of(track, grouping), declared), library)
-    monkeypatch.setattr(thinning, "MOST_SAMPLES", LIMIT)
-    monkeypatch.setattr(model, "MOST_SAMPLES", LIMIT)
-    part = close_loop(declared_fit(dataset_of(track, grouping), declared), library)
+    part = close_loop(declared_fit(dataset_of(track, grouping, LIMIT), declared), library)
     assert [s.term.effect.name for s in part.steps] == [s.term.effect.name for s in whole.steps]
     assert part.verdict == whole.verdict == "closed"
     assert part.rmse_before_a == pytest.approx(whole.rmse_before_a, rel=0.02)

@@ -155,16 +155,31 @@ def test_guesses_that_lie_ready_are_asked_only_if_their_effect_is_in_the_pool():
     assert "position_drag" not in {one.term.effect.name for one in trials(chain, spring)}
 
 
-@pytest.mark.parametrize(("width", "found"), [(1, -1.0), (2, -3.0)])
-def test_one_chain_is_followed_as_far_as_its_score_falls(monkeypatch, width, found):
-    chains = [SimpleNamespace(score=score) for score in (0.0, -1.0, -0.5, -3.0)]
+@pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
+@pytest.mark.parametrize("strength", [5.0, 20.0, 60.0])
+def test_friction_that_follows_the_weight_alone_is_found_in_its_own_form(motion, strength):
+    # All of the inertia taken into the load, it shows as nothing; and its own form was reached
+    # from a load whose zero was right alone.
+    def by_weight(q, v, a, t):
+        return np.sign(v) * np.abs(np.sin(q) + 0.4 * np.cos(q))
+
+    chain = chain_of(plain_fit(joint_of(motion, by_weight, strength)), 0)
+    (found,) = trials(chain, pool_of(chain, "load_friction"))
+    assert found.term.parameters == {"inertia_share": 0.0}
+    assert found.why_not is None
+    assert found.chain.fit.rmse(sealed=False) == pytest.approx(0.02, rel=0.05)
+
+
+@pytest.mark.parametrize("width", [1, 2])
+def test_chains_are_followed_as_far_as_the_score_falls(monkeypatch, width):
+    chains = [SimpleNamespace(score=score, added=0) for score in (0.0, -1.0, -0.5, -3.0)]
 
     def possible(chain, pool, known):
         following = chains[chains.index(chain) + 1 :][:1]
         return [SimpleNamespace(chain=one) for one in following]
 
     monkeypatch.setattr(search, "_possible", possible)
-    assert beam(chains[0], Pool([], {}), width).score == found
+    assert beam(chains[0], Pool([], {}), width).score == -1.0
 
 
 def test_a_slow_effect_is_judged_beside_a_ripple_that_is_fitted_with_it():
