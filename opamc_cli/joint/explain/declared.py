@@ -14,6 +14,9 @@ from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
 
+HALF = 0.5
+"""Of what that leaves of the mean square error with functions beside it: then it has smoothed away
+what something missing answers to. Between 0.4 and 0.8 there was no simulated joint."""
 ENOUGH = 12_500
 """Moving samples by which two ways are told apart by what can be explained: a quarter of all that
 the loop takes of a long recording."""
@@ -76,7 +79,7 @@ def _best_of(
         if found < BETTER * error:
             track, error, best = other, found, smoothing
     # What fits best as declared may have smoothed away what something missing answers to.
-    if best is not None and unexplained(first) < BETTER * unexplained(track):
+    if best is not None and unexplained(first) < HALF * unexplained(track):
         return None
     return best
 
