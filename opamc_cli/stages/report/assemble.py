@@ -8,19 +8,20 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import jinja2
-
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures.loading import undocumented
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.focus import by_severity, choose_focus
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs, read_inputs
 from opamc_cli.stages.report.results.provenance import provenance
+from opamc_cli.stages.report.templates import environment
 from opamc_cli.stages.report.views import axis_view, compared, heading, headline, loop_view
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 
 if TYPE_CHECKING:
+    import jinja2
+
     from opamc_cli.stages.report.figures.figure import Figure
 
 
@@ -106,8 +107,7 @@ def render(
         *evidence.omitted,
         *(line for loop in loops for line in loop["section"].omitted),
     ]
-    template = _environment().get_template("report.html.j2")
-    page = template.render(
+    page = _template().render(
         title=title,
         styles=custom_properties() + "\n" + _resource("report.css"),
         headline=headline(inputs),
@@ -161,23 +161,16 @@ def _draw(
 
 
 @functools.cache
-def _environment() -> jinja2.Environment:
-    """Return where templates are found; each is compiled once, not in every night of a worker."""
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_resource),
-        autoescape=True,  # whatever the template is called: names of runs are not ours
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
+def _template() -> "jinja2.Template":
+    found = environment(_resource)
+    found.filters |= {
         "number": wording.number,
         "p_value": wording.p_value,
         "p_phrase": wording.p_phrase,
         "moment": wording.moment,
     }
-    environment.globals |= {"sign": state_sign, "role": state_role}
-    return environment
+    found.globals |= {"sign": state_sign, "role": state_role}
+    return found.get_template("report.html.j2")
 
 
 def _resource(name: str) -> str:

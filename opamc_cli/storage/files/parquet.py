@@ -79,12 +79,16 @@ def read_schema(path: Path, advice: str) -> pa.Schema:
     require_regular_file(path, InputError)
     with reading(path, advice):
         schema = pq.read_schema(path)
-        # names that are not UTF-8 are found when they are first looked at
-        repeated = sorted({name for name in schema.names if schema.names.count(name) > 1})
-    if repeated:
-        msg = f"{path}: has column {shown(repeated[0])} more than once; {advice}"
-        raise InputError(msg)
+        _refuse_repeated(path, schema, advice)
     return schema
+
+
+def _refuse_repeated(path: Path, schema: pa.Schema, advice: str) -> None:
+    # names that are not UTF-8 are found when they are first looked at
+    for name in schema.names:
+        if schema.names.count(name) > 1:
+            msg = f"{path}: has column {shown(name)} more than once; {advice}"
+            raise InputError(msg)
 
 
 def read_whole(path: Path, advice: str) -> pa.Table:
@@ -95,11 +99,12 @@ def read_whole(path: Path, advice: str) -> pa.Table:
     InputError
         If it cannot be read, or is too long.
     """
-    read_schema(path, advice)
+    require_regular_file(path, InputError)
     with reading(path, advice), pq.ParquetFile(path, page_checksum_verification=True) as file:
         if file.metadata.num_rows > MOST_ROWS:
             msg = f"{path}: has {file.metadata.num_rows} rows, at most {MOST_ROWS} are read"
             raise InputError(msg)
+        _refuse_repeated(path, file.schema_arrow, advice)
         table = file.read()
         table.validate(full=True)
         return table

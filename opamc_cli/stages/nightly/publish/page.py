@@ -8,11 +8,10 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from typing import Any
 
-import jinja2
-
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
+from opamc_cli.stages.report.templates import environment
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.history import History
 from opamc_cli.storage.schemas import files
@@ -54,14 +53,8 @@ def render(history: History, summary: Summary) -> str:
             "SELECT DISTINCT night FROM night ORDER BY night DESC LIMIT ?", (NIGHTS_SHOWN,)
         )
     ][::-1]
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(_resource),
-        autoescape=True,  # names of robots are not ours
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("index.html.j2").render(
+    template = environment(_resource).get_template("index.html.j2")
+    return template.render(
         styles=custom_properties() + "\n" + _resource("index.css"),
         script=_resource("index.js"),
         headline=summary.headline(),

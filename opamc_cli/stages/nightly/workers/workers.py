@@ -6,6 +6,7 @@ a short night; one that failed is replaced. They are forked where nothing speaks
 the start has loaded they need as well, and to load it anew is a tenth of a single night.
 """
 
+import gc
 import importlib
 import os
 import resource
@@ -61,6 +62,7 @@ class _Pool(Generic[Job]):
 
     def start(self) -> _Worker[Job]:
         forked = can_fork()
+        gc.freeze()  # else a copy that looks for garbage copies every page of its parent's
         context = get_context("fork") if forked else get_context("spawn")
         here, there = context.Pipe()
         arguments = (there, self._function, self._memory, os.getpid(), forked)
