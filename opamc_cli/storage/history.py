@@ -218,6 +218,7 @@ class NightKey:
     config: str
     baseline: str
     files: list[str]
+    members: str = ""
 
 
 @dataclass(frozen=True)
@@ -542,7 +543,13 @@ class History:
                 [(robot, *place) for place in standing],
             )
             self._put("alarm", alarms)
-            self._put("event", events)
+            said = list(events)
+            # a joint that is watched again, and then no more, is news
+            self._db.executemany(
+                "DELETE FROM told WHERE robot = ? AND axis = ? AND kind = 'ended' AND time = ?",
+                [(one.robot, one.axis, one.time) for one in said if one.kind == "ended"],
+            )
+            self._put("event", said)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:

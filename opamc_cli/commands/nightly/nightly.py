@@ -86,7 +86,7 @@ def run(
         from opamc_cli.stages.nightly import run as stage
     from opamc_cli.commands.nightly.claim import claim
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.morning import silent, tell
+    from opamc_cli.stages.nightly.morning import left, silent, tell
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.schemas import files
@@ -112,6 +112,7 @@ def run(
         if wanted == stage.Wanted():
             today = datetime.now(UTC).date()
             now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
+            now += left(history, loaded)
             untold += history.untold(now)
         morning = tell(summary, untold, outcome, loaded.out, cell)
         if outcome.ended:
@@ -158,18 +159,28 @@ def _print_plan(output: Output, outcome: Any) -> None:
 @app.command("acknowledge")
 def acknowledge(
     robot: Annotated[str, typer.Argument(metavar="ROBOT", help="Its name.")],
-    axis: Annotated[int, typer.Option("--axis", min=1, help="The joint.")],
     why: Why,
+    axis: Annotated[
+        int | None, typer.Option("--axis", min=1, help="The joint; else: that files are missing.")
+    ] = None,
     cell: Cell = DEFAULT_CELL,
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Silence the alarm that stands on a joint, until it is over."""
+    """Silence the alarm of a joint until it is over, or of a robot that it has no files."""
     from opamc_cli.storage.history import Declared
 
     why = _reason(why)
 
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
+        if axis is None:
+            last = max((night for _, night in history.nights()), default="")
+            own = max((night for name, night in history.nights() if name == robot), default="")
+            if not own or own == last:
+                msg = f"{robot} lacks no file of the last night; name the joint by --axis"
+                raise UsageError(msg)
+            text = f"no files since {own}, acknowledged: {why}"
+            return Declared(_now(), robot, None, "gone", last, why), text
         standing = [
             alarm
             for alarm in history.alarms(standing=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Any
 
+from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.recordings import some
 from opamc_cli.stages.nightly.run import CellOutcome
@@ -14,9 +15,17 @@ from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
 from opamc_cli.storage.schemas import files
 
-OVER = {"silent": 0, "thinned": 1, "failed": 2, "not-judged": 3, "missing": 4, "cleared": 5}
+OVER = {
+    kind: rank
+    for rank, kind in enumerate(
+        ("ended", "silent", "thinned", "failed", "not-judged", "missing", "cleared")
+    )
+}
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
+
+MOST_OTHERS = 3
+"""Verdicts that are others than before which are told one by one."""
 
 SILENT_DAYS = 3
 """Days without a night after which a cell is silent: a weekend is none."""
@@ -44,6 +53,16 @@ def silent(history: History, today: date, remind_after: int) -> Iterator[Event]:
         yield Event(time, "the cell:", None, "silent", f"no recording of any robot since {last}")
 
 
+def left(history: History, cell: CellConfig) -> Iterator[Event]:
+    """Say which alarms stood when their robot left the cell's file."""
+    for alarm in history.alarms(standing=True) if cell.robots != "auto" else ():
+        if alarm.robot not in cell.robots:
+            text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: the robot has "
+            yield Event(
+                alarm.raised, alarm.robot, alarm.axis, "ended", f"{text}left the cell's file"
+            )
+
+
 def tell(
     summary: Summary, untold: Sequence[Event], outcome: CellOutcome, out: Path, cell: Path
 ) -> Morning:
@@ -63,7 +82,7 @@ def tell(
         The cell's file, for what can be done about an alarm.
     """
     names = {robot.name for robot in summary.robots}
-    news = [event for event in untold if event.robot in names or event.kind == "silent"]
+    news = [event for event in untold if event.robot in names or event.kind in ("silent", "ended")]
     failed_now = {(robot, why) for robot, _, why in outcome.failed}
     lines = list(outcome.absent)
     for robot in summary.needing():
@@ -81,9 +100,12 @@ def tell(
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
+    for name, others in sorted(outcome.others.items()):
+        lines.append(f"{name} judged anew: {some(sorted(others), MOST_OTHERS)}")
     alarms = any(robot.alarms for robot in summary.robots)
     broken = any(robot.broken for robot in summary.robots)
-    failed = failed_now or broken or outcome.absent or outcome.ended
+    ended = any(event.kind == "ended" for event in news)
+    failed = failed_now or broken or ended or outcome.absent or outcome.ended
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
     return Morning(tuple(lines), _values(summary, outcome), code)
 

@@ -37,6 +37,10 @@ class Comparison:
     """Name of the baseline; the series of nights begins anew where it changes."""
     missing: str = ""
     """Why there is nothing to compare with; empty if there is."""
+    members: tuple[str, ...] = ()
+    """Nights of a baseline that is complete, with or without their recordings."""
+    lost: bool = False
+    """Whether some of these have none any more."""
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,8 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         if not comparisons and not broken:
             continue  # all its recordings belong to the fixed baseline
         key = _key(comparisons, broken, now.config_hash, known)
-        why = _why(key, now.recorded.get(night))
+        lost = any(one.lost for one in comparisons)
+        why = _why(key, now.recorded.get(night), lost)
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
@@ -252,7 +257,7 @@ class _Baselines:
                 f"the recordings of the baseline's nights {gone} are gone; put them back, or begin "
                 "a new baseline with `opamc nightly rebaseline`"
             )
-            return Comparison(program, condition, targets, missing=why)
+            return Comparison(program, condition, targets, (), "", why, tuple(members), True)
         if gone:
             self.thinned[key] = (
                 max(set(members) - set(left)),
@@ -264,7 +269,8 @@ class _Baselines:
             self._used[key] = tuple(one for n in left for one in self._series[program, n][1])
         used = self._used[key]
         name = f"from {members[0]}, {condition}"
-        return Comparison(program, condition, targets, used, name)
+        of = tuple(members)
+        return Comparison(program, condition, targets, used, name, members=of, lost=bool(gone))
 
     def _nights_there(self, key: tuple[str, str, str]) -> list[str]:
         """Return the nights that may belong to a baseline, the same list for all its nights."""
@@ -299,6 +305,7 @@ def _key(
             "version": __version__,
             "config": config_hash,
             "baseline": digest({"of": rest}),
+            "members": digest({"of": [[one.program, one.members] for one in comparisons]}),
             "files": sorted([*targets, *_identity(broken)]),
         },
         sort_keys=True,
@@ -309,7 +316,7 @@ def _identity(recordings: Sequence[Recording]) -> Iterator[str]:
     return (f"{one.name} {one.sha256[:24]}" for one in recordings)
 
 
-def _why(key: str, record: NightRow | None) -> str:
+def _why(key: str, record: NightRow | None, lost: bool) -> str:
     """Say why a night is to be done; empty if its record stands."""
     if record is None:
         return "new"
@@ -318,9 +325,10 @@ def _why(key: str, record: NightRow | None) -> str:
         return f"judged by version {then['version']}"
     if now["config"] != then["config"]:
         return "other options"
-    if now["baseline"] != then["baseline"]:
+    # what was judged stays judged when its logs are cleared away, or some of its baseline's
+    kept = lost and record.status != "failed" and now["members"] == then.get("members")
+    if now["baseline"] != then["baseline"] and not kept:
         return "the baseline has changed"
-    # what was judged stays judged when its logs are cleared away
     added = set(now["files"]) - set(then["files"])
     if added:
         return f"{len(added)} new or changed file{'s' if len(added) > 1 else ''}"

@@ -79,6 +79,8 @@ class CellOutcome:
     """Robot, night and why; of nights that were judged in part as well."""
     absent: list[str] = field(default_factory=list)
     """Sentences that say of what was asked for that there is no recording of it."""
+    others: dict[str, list[str]] = field(default_factory=dict)
+    """By robot: verdicts that are others than before, since their nights were judged anew."""
     thinned: list[Event] = field(default_factory=list)
     """Baselines that have lost recordings."""
     ended: str = ""
@@ -407,8 +409,19 @@ def _record(
                     axis.reason,
                 )
             )
+    before = {
+        (one["program"], one["axis"]): one["state"]
+        for one in history.rows(
+            "SELECT program, axis, state FROM verdict WHERE robot = ? AND night = ?", place[:2]
+        )
+    }
     history.record_night(row, verdicts, measures)
     _note(outcome, row)
+    for one in verdicts:
+        was = before.get((one.program, one.axis), one.state)
+        if was != one.state:
+            text = f"{one.night} axis {one.axis} {one.state}, was {was} ({night.why})"
+            outcome.others.setdefault(one.robot, []).append(text)
 
 
 def _first(reasons: Sequence[str]) -> Iterator[str]:

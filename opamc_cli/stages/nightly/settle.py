@@ -1,6 +1,7 @@
 """What follows from the history: alarms, what is worth saying, old folders, pages and metrics."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
@@ -10,7 +11,7 @@ from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page
 from opamc_cli.stages.nightly.summary import Summary, summarise
 from opamc_cli.storage.files.folders import remove_folder
-from opamc_cli.storage.history import Event, History, NightRow
+from opamc_cli.storage.history import AlarmRow, Event, History, NightRow, begun_anew
 from opamc_cli.storage.schemas import files
 
 OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
@@ -44,6 +45,7 @@ def settle_cell(
     by_robot: dict[str, list[NightRow]] = {}
     for row in sorted(history.nights().values(), key=lambda row: (row.robot, row.night)):
         by_robot.setdefault(row.robot, []).append(row)
+    standing = history.alarms(standing=True)
     for robot in history.stale():
         config = cell.diagnosis_of(robot, source)
         settled = settle_robot(
@@ -55,9 +57,15 @@ def settle_cell(
             config.score.fault_effect,
             cell.baseline.nights or NIGHTS_AGAIN,
         )
-        history.settle(robot, settled.alarms, settled.standing, settled.events)
+        before = [alarm for alarm in standing if alarm.robot == robot]
+        begun = [night for _, night in begun_anew(history.declared(robot))]
+        ended = _ended(
+            before, settled.alarms, history.series(robot), by_robot.get(robot, []), begun
+        )
+        history.settle(robot, settled.alarms, settled.standing, (*settled.events, *ended))
     if whole:
-        history.replace_missing(_missing(by_robot, set(robots), cell.alarm.remind_after))
+        gone = {one.robot: one.night for one in history.declared() if one.kind == "gone"}
+        history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
     _prune(cell, history)
     summary = summarise(history, robots)
     if cell.robots != "auto":  # what left the cell is no concern of its page
@@ -67,10 +75,42 @@ def settle_cell(
     return summary
 
 
-def _missing(
-    by_robot: Mapping[str, Sequence[NightRow]], robots: set[str], remind_after: int
+def _ended(
+    before: Sequence[AlarmRow],
+    after: Sequence[AlarmRow],
+    series: Sequence[Mapping[str, Any]],
+    nights: Sequence[NightRow],
+    begun: Sequence[str],
 ) -> Iterator[Event]:
-    """Say which robots have no file of nights of which others have, and again while they lack."""
+    """Say which alarms stood, and after nights were judged anew neither stand nor have ended.
+
+    But for those of nights that a user has made a new baseline of.
+    """
+    baseline = {row.night for row in nights if row.status == "baseline"} if begun else set()
+    watched = {(row["program"], row["axis"]) for row in series}
+    for alarm in before:
+        place = (alarm.program, alarm.axis)
+        same = [one for one in after if (one.program, one.axis) == place]
+        over = any(one.cleared is None or one.cleared > alarm.raised for one in same)
+        if over or alarm.raised in baseline:
+            continue
+        why = "its nights were judged anew, and show none"
+        if place not in watched:
+            why = "it is not watched any more (`axes` in the cell's file, or its recordings)"
+        text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: {why}"
+        yield Event(nights[-1].night, alarm.robot, alarm.axis, "ended", text)
+
+
+def _missing(
+    by_robot: Mapping[str, Sequence[NightRow]],
+    robots: set[str],
+    gone: Mapping[str, str],
+    remind_after: int,
+) -> Iterator[Event]:
+    """Say which robots have no file of nights of which others have, and again while they lack.
+
+    A robot of which somebody has said that it is gone is not reminded of until it has files again.
+    """
     nights = sorted({row.night for rows in by_robot.values() for row in rows})
     for robot in sorted(robots | set(by_robot)):
         own = {row.night for row in by_robot.get(robot, ())}
@@ -85,7 +125,8 @@ def _missing(
                 span = gap[0] if len(gap) == 1 else f"{gap[0]} to {gap[-1]}"
                 text = f"no file of {span}; others have some"
                 for index in said_in(gap, [""] * len(gap), remind_after):
-                    yield Event(gap[index], robot, None, "missing", text)
+                    if not gap[0] <= gone.get(robot, "") <= gap[index]:
+                        yield Event(gap[index], robot, None, "missing", text)
                 gap = []
 
 

@@ -110,6 +110,22 @@ def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
         assert (gone in said) == (index == 11)  # the alarm's remind_after: a week
 
 
+def test_a_renamed_robot_is_reminded_of_until_somebody_says_that_it_is_gone(cell, logs, opamc):
+    shutil.rmtree(logs / "r1" / night(4))
+    assert "r1 no file of" in opamc("nightly", cell, "--quiet").out
+    why = ("--why", "is called r7 now", "--cell", cell)
+    assert opamc("nightly", "acknowledge", "r3", *why).code == ExitCode.USAGE
+    assert opamc("nightly", "acknowledge", "r1", *why).code == ExitCode.DONE
+    for index in range(5, 14):
+        path = shutil.copytree(logs / "r3" / night(4), logs / "r3" / night(index))
+        set_clock(path / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
+    assert "r1" not in opamc("nightly", cell, "--quiet").out
+    # it was not, after all
+    path = shutil.copytree(logs / "r1" / night(3), logs / "r1" / night(12))
+    set_clock(path / "cycle.parquet", f"{night(12)}T22:00:00+00:00")
+    assert f"r1 no file of {night(13)}" in opamc("nightly", cell, "--quiet").out
+
+
 def test_a_silent_cell_is_said_again(tmp_path):
     with History(tmp_path / "history.sqlite") as history:
         history.record_night(NightRow("r1", "2026-03-01", KEY, "done", 0, "", ""))
@@ -130,6 +146,26 @@ def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, 
         "are left; put them back, with fewer than 2 nothing is judged\n"
     )
     assert second.out == ""
+    # no verdict of before is another one now, though its baseline is not whole or even gone
+    shutil.rmtree(logs / "r1" / night(0))
+    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
+    set_clock(logs / "r1" / night(5) / "cycle.parquet", f"{night(5)}T22:00:00+00:00")
+    gone = opamc("nightly", cell, "--quiet")
+    assert gone.code == ExitCode.PARTIAL
+    assert f"r1 {night(5)}: the recordings of the baseline's nights" in gone.out
+    assert states(cell) == ["baseline"] * 3 + ["done"] * 2 + ["failed"]
+    shutil.move(cell.parent / "aside", logs / "r1" / night(1))
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    assert states(cell) == ["baseline"] * 3 + ["done"] * 3
+
+
+def test_verdicts_that_change_afterwards_are_said(cell, logs, opamc):
+    opamc("nightly", cell)
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        db.execute("UPDATE verdict SET state = 'fault' WHERE robot = 'r1' AND axis = 1")
+    cell.write_text(cell.read_text().replace("joint.explain: false", "score.seed: 1"))
+    said = [f"{night(n)} axis 1 healthy, was fault (other options)" for n in (3, 4)]
+    assert opamc("nightly", cell, "--quiet").out == f"r1 judged anew: {', '.join(said)}\n"
 
 
 def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, opamc):

@@ -149,6 +149,35 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
 
 
+def test_an_alarm_does_not_end_without_a_word(cell, opamc):
+    plain = cell.read_text()
+    watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
+    cell.write_text(watched)
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+    # its joint is watched no more
+    cell.write_text(watched.replace("r2: {}", "r2: {axes: [1]}"))
+    ended = opamc("nightly", cell, "--quiet")
+    assert f"r2 axis 2: the alarm of {NIGHTS[3]} stands no more: it is not watched" in ended.out
+    assert ended.code == ExitCode.PARTIAL
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, "stands no more" in ended.out) == (ExitCode.DONE, False)
+    # its robot leaves the cell
+    cell.write_text(watched)
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+    cell.write_text(watched.replace(" r2: {},", ""))
+    ended = opamc("nightly", cell, "--quiet")
+    assert "r2 axis 2: the alarm of" in ended.out
+    assert ended.code == ExitCode.PARTIAL
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    # other options, another verdict
+    cell.write_text(watched)
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+    cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 100}\n")
+    ended = opamc("nightly", cell, "--quiet")
+    assert "r2 axis 2: the alarm of" in ended.out
+    assert "judged anew" in ended.out
+
+
 def test_facts_of_thousands_of_known_files_are_read_at_once():
     text = Facts("cycle", 100.0, 0.0, 2048.0, "2026-03-01T22:00:00+00:00").to_json()
     begun = time.process_time()
