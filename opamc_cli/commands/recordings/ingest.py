@@ -74,6 +74,9 @@ def ingest(
         for doubt in item.doubts:
             output.failure(doubt)
     failures = [str(error) for error in outcome.errors]
+    lost = [item.lost for item in outcome.results if item.lost]
+    for sentence in lost:
+        output.failure(sentence)
     output.result(
         {
             "runs": [_as_json(item) for item in outcome.results],
@@ -83,6 +86,8 @@ def ingest(
         *[_line(item) for item in outcome.results],
     )
     code = output.failures(failures, len(outcome.results))
+    if lost:
+        code = ExitCode.PARTIAL
     if code != ExitCode.DONE:
         raise typer.Exit(code)
 
@@ -178,6 +183,7 @@ def _as_json(item: "Ingested") -> dict[str, Any]:
         "duration_s": item.n_samples / item.sampling_rate_hz,
         "missing": dict(item.missing),
         "doubts": list(item.doubts),
+        "lost": item.lost,
         "time_stamps": None if item.stamps is None else asdict(item.stamps),
         "sources": dict(item.sources),
         "skipped": item.skipped,

@@ -74,6 +74,8 @@ class Ingested:
     """The run was there already, made from another recording or by another map."""
     doubts: tuple[str, ...] = ()
     """One sentence for each column whose numbers are larger than most robots'."""
+    lost: str | None = None
+    """One sentence if stamps say that a part of the recording is not in the run."""
 
 
 @dataclass(frozen=True)
@@ -202,16 +204,19 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         )
         written = _write(path, task.run, channels, info, blocks)
         labels = {each.name: each.labels for each in source.channels() if each.labels}
+    account = clock.clock.account if clock and channels.time else None
+    doubt = account.doubt() if account else None
     return Ingested(
         task.source,
         task.run,
         rate,
         written.n_samples,
         written.missing,
-        clock.clock.account if clock and channels.time else None,
+        account,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
         doubts=written.doubts,
+        lost=f"{path}: {doubt}" if doubt else None,
     )
 
 

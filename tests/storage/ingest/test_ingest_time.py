@@ -1,5 +1,7 @@
 """Times of a recording: from its file to the run."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -67,3 +69,39 @@ def test_uneven_stamps_end_on_the_grid(tmp_path):
     grid = times[0] + np.arange(run.n_samples) / 1000
     np.testing.assert_allclose(run.read(["axis1_a"])["axis1_a"], np.sin(40 * grid), atol=2e-4)
     assert not item.missing
+
+
+@pytest.mark.parametrize("slower", [2, 4])
+def test_a_rate_that_changes_midway_is_refused(tmp_path, slower):
+    fast, slow = np.arange(3000) / 1000, 3 + np.arange(1500) * slower / 1000
+    for stamps in (np.r_[fast, slow], np.r_[slow - 3, fast + 1.5 * slower]):
+        rows = [(f"{t:.6f}", 1) for t in stamps]
+        with pytest.raises(InputError, match=r"Hz at row \d+: the rate changes; split"):
+            ingested(tmp_path, rows, "{source: t, unit: s}")
+
+
+def test_lost_samples_here_and_there_are_no_other_rate(tmp_path):
+    rng = np.random.default_rng(0)
+    stamps = np.delete(np.arange(8000) / 1000, rng.choice(8000, 400, replace=False))
+    stamps += rng.normal(0, 1e-4, stamps.size)
+    item = ingested(tmp_path, [(f"{t:.6f}", 1) for t in np.sort(stamps)], "{source: t, unit: s}")
+    assert item.lost is None
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (lambda t: np.r_[t[:5000], t[4700:]], r"go back or repeat in rows of 0.3 s"),
+        (lambda t: np.r_[t[:9700], t[9700:] - 3], r"go back or repeat in rows of 0.3 s"),
+        (lambda t: np.r_[t[:5000], t[5000:] + 3], r"1 gap, of 3 s at most, left as NaN"),
+    ],
+)
+def test_a_part_that_is_lost_is_said_when_quiet(tmp_path, opamc, stamps, said):
+    file, out = tmp_path / "r.csv", tmp_path / "out"
+    times = stamps(np.arange(10000) / 1000)
+    file.write_text("t,i\n" + "".join(f"{t:.6f},{k % 7}\n" for k, t in enumerate(times)))
+    path = tmp_path / "map.yaml"
+    path.write_text("time: {source: t, unit: s}\ncolumns: {axis1_a: {source: i, unit: A}}\n")
+    ended = opamc("ingest", file, "--map", path, "--out", out, "--quiet")
+    assert (ended.code, out.exists()) == (4, True)
+    assert re.search(said, ended.err)

@@ -33,6 +33,17 @@ MAX_DROPPED = 0.05
 MAX_STRETCH = 10
 """Samples per row beyond which a recording is mostly gap."""
 
+ONE_RATE_WITHIN = 1.25
+"""Ratio of the rates of two stretches beyond which the logger's rate has changed."""
+
+STRETCHES = 20
+STRETCH_ROWS = 50
+"""As many stretches are looked at, of as many rows at least: a burst or a few lost samples are no
+rate."""
+
+LOST_S = 0.2
+"""Seconds of a gap, or of rows before an earlier one, that may hold a motion or part of one."""
+
 SAME_RATE = 1e-9
 """Relative difference of rates that is none: of the arithmetic, not of the clock."""
 
@@ -61,6 +72,20 @@ class StampAccount:
     n_unreadable: int
     """With `n_duplicates`, `n_backward`: rows dropped: a stamp for the second time, before an
     earlier one, or none."""
+
+    def doubt(self) -> str | None:
+        """Say what part of the recording is not in the run, if a motion may be; None: nothing."""
+        back_s = (self.n_backward + self.n_duplicates) / self.measured_rate_hz
+        lost = []
+        if back_s >= LOST_S:
+            lost.append(f"stamps go back or repeat in rows of {back_s:.3g} s, which were dropped")
+        if self.longest_gap_s >= LOST_S:
+            lost.append(
+                f"{self.n_gaps} gap{'s' * (self.n_gaps > 1)}, of {self.longest_gap_s:.3g} s at "
+                "most, left as NaN"
+            )
+        advice = "look at the logger and its clock, or split the recording there"
+        return f"{'; '.join(lost)}; {advice}" if lost else None
 
 
 @dataclass(frozen=True)
@@ -208,6 +233,7 @@ def _uneven_clock(
         raise InputError(msg)
     step = np.diff(times_s[kept])
     missing = _missing_samples(step)
+    _refuse_two_rates(path, source, step, max_gap_samples)
     measured = 1.0 / float(step[~missing].mean())
     rate = grid_rate_hz or declared_rate_hz or float(f"{measured:.6g}")
     for declared in (declared_rate_hz, grid_rate_hz):
@@ -255,6 +281,30 @@ def _missing_samples(step: Seconds) -> npt.NDArray[np.bool_]:
     padded = np.concatenate(([typical], step, [typical]))
     together = padded[:-2] + padded[1:-1] + padded[2:]
     return np.asarray((step >= 1.5 * typical) & (together >= 3.5 * typical))
+
+
+def _refuse_two_rates(path: Path, source: Name, step: Seconds, max_gap_samples: float) -> None:
+    """Refuse a recording whose rate changes: to resample it would alias a part, or invent one."""
+    n_stretches = min(STRETCHES, len(step) // STRETCH_ROWS)
+    if n_stretches < 2:
+        return
+    edges = np.linspace(0, len(step), n_stretches + 1).astype(int)
+    typical = float(np.median(step))
+    rates = np.array(
+        [
+            1.0 / part[part <= max_gap_samples * max(typical, float(np.median(part)))].mean()
+            for part in np.split(step, edges[1:-1])
+        ]
+    )
+    fast, slow = int(rates.argmax()), int(rates.argmin())
+    if rates[fast] > ONE_RATE_WITHIN * rates[slow]:
+        first, last = sorted((fast, slow))
+        msg = (
+            f"{path}: time column {source!r} says {rates[first]:.4g} Hz at row {edges[first] + 1} "
+            f"and {rates[last]:.4g} Hz at row {edges[last] + 1}: the rate changes; split the "
+            "recording there, or log at one rate"
+        )
+        raise InputError(msg)
 
 
 def _fitted_period(times_s: Seconds) -> float:
