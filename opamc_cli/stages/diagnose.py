@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from opamc_cli.config import Config
-from opamc_cli.errors import ExitCode, OpamcError
+from opamc_cli.errors import ExitCode, InputError, OpamcError
 from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.discriminants import LatentModels
@@ -26,7 +26,7 @@ from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.sources import RunSource, check_comparable
+from opamc_cli.storage.sources import RunSource, check_comparable, other_robot
 
 FILES = (
     files.VERDICT,
@@ -188,6 +188,7 @@ def _diagnose(
         )
     )
     sources = (*sides.baseline.sources, *sides.target.sources)
+    stranger = other_robot(sides.baseline.sources, sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
@@ -203,11 +204,12 @@ def _diagnose(
         verdict=written.verdict,
         verdict_path=written.path,
         report_path=page.path,
-        exit_code=written.exit_code,
+        exit_code=written.exit_code or (ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.DONE),
         n_runs=len(normal.runs_done) + len(other.runs_done),
         errors=(
             *(*normal.errors, *other.errors, *unjudged.errors),
             *unjudged.sessions_at_rest(sides),
+            *([InputError(stranger)] if stranger else []),
         ),
         conditions=check_comparable(sides.baseline.sources, sides.target.sources),
         notes=every_note,

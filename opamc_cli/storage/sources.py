@@ -172,6 +172,19 @@ def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource])
     return tuple(notes)
 
 
+def other_robot(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> str | None:
+    """Say that a target is of a robot that the baseline knows nothing of; None where it is not."""
+    healthy = {run.info.robot for run in baseline}
+    for run in target:
+        if run.info.robot not in healthy and None not in (run.info.robot, *healthy):
+            return (
+                f"{run.path}: is of robot {run.info.robot!r}, the baseline of "
+                f"{', '.join(map(repr, sorted(map(str, healthy))))}: healthy by another robot's "
+                "baseline is no verdict; record one of its own, or correct `robot`"
+            )
+    return None
+
+
 def _first_difference(
     runs: Sequence[RunSource], key: str
 ) -> tuple[tuple[RunSource, object], tuple[RunSource, object]] | None:

@@ -754,10 +754,10 @@ def test_tables_of_the_same_recordings_are_no_comparison(opamc, tmp_path):
     check_refusal(ended, ExitCode.BAD_INPUT, "same recording")
 
 
-def test_another_robots_baseline_is_said_even_if_quiet(opamc, tmp_path):
+def test_by_another_robots_baseline_nobody_is_healthy(opamc, tmp_path):
     own = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(2)]
     other = bad_runs.good(tmp_path / "other.parquet", seed=2, robot="R2")
     sides = ("--baseline", own[0], "--baseline", own[1], "--target", other)
     ended = opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
-    assert ended.code == ExitCode.DONE
-    assert [text for text in ended.sentences if "robot differs" in text]
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert [text for text in ended.sentences if "is of robot 'R2', the baseline of 'R1'" in text]
