@@ -36,7 +36,7 @@ class BaselineConfig(Section):
 
     model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
 
-    nights: Annotated[int, Field(ge=2)] | None = Field(
+    nights: Annotated[int, Field(ge=2, le=365)] | None = Field(
         None, description="The first so many nights of each program and condition."
     )
     first: date | None = Field(None, alias="from", description="First night of a fixed baseline.")

@@ -12,6 +12,8 @@ from pathlib import Path
 
 import bad_runs
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.commands.command_line import COMMANDS
@@ -752,6 +754,20 @@ def test_tables_of_the_same_recordings_are_no_comparison(opamc, tmp_path):
     table = tmp_path / "out" / "patterns.parquet"
     ended = opamc("score", "--baseline", table, "--target", table, "--out", tmp_path / "scored")
     check_refusal(ended, ExitCode.BAD_INPUT, "same recording")
+
+
+def test_a_recording_that_lacks_most_numbers_is_not_healthy_without_a_word(opamc, tmp_path):
+    runs = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(3)]
+    table = pq.read_table(runs[2])
+    columns = {}
+    for name in table.column_names:
+        columns[name] = table[name].to_numpy().copy()
+        columns[name][len(table) // 2 :] = np.nan
+    pq.write_table(pa.table(columns).replace_schema_metadata(table.schema.metadata), runs[2])
+    sides = ("--baseline", runs[0], "--baseline", runs[1], "--target", runs[2])
+    ended = opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert [one for one in ended.sentences if "50% of the current of axis 1 is no numbers" in one]
 
 
 def test_by_another_robots_baseline_nobody_is_healthy(opamc, tmp_path):

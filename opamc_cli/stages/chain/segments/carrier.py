@@ -32,6 +32,7 @@ from opamc_cli.signal.transform.wavelet import Morse
 from opamc_cli.stages.chain.segments.rows import (
     AxisSegments,
     Segment,
+    lost,
     make_rows,
     mean_variance,
     read_variance,
@@ -90,7 +91,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     band = motion_band(run.sampling_rate_hz, config)
     _check_band(run, band)
     probe = _look(run, names, config)
-    evidence, notes = _gather(run, names, band, probe, config)
+    evidence, notes, missing = _gather(run, names, band, probe, config)
     rule = MotionRule(
         on=config.threshold_on,
         off=config.threshold_off,
@@ -111,6 +112,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
         make_rows(run, channels, segments, signal),
         probe.notes + notes,
         f"axis {channels.axis}: S(t) reaches {strongest:.2f}, {config.threshold_on:g} is motion",
+        lost(channels.axis, missing),
     )
 
 
@@ -159,7 +161,7 @@ def _look(run: Run, names: Sequence[str], config: SegmentConfig) -> _Probe:
 
 def _gather(
     run: Run, names: Sequence[str], band: MotionBand, probe: _Probe, config: SegmentConfig
-) -> tuple[Evidence, tuple[str, ...]]:
+) -> tuple[Evidence, tuple[str, ...], float]:
     """Read the whole run once, block by block, and keep its frames only."""
     fs_hz = run.sampling_rate_hz
     step = frame_step(fs_hz)
@@ -217,7 +219,7 @@ def _gather(
         noise_a=probe.noise_a,
         f_floor_hz=band.f_min_hz,
     )
-    return evidence, notes
+    return evidence, notes, max(n_missing.values()) / run.n_samples
 
 
 def _current(phases: Sequence[Floats]) -> npt.NDArray[np.inexact]:

@@ -14,7 +14,13 @@ from opamc_cli.signal.motion.reported import (
 )
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.quality import LIMITS, clipped_share
-from opamc_cli.stages.chain.segments.rows import AxisSegments, Segment, make_rows, mean_variance
+from opamc_cli.stages.chain.segments.rows import (
+    AxisSegments,
+    Segment,
+    lost,
+    make_rows,
+    mean_variance,
+)
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs import AxisChannels, Run
 
@@ -93,6 +99,7 @@ def joint_segments(
         tuple(notes),
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
         f"{config.min_speed_rad_s:g} is motion",
+        lost(channels.axis, 1 - known.size / current.size),
     )
 
 

@@ -25,6 +25,10 @@ class Segment:
     kind: str = "motion"
 
 
+MOST_MISSING = 0.1
+"""Share of an axis's samples without a number that is a note; of more it is said that they lack."""
+
+
 @dataclass(frozen=True)
 class AxisSegments:
     """What was found on one axis of one run."""
@@ -37,6 +41,18 @@ class AxisSegments:
     """One sentence for each doubtful channel."""
     stands: str | None = None
     """Why there is no row, or None."""
+    lost: str | None = None
+    """One sentence if so many samples are no numbers that motions are likely among them."""
+
+
+def lost(axis: int, share: float) -> str | None:
+    """Say that a share of an axis's samples is no numbers, if it is more than a tenth."""
+    if share <= MOST_MISSING:
+        return None
+    return (
+        f"{share:.0%} of the current of axis {axis} is no numbers, and what moved "
+        "meanwhile is not judged; check the log"
+    )
 
 
 def make_rows(
