@@ -91,7 +91,7 @@ class Output:
         for failure in failures:
             self.failure(failure)
         if failures and n_done:
-            self.note(f"{len(failures)} of {len(failures) + n_done} runs failed, the rest are done")
+            self.note(f"{len(failures)} failures, the rest of {n_done} runs is done")
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
 

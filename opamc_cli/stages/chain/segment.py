@@ -119,8 +119,8 @@ def run(
     errors += outcome.errors
     notes = [note for result in outcome.results for note in result.notes]
     errors += _runs_without_motion(sources, outcome.results, outcome.errors)
-    paths = {source.name: source.path for source in sources}
-    lost = [(paths[each.run], each.lost) for each in outcome.results if each.lost]
+    path_of = {source.name: source.path for source in sources}
+    lost = [(path_of[each.run], each.lost) for each in outcome.results if each.lost]
     errors += [InputError(f"{path}: {what}") for path, what in lost]
     table = pa.Table.from_pylist(
         [row for result in outcome.results for row in result.rows], schema=SEGMENTS
