@@ -91,7 +91,8 @@ class Output:
         for failure in failures:
             self.failure(failure)
         if failures and n_done:
-            self.note(f"{len(failures)} failures, the rest of {n_done} runs is done")
+            count = f"{len(failures)} failure{'s' * (len(failures) > 1)}"
+            self.note(f"{count}; all else of {n_done} run{'s' * (n_done > 1)} is done")
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
 

@@ -22,7 +22,7 @@ every round costs as many."""
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
-ENOUGH_ROWS = 10_000
+LOAD_SAMPLES = 10_000
 """Samples by which a load is found that friction follows; all are fitted beside it."""
 TINY = 1e-6
 """Share of the largest load by which it is moved for its derivatives."""
@@ -352,7 +352,7 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     # What carried the load may have been taken out again.
     if not all(map(any, zip(*roles, strict=True))):
         return dataset
-    every = max(parts.rows.size // ENOUGH_ROWS, 1)
+    every = max(parts.rows.size // LOAD_SAMPLES, 1)
     rows = parts.rows[::every]
     blocks = [dataset.columns(term, fine=True) for term in terms]
     known = list(zip(roles, blocks, fitted.coefficients, strict=True))

@@ -76,8 +76,9 @@ def test_a_joint_at_rest_has_no_fit():
     assert best_fit([rest()], Joint(), lambda dataset: declared(*BASE)) is None
 
 
-def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples():
-    made = joint_of("cyclic", None, noise_a=1e-3, seconds=20.0)
+@pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
+def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(motion):
+    made = joint_of(motion, None, noise_a=1e-3, seconds=20.0)
     seen = 1e-4 * np.round(made.position_rad / 1e-4)
     recording = Recording("run", made.rate_hz, current_a=made.current_a, position_rad=seen)
     ask = [recording], Joint(), lambda dataset: declared(*BASE)
