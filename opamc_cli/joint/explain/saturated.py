@@ -10,7 +10,7 @@ from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import PRICE, Chain
-from opamc_cli.joint.name.search import Pool, beam
+from opamc_cli.joint.name.search import MOST_STEPS, Pool, beam
 
 SEALED_PARTS = 12
 
@@ -36,9 +36,9 @@ def unnamed_library() -> dict[str, Effect]:
     return {effect.name: effect for effect in effects}
 
 
-def saturated(start: Chain, pool: Pool) -> Chain:
+def saturated(start: Chain, pool: Pool, steps: int = MOST_STEPS) -> Chain:
     """Explain what the declared model leaves by a pool of unnamed functions, largest first."""
-    return beam(start, replace(pool, least_share=PRICE), width=1)
+    return beam(start, replace(pool, least_share=PRICE), width=1, steps=steps)
 
 
 def ceiling(before: Fit, explained: Fit) -> Ceiling:

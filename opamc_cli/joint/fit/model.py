@@ -299,45 +299,35 @@ def r2_of(current: Floats, residual: Floats) -> float:
     return 1.0 - rmse_of(residual) ** 2 / variance if variance > 0 else 0.0
 
 
-def fit_terms(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
-    """Fit all terms jointly; where some scale with the load or the model, until that settles."""
-    dataset = _with_first_load(dataset, terms)
+def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
+    """Fit all terms jointly; where some scale with the load or the model, until that settles.
+
+    In one round they scale with those that the dataset has.
+    """
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
+    names = frozenset(term.key for term in terms)
+    if circular and names in dataset.cache.settled:
+        # Met before, in another order or from another chain.
+        return _fit_once(
+            dataset.with_model(*dataset.cache.settled[names], static_terms(terms)), terms
+        )
+    track = dataset.fine.track
+    dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3
-    before = np.inf
-    for number in range(1, MOST_ROUNDS + 1):
+    best, least = dataset, np.inf
+    for number in range(1, rounds + 1):
         fitted = _fit_once(dataset, terms)
         error = fitted.rmse(sealed=False)
-        settled = number >= fewest and abs(before - error) <= SETTLED * error
-        if not circular or settled:
+        falls = error < (1 - SETTLED) * least
+        if falls or number <= fewest:
+            best, least, found = dataset, error, fitted
+        if not circular or number == rounds or (number >= fewest and not falls):
             break
-        dataset, before = _with_newton_load(fitted), error
-    return fitted
-
-
-def _with_first_load(dataset: Dataset, terms: tuple[Term, ...]) -> Dataset:
-    """Return the dataset with these static terms, and a load that begins near its place.
-
-    One that was fitted without friction that follows it has taken that up, and leads nowhere.
-    """
-    track = dataset.fine.track
-    known = {term.key for term in track.static_terms}
-    others = tuple(term for term in terms if not term.effect.follows_load)
-    if any(term.effect.follows_load and term.key not in known for term in terms):
-        track = _fit_once(dataset, (*others, Term(_FreeFriction(), {}))).dataset.fine.track
-    return dataset.with_model(track.load_a, track.model_a, static_terms(terms))
-
-
-class _FreeFriction(Effect):
-    """Friction that may be anything over the place, beside which a load shows as it is."""
-
-    name = "free_friction"
-    from_motion = True
-
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        place = track.position_rad
-        angle = np.pi * (place - place[track.moving].min()) / max(track.travel_rad, 1e-12)
-        return track.direction[:, None] * np.cos(np.outer(angle, np.arange(5)))
+        dataset = _with_newton_load(fitted)
+    if circular and rounds > 1:
+        track = best.fine.track
+        dataset.cache.settled[names] = track.load_a, track.model_a
+    return found
 
 
 def _with_newton_load(fitted: Fit) -> Dataset:

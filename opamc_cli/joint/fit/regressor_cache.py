@@ -23,6 +23,7 @@ class RegressorCache:
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
         self._columns: dict[Hashable, Floats] = {}
+        self.settled: dict[Hashable, tuple[Floats, Floats]] = {}
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}

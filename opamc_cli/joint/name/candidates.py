@@ -1,7 +1,7 @@
 """Every effect on a coarse grid of its parameters, and what each would take off a chain's error."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -10,6 +10,8 @@ from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import SINGULAR_BELOW
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
+
+Products = dict[Hashable, Floats]
 
 LEAST_LEFT = 1e-6
 """Share of the error that is left at least: a coarse grid may promise more than there is."""
@@ -36,6 +38,8 @@ class Batch:
     """Products of each guess with itself; (p, K, w, w)."""
     moment: Floats
     """Products with the current; (p, K, w)."""
+    beside: Products = field(default_factory=dict, repr=False, compare=False)
+    """Products with other terms, of those that were asked for."""
 
     @property
     def width(self) -> int:
@@ -94,19 +98,30 @@ class Beside:
         self.parts: Parts = dataset.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
+        terms = chain.fit.terms
+        self.terms = terms if self.fine else [term for term in terms if not term.effect.fast]
         if not self.fine:
             self.sums, blocks, fast = chain.fit.coarse_sums
             self.fast_part = fast[self.parts.rows]
         else:
-            blocks = [dataset.columns(term, True) for term in chain.fit.terms]
+            blocks = [dataset.columns(term, True) for term in terms]
             self.sums = dataset.sums((), True, *blocks)
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses
 
-    def products(self, columns: Floats) -> Floats:
-        """Products of the chain's regressors with others over each part, shape (p, b, k)."""
+    def products(self, columns: Floats, kept: Products | None = None) -> Floats:
+        """Products of the chain's regressors with others over each part, shape (p, b, k).
+
+        Those with terms that stay the same are `kept` from one chain to the next.
+        """
+        kept = {} if kept is None else kept
+        asked = [i for i, term in enumerate(self.terms) if term.key not in kept]
+        found = self.parts.products_of([self.blocks[i] for i in asked], columns)
+        known = dict(zip(asked, found, strict=True))
+        kept |= {self.terms[i].key: one for i, one in known.items() if self.terms[i].is_constant}
+        every = [known[i] if i in known else kept[one.key] for i, one in enumerate(self.terms)]
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
-        return np.concatenate([none, *self.parts.products_of(self.blocks, columns)], axis=1)
+        return np.concatenate([none, *every], axis=1)
 
     def candidate(self, term: Term) -> Candidate:
         """Judge one guess."""
@@ -123,7 +138,7 @@ class Beside:
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
         count, width = len(batch.terms), batch.width
-        cross = self.products(batch.columns)
+        cross = self.products(batch.columns, batch.beside)
         cross = cross.reshape(*cross.shape[:2], count, width).transpose(0, 2, 1, 3)
         moment = batch.moment
         if self.fast_part is not None:

@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.fit.model import Fit, Term, fit_terms
+from opamc_cli.joint.fit.model import MOST_ROUNDS, Fit, Term, fit_terms
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.significance import paired
 
@@ -141,17 +141,17 @@ def deviation_of(error: Floats, counts: Floats) -> Floats:
     return found
 
 
-def extended(chain: Chain, *terms: Term) -> Chain:
-    """Add terms to a chain and fit all of it anew."""
-    fit = fit_terms(chain.fit.dataset, (*chain.fit.terms, *terms))
+def extended(chain: Chain, *terms: Term, rounds: int = MOST_ROUNDS) -> Chain:
+    """Add terms to a chain and fit all of it anew, in so many rounds at most."""
+    fit = fit_terms(chain.fit.dataset, (*chain.fit.terms, *terms), rounds)
     return chain_of(fit, chain.added + len(terms))
 
 
-def without(chain: Chain, place: int) -> Chain:
-    """Take one of the added terms out, and fit the rest anew."""
+def without(chain: Chain, place: int, rounds: int = MOST_ROUNDS) -> Chain:
+    """Take one of the added terms out, and fit the rest anew, in so many rounds at most."""
     terms = list(chain.fit.terms)
     del terms[len(terms) - chain.added + place]
-    return chain_of(fit_terms(chain.fit.dataset, tuple(terms)), chain.added - 1)
+    return chain_of(fit_terms(chain.fit.dataset, tuple(terms), rounds), chain.added - 1)
 
 
 def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:

@@ -237,12 +237,15 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     return None
 
 
-def beam(start: Chain, pool: Pool, width: int = CHAINS) -> Chain:
-    """Follow `width` chains side by side as far as the score falls; return the best."""
+def beam(start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS) -> Chain:
+    """Follow `width` chains side by side as far as the score falls; return the best.
+
+    Of up to so many `steps`.
+    """
     chains = [start]
     best, width = start, 1 if "beam" in pool.without else width
     known: set[Signature] = set()
-    while best.added < MOST_STEPS:
+    for _ in range(steps):
         following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
         chains = sorted(following, key=lambda chain: chain.score)[:width]
         if not chains or chains[0].score >= best.score:

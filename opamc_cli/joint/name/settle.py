@@ -55,12 +55,15 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
 
 
 def worth_their_price(chain: Chain) -> Chain:
-    """Drop what is not worth its price beside all the others."""
-    for place in range(chain.added):
-        parent = without(chain, place)
-        if parent.score <= chain.score:
-            return worth_their_price(parent)
-    return chain
+    """Drop what is not worth its price beside all the others.
+
+    Which that is shows beside the load that all were fitted with; what stays is fitted anew.
+    """
+    kept, place = chain, 0
+    while place < kept.added:
+        parent = without(kept, place, rounds=1)
+        kept, place = (parent, 0) if parent.score <= kept.score else (kept, place + 1)
+    return chain if kept is chain else extended(kept)
 
 
 def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | None:

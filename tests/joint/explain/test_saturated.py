@@ -97,7 +97,7 @@ def test_what_takes_less_than_two_per_cent_is_not_asked_for(monkeypatch):
     asked = []
     monkeypatch.setattr(
         "opamc_cli.joint.explain.saturated.beam",
-        lambda start, pool, width: asked.append((start, pool, width)) or start,
+        lambda start, pool, width, steps: asked.append((start, pool, width)) or start,
     )
     pool = Pool([], unnamed_library(), 0.5, ("drift",))
     assert saturated("start", pool) == "start"
