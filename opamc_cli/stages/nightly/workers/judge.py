@@ -101,6 +101,8 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
     there = [entry["axis"] for entry in outcome.verdict["axes"]]
     lacking = [axis for axis in job.axes or () if axis not in there]
     failures = [_plain(str(error), folder) for error in outcome.errors]
+    # the night is judged by the rest of its baseline: no failure of the night
+    of_baseline, failures = failures[: outcome.n_of_baseline], failures[outcome.n_of_baseline :]
     if lacking:
         failures.append(
             f"{axes_phrase(lacking)} of program {wanted.program!r} cannot be judged: recorded "
@@ -116,6 +118,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
         axes,
         written,
         tuple(failures),
+        tuple(of_baseline),
         tuple(_plain(note, folder) for note in outcome.notes),
     )
 
