@@ -113,9 +113,8 @@ def main() -> None:
             found = measure(Path(folder), record, arguments.rounds)
         for kind, pairs in found.items():
             for index, measure_of in enumerate(("computing", "clock")):
-                nights, diagnoses = (
-                    [each[index] for each in side] for side in zip(*pairs, strict=True)
-                )
+                nights = [night[index] for night, _ in pairs]
+                diagnoses = [diagnosis[index] for _, diagnosis in pairs]
                 shares = [one / other for one, other in zip(nights, diagnoses, strict=True)]
                 print(
                     f"{name}, {kind}, {measure_of}: {median(nights):.1f} s beside "
