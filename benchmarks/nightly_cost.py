@@ -1,7 +1,7 @@
 """What a new night of one robot costs beside `opamc diagnose` of the same recordings.
 
-Both are whole processes begun cold, in seconds of computing (their workers' too); six baseline
-nights, which an earlier night has read, and one target night of one recording.
+Both are whole processes begun cold, in seconds of computing (their workers' too) and of the clock;
+six baseline nights, which an earlier night has read, and one target night of one recording.
 
     python benchmarks/nightly_cost.py --rounds 3
 """
@@ -12,6 +12,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
@@ -26,6 +27,8 @@ from opamc_cli.testbed.robot import simulate
 BASELINE = 6
 FAULTY_AXIS = 3
 KINDS = ("healthy", "first faulty", "next faulty")
+Pair = tuple[tuple[float, float], tuple[float, float]]
+"""A night's and its diagnosis's seconds of computing and of the clock."""
 OPTIONS = {"joint.gear_ratio": 100, "joint.pole_pairs": 5}
 
 
@@ -49,22 +52,22 @@ def record_long(path: Path, index: int, faulty: bool) -> None:
     save_run(path, RunInfo(made.sampling_rate_hz, program="cycle", started_at=started), columns)
 
 
-def computing_s(*arguments: object) -> float:
-    """Run opamc and return the seconds that it and its workers computed."""
-    before = os.times()
+def seconds(*arguments: object) -> tuple[float, float]:
+    """Run opamc and return the seconds that it and its workers computed, and those of the clock."""
+    before, begun = os.times(), time.perf_counter()
     command = [sys.executable, "-m", "opamc_cli", *map(str, arguments), "--jobs", "1", "--quiet"]
     # as for who starts it every night: Python's own compiled files are there
     kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
     ended = subprocess.run(command, stdout=subprocess.DEVNULL, check=False, env=kept)
     assert ended.returncode in (0, 1), ended
-    after = os.times()
+    took, after = time.perf_counter() - begun, os.times()
     children = (after.children_user, after.children_system)
-    return sum(children) - before.children_user - before.children_system
+    return sum(children) - before.children_user - before.children_system, took
 
 
 def measure(
     folder: Path, record: Callable[[Path, int, bool], None], rounds: int
-) -> dict[str, list[tuple[float, float]]]:
+) -> dict[str, list[Pair]]:
     """Return a night's and its diagnosis's seconds, by kind of night."""
     for index in range(BASELINE + 1):
         record(folder / "logs" / "r1" / cell_logs.night(index) / "run.parquet", index, False)
@@ -74,12 +77,12 @@ def measure(
         "runs: logs/{robot}/{night}/*.parquet\n"
         f"baseline: {{nights: {BASELINE}}}\nset: {{{options}}}\n"
     )
-    computing_s("nightly", cell)
+    seconds("nightly", cell)
     shutil.copytree(folder / "nightly", folder / "before")
     given = [part for key, value in OPTIONS.items() for part in ("--set", f"{key}={value}")]
     for index in range(BASELINE):
         given += ["--baseline", folder / "logs" / "r1" / cell_logs.night(index)]
-    found: dict[str, list[tuple[float, float]]] = {kind: [] for kind in KINDS}
+    found: dict[str, list[Pair]] = {kind: [] for kind in KINDS}
     index = BASELINE + 1
     for _ in range(rounds):
         shutil.rmtree(folder / "nightly")
@@ -88,9 +91,9 @@ def measure(
             night = cell_logs.night(index)
             target = folder / "logs" / "r1" / night
             record(target / "run.parquet", index, kind != "healthy")
-            nightly = computing_s("nightly", cell, "--night", night)
+            nightly = seconds("nightly", cell, "--night", night)
             out = folder / "diagnosed" / night
-            diagnosed = computing_s("diagnose", *given, "--target", target, "--out", out)
+            diagnosed = seconds("diagnose", *given, "--target", target, "--out", out)
             found[kind].append((nightly, diagnosed))
             index += 1
     return found
@@ -109,13 +112,16 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as folder:
             found = measure(Path(folder), record, arguments.rounds)
         for kind, pairs in found.items():
-            shares = [night / diagnosis for night, diagnosis in pairs]
-            night, diagnosis = (median(side) for side in zip(*pairs, strict=True))
-            print(
-                f"{name}, {kind}: {night:.1f} s beside {diagnosis:.1f} s; "
-                f"{min(shares):.0%} to {max(shares):.0%}, median {median(shares):.0%}",
-                flush=True,
-            )
+            for index, measure_of in enumerate(("computing", "clock")):
+                nights = [night[index] for night, _ in pairs]
+                diagnoses = [diagnosis[index] for _, diagnosis in pairs]
+                shares = [one / other for one, other in zip(nights, diagnoses, strict=True)]
+                print(
+                    f"{name}, {kind}, {measure_of}: {median(nights):.1f} s beside "
+                    f"{median(diagnoses):.1f} s; {min(shares):.0%} to {max(shares):.0%}, "
+                    f"median {median(shares):.0%}",
+                    flush=True,
+                )
 
 
 if __name__ == "__main__":

@@ -163,13 +163,17 @@ def load_cell(path: Path) -> CellConfig:
         If the file cannot be read, or a key or value is not allowed.
     """
     cell = validate(CellConfig, read_yaml(path), str(path))
+    out = path.parent / cell.out
+    if out.resolve() == Path(out.resolve().anchor):
+        msg = f"{path}: out is {cell.out}, the root of all folders; name a folder for the results"
+        raise ConfigError(msg)
     base = cell.baseline
     if base.runs is not None:
         base = base.model_copy(update={"runs": _beside(path, base.runs)})
     cell = cell.model_copy(
         update={
             "runs": _beside(path, cell.runs),
-            "out": path.parent / cell.out,
+            "out": out,
             "baseline": base,
         }
     )

@@ -58,6 +58,8 @@ class DiagnoseOutcome:
     """One for each run, or axis of a run, that could not be used."""
     notes: tuple[str, ...]
     """What is worth knowing besides."""
+    n_of_baseline: int = 0
+    """How many of the errors, the first ones, are the baseline's."""
     conditions: tuple[str, ...] = ()
     """Those of the notes that say what differs between the recordings of both sides."""
 
@@ -211,6 +213,7 @@ def _diagnose(
             *unjudged.sessions_at_rest(sides),
             *([InputError(stranger)] if stranger else []),
         ),
+        n_of_baseline=len(normal.errors),
         conditions=check_comparable(sides.baseline.sources, sides.target.sources),
         notes=every_note,
     )

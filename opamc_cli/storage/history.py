@@ -79,7 +79,10 @@ CREATE TABLE stale (robot TEXT NOT NULL PRIMARY KEY) WITHOUT ROWID;
 OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed")
 """Kinds of event that follow from the nights of one robot."""
 
-DERIVED = (*OF_ROBOT, "missing")
+OF_NIGHT = ("judged-anew", "lacking")
+"""Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
+
+DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
 """Kinds of event that follow from the nights; the others were declared by a user."""
 
 
@@ -462,8 +465,9 @@ class History:
         night: NightRow,
         verdicts: Iterable[VerdictRow] = (),
         measures: Iterable[MeasureRow] = (),
+        events: Iterable[Event] = (),
     ) -> None:
-        """Record a robot's night, in the place of what was known of it."""
+        """Record a robot's night, in the place of what was known of it; said again is no news."""
         with self.transaction():
             place = (night.robot, night.night)
             # another reason than the one that was told is news
@@ -477,7 +481,20 @@ class History:
             self._put("night", [night])
             self._put("verdict", verdicts)
             self._put("measure", measures)
+            for one in events:
+                self._put_news(one, replaces=one.time == night.night)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (night.robot,))
+
+    def _put_news(self, event: Event, *, replaces: bool) -> None:
+        where = "robot = ? AND ifnull(axis, 0) = ? AND kind = ? AND time = ?"
+        key = (event.robot, event.axis or 0, event.kind, event.time)
+        said = self._db.execute(f"SELECT text FROM event WHERE {where}", key).fetchall()
+        if (event.text,) in said:
+            return
+        if replaces:
+            self._db.execute(f"DELETE FROM event WHERE {where}", key)
+        self._db.execute(f"DELETE FROM told WHERE {where}", key)
+        self._put("event", [event])
 
     def forget_undated(self, robot: str) -> None:
         """Forget that a robot had files that tell no night: they are mended, or gone."""

@@ -18,7 +18,7 @@ from opamc_cli.storage.schemas import files
 OVER = {
     kind: rank
     for rank, kind in enumerate(
-        ("ended", "silent", "thinned", "failed", "not-judged", "missing", "cleared")
+        ("ended", "silent", "thinned", "lacking", "failed", "not-judged", "missing", "cleared")
     )
 }
 """Kinds of event that are a line of their own, in the order in which they are said."""
@@ -100,8 +100,12 @@ def tell(
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
-    for name, others in sorted(outcome.others.items()):
-        lines.append(f"{name} judged anew: {some(sorted(others), MOST_OTHERS)}")
+    others: dict[str, list[str]] = {}
+    for event in news:
+        if event.kind == "judged-anew":
+            others.setdefault(event.robot, []).append(event.text)
+    for name, texts in sorted(others.items()):
+        lines.append(f"{name} judged anew: {some(sorted(texts), MOST_OTHERS)}")
     alarms = any(robot.alarms for robot in summary.robots)
     broken = any(robot.broken for robot in summary.robots)
     ended = any(event.kind == "ended" for event in news)

@@ -199,7 +199,7 @@ class _Baselines:
         self._usable = usable
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self.thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
-        self._there: dict[tuple[str, str, str], list[str]] = {}
+        self._there: dict[tuple[str, str, str], dict[str, list[Recording]]] = {}
         self._used: dict[tuple[str, str, str], tuple[Recording, ...]] = {}
 
     def comparison(
@@ -208,51 +208,24 @@ class _Baselines:
         since = max((begun for begun in self._now.begun if begun <= night), default="")
         rule = self._now.baseline
         if since or rule.nights is not None:
-            return self._first_nights(program, condition, night, targets, since)
-        if rule.runs is not None:
-            found = [one for one in self._now.fixed if not one.facts.error]
-            name = "runs"
+            key = (program, condition, since)
+            members = self._first_nights(key)
+            inside = not members or night in members
+            name = f"from {members[0]}" if members else ""
         else:
-            first, last = str(rule.first), str(rule.last)
-            if first <= night <= last:
-                return Comparison(program, condition, targets)
-            found = [one for one in self._usable if first <= one.night <= last]
-            name = f"{first} to {last}"
-        same = [one for one in found if one.facts.program == program]
-        used = tuple(one for one in same if one.condition == condition)
-        if not used:
-            known = sorted({one.condition for one in same})
-            why = (
-                f"the baseline was recorded at {' and '.join(known)}, the night at {condition}"
-                if known
-                else f"the baseline has no recording of program {program!r}"
-            )
-            return Comparison(program, condition, targets, missing=why)
-        return Comparison(program, condition, targets, used, f"{name}, {condition}")
-
-    def _first_nights(
-        self,
-        program: str,
-        condition: str,
-        night: str,
-        targets: tuple[Recording, ...],
-        since: str,
-    ) -> Comparison:
-        wanted = self._now.baseline.nights or NIGHTS_AGAIN
-        key = (program, condition, since)
-        there = self._nights_there(key)
-        pinned = list(self._now.pinned.get(key, ()))
-        # the file asks for more nights than before: those that follow, as soon as they are there
-        longer = pinned + [n for n in there if not pinned or n > pinned[-1]]
-        members = pinned if len(longer) < wanted else longer[:wanted]
+            name = "runs" if rule.runs is not None else f"{rule.first} to {rule.last}"
+            key = (program, condition, rule.runs or name)
+            members = sorted({*self._now.pinned.get(key, ()), *self._fixed_there(key)})
+            inside = rule.runs is None and str(rule.first) <= night <= str(rule.last)
+        if members:
+            self.complete[key] = tuple(members)
+        if inside:
+            return Comparison(program, condition, targets)
         if not members:
-            return Comparison(program, condition, targets)
-        self.complete[key] = tuple(members)
-        if night in members:
-            return Comparison(program, condition, targets)
-        left = [n for n in members if n in there]
+            return Comparison(program, condition, targets, missing=self._never_there(key))
+        left = [n for n in members if n in self._there[key]]
         gone = ", ".join(n for n in members if n not in left)
-        if len(left) < LEAST_NIGHTS:
+        if gone and len(left) < LEAST_NIGHTS:
             why = (
                 f"the recordings of the baseline's nights {gone} are gone; put them back, or begin "
                 "a new baseline with `opamc nightly rebaseline`"
@@ -266,23 +239,53 @@ class _Baselines:
                 "nothing is judged",
             )
         if key not in self._used:
-            self._used[key] = tuple(one for n in left for one in self._series[program, n][1])
+            self._used[key] = tuple(one for n in left for one in self._there[key][n])
         used = self._used[key]
-        name = f"from {members[0]}, {condition}"
+        name = f"{name}, {condition}"
         of = tuple(members)
         return Comparison(program, condition, targets, used, name, members=of, lost=bool(gone))
 
-    def _nights_there(self, key: tuple[str, str, str]) -> list[str]:
-        """Return the nights that may belong to a baseline, the same list for all its nights."""
+    def _first_nights(self, key: tuple[str, str, str]) -> list[str]:
+        """Return the nights of a baseline that begins with the first ones; empty: too few yet."""
+        wanted = self._now.baseline.nights or NIGHTS_AGAIN
+        pinned = list(self._now.pinned.get(key, ()))
+        # the file asks for more nights than before: those that follow, as soon as they are there
+        longer = pinned + [n for n in self._nights_there(key) if not pinned or n > pinned[-1]]
+        return pinned if len(longer) < wanted else longer[:wanted]
+
+    def _nights_there(self, key: tuple[str, str, str]) -> dict[str, list[Recording]]:
+        """Return the nights that may belong to a baseline, the same for all its nights."""
         if key not in self._there:
             program, condition, since = key
             until = min((begun for begun in self._now.begun if begun > since), default="9999")
-            self._there[key] = sorted(
-                n
-                for (p, n), (c, _) in self._series.items()
+            self._there[key] = {
+                n: recordings
+                for (p, n), (c, recordings) in sorted(self._series.items(), key=lambda one: one[0])
                 if p == program and c == condition and since <= n < until
-            )
+            }
         return self._there[key]
+
+    def _fixed_there(self, key: tuple[str, str, str]) -> dict[str, list[Recording]]:
+        """Return what there is of a baseline that dates or files tell, by night."""
+        if key not in self._there:
+            self._there[key] = {}
+            for one in self._told():
+                if (one.facts.program, one.condition) == key[:2]:
+                    self._there[key].setdefault(one.night, []).append(one)
+        return self._there[key]
+
+    def _told(self) -> list[Recording]:
+        rule = self._now.baseline
+        if rule.runs is not None:
+            return [one for one in self._now.fixed if not one.facts.error]
+        return [one for one in self._usable if str(rule.first) <= one.night <= str(rule.last)]
+
+    def _never_there(self, key: tuple[str, str, str]) -> str:
+        program, condition, _ = key
+        known = sorted({one.condition for one in self._told() if one.facts.program == program})
+        if not known:
+            return f"the baseline has no recording of program {program!r}"
+        return f"the baseline was recorded at {' and '.join(known)}, the night at {condition}"
 
 
 def _key(

@@ -79,8 +79,6 @@ class CellOutcome:
     """Robot, night and why; of nights that were judged in part as well."""
     absent: list[str] = field(default_factory=list)
     """Sentences that say of what was asked for that there is no recording of it."""
-    others: dict[str, list[str]] = field(default_factory=dict)
-    """By robot: verdicts that are others than before, since their nights were judged anew."""
     thinned: list[Event] = field(default_factory=list)
     """Baselines that have lost recordings."""
     ended: str = ""
@@ -415,13 +413,21 @@ def _record(
             "SELECT program, axis, state FROM verdict WHERE robot = ? AND night = ?", place[:2]
         )
     }
-    history.record_night(row, verdicts, measures)
-    _note(outcome, row)
+    news = []
     for one in verdicts:
         was = before.get((one.program, one.axis), one.state)
         if was != one.state:
             text = f"{one.night} axis {one.axis} {one.state}, was {was} ({night.why})"
-            outcome.others.setdefault(one.robot, []).append(text)
+            news.append(Event(one.night, one.robot, one.axis, "judged-anew", text))
+    for result in judged:
+        if result.of_baseline:
+            # dated by the baseline: the same of all nights that are held against it
+            held = next(one for one in night.comparisons if one.program == result.program)
+            last = max(one.night for one in held.baseline)
+            text = f"its baseline: {'; '.join(_first(result.of_baseline))}"
+            news.append(Event(last, night.robot, None, "lacking", text))
+    history.record_night(row, verdicts, measures, news)
+    _note(outcome, row)
 
 
 def _first(reasons: Sequence[str]) -> Iterator[str]:

@@ -6,6 +6,7 @@ import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from pathlib import Path
 
 from opamc_cli.errors import UsageError
@@ -98,8 +99,23 @@ def _umask() -> int:
     return mask
 
 
+_SCRATCH = ContextVar("scratch", default=False)
+
+
+@contextmanager
+def scratch() -> Iterator[None]:
+    """Have nothing waited for that is thrown away anyway, or checked when it is read."""
+    before = _SCRATCH.set(True)
+    try:
+        yield
+    finally:
+        _SCRATCH.reset(before)
+
+
 def flush(path: Path) -> None:
-    """Have a file or folder on the disk before going on."""
+    """Have a file or folder on the disk before going on, unless it is scratch."""
+    if _SCRATCH.get():
+        return
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)

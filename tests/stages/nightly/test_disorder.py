@@ -8,11 +8,14 @@ from dataclasses import replace
 from datetime import date
 
 import nightly_kills
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from cell_logs import night
 
+from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly import run as stage
 from opamc_cli.stages.nightly.morning import silent
 from opamc_cli.storage.history import History, NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
@@ -35,6 +38,12 @@ def states(cell):
     with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
         query = "SELECT night, status FROM night WHERE robot = 'r1' ORDER BY night"
         return [status for _, status in db.execute(query).fetchall()]
+
+
+def add_night(logs, index):
+    """Have r1 recorded in one more night."""
+    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(index))
+    set_clock(logs / "r1" / night(index) / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
 
 
 def set_clock(path, started_at):
@@ -148,8 +157,7 @@ def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, 
     assert second.out == ""
     # no verdict of before is another one now, though its baseline is not whole or even gone
     shutil.rmtree(logs / "r1" / night(0))
-    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
-    set_clock(logs / "r1" / night(5) / "cycle.parquet", f"{night(5)}T22:00:00+00:00")
+    add_night(logs, 5)
     gone = opamc("nightly", cell, "--quiet")
     assert gone.code == ExitCode.PARTIAL
     assert f"r1 {night(5)}: the recordings of the baseline's nights" in gone.out
@@ -159,13 +167,65 @@ def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, 
     assert states(cell) == ["baseline"] * 3 + ["done"] * 3
 
 
+@pytest.mark.parametrize(
+    "rule", ["from: 2026-03-01, to: 2026-03-03", "runs: 'good/{robot}/*.parquet'"]
+)
+def test_a_baseline_of_dates_or_files_that_loses_nights_leaves_verdicts(cell, logs, opamc, rule):
+    shutil.rmtree(logs / "r3")
+    good = cell.parent / "good" / "r1"
+    good.mkdir(parents=True)
+    for index in (0, 1, 2):
+        shutil.copy(logs / "r1" / night(index) / "cycle.parquet", good / f"{index}.parquet")
+    cell.write_text(cell.read_text().replace("nights: 3", rule))
+    assert opamc("nightly", cell).code == ExitCode.DONE
+    before = states(cell)
+    for index, lost in ((1, "2 nights are left"), (0, "")):
+        shutil.rmtree(logs / "r1" / night(index))
+        (good / f"{index}.parquet").unlink()
+        assert "0 nights to be done" in opamc("nightly", cell, "--dry-run").out
+        first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+        assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
+        assert lost in first.out
+        assert states(cell) == before
+    add_night(logs, 5)
+    failed = opamc("nightly", cell, "--quiet")
+    assert failed.code == ExitCode.PARTIAL
+    assert "are gone; put them back" in failed.out
+
+
+def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc):
+    logs = cell.parent / "logs"
+    for robot in ("r2", "r3"):
+        shutil.rmtree(logs / robot)
+    path = logs / "r1" / night(1) / "cycle.parquet"
+    with Run(path) as run:
+        info = run.info
+    table = pq.read_table(path)
+    columns = {name: table[name].to_numpy().copy() for name in table.column_names}
+    columns["axis1_a"][: len(table) // 5] = np.nan
+    save_run(path, info, columns)
+    last = cell.parent / "aside"
+    (logs / "r1" / night(4)).rename(last)
+    first = opamc("nightly", cell, "--quiet")
+    last.rename(logs / "r1" / night(4))
+    second = opamc("nightly", cell, "--quiet")
+    assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, SILENT)
+    assert f"r1 its baseline: {night(1)}/cycle.parquet: 20% of the current of axis 1" in first.out
+    assert states(cell) == ["baseline"] * 3 + ["done"] * 2
+
+
 def test_verdicts_that_change_afterwards_are_said(cell, logs, opamc):
     opamc("nightly", cell)
     with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
         db.execute("UPDATE verdict SET state = 'fault' WHERE robot = 'r1' AND axis = 1")
     cell.write_text(cell.read_text().replace("joint.explain: false", "score.seed: 1"))
     said = [f"{night(n)} axis 1 healthy, was fault (other options)" for n in (3, 4)]
+    # a start that is killed before it says so leaves it to the next one
+    loaded = load_cell(cell)
+    with stage.open_history(loaded) as history:
+        stage.run(loaded, str(cell), history, stage.Wanted())
     assert opamc("nightly", cell, "--quiet").out == f"r1 judged anew: {', '.join(said)}\n"
+    assert opamc("nightly", cell, "--quiet").out == ""
 
 
 def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, opamc):

@@ -333,6 +333,7 @@ def test_other_conditions_have_a_baseline_of_their_own(cell, opamc):
         ("runs: '{robot}/*.parquet'\nrobots: {../x: {}}", "robots"),
         ("runs: '{robot}/*.parquet'\nrobots: {r1: {axis: [1]}}", "did you mean 'axes'"),
         ("runs: '{robot}/*.parquet'", "no file fits"),
+        ("runs: '{robot}/*.parquet'\nout: /", "the root of all folders; name a folder"),
         ("- 1", "a mapping of keys is needed"),
     ],
 )

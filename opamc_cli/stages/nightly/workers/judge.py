@@ -21,6 +21,7 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramResult,
 )
 from opamc_cli.stages.report.wording import axes_phrase
+from opamc_cli.storage.files.atomic import scratch
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
 from opamc_cli.storage.schemas import files
@@ -82,14 +83,15 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
             _laid_out(inputs, folder / role, copies)
             for role, inputs in (("baseline", wanted.baseline), ("target", wanted.targets))
         ]
-        outcome = diagnose.run(
-            [sides[0]],
-            [sides[1]],
-            job.config,
-            folder / "out",
-            kept=None if job.kept is None else KeptResults(job.kept),
-            figures_of_healthy=False,
-        )
+        with scratch():  # what is kept of the baseline is held against its hash
+            outcome = diagnose.run(
+                [sides[0]],
+                [sides[1]],
+                job.config,
+                folder / "out",
+                kept=None if job.kept is None else KeptResults(job.kept),
+                figures_of_healthy=False,
+            )
         temperatures = _temperatures(folder / "out" / "target" / files.PATTERNS)
         written = {
             files.VERDICT: outcome.verdict_path.read_bytes(),
@@ -101,6 +103,8 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
     there = [entry["axis"] for entry in outcome.verdict["axes"]]
     lacking = [axis for axis in job.axes or () if axis not in there]
     failures = [_plain(str(error), folder) for error in outcome.errors]
+    # the night is judged by the rest of its baseline: no failure of the night
+    of_baseline, failures = failures[: outcome.n_of_baseline], failures[outcome.n_of_baseline :]
     if lacking:
         failures.append(
             f"{axes_phrase(lacking)} of program {wanted.program!r} cannot be judged: recorded "
@@ -116,6 +120,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
         axes,
         written,
         tuple(failures),
+        tuple(of_baseline),
         tuple(_plain(note, folder) for note in outcome.notes),
     )
 

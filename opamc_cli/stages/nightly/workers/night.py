@@ -92,6 +92,8 @@ class ProgramResult:
     """Content of verdict.json and report.html."""
     failures: tuple[str, ...] = ()
     """One sentence for each recording, or the whole comparison, that failed."""
+    of_baseline: tuple[str, ...] = ()
+    """One sentence for each recording of the baseline of which something cannot be used."""
     notes: tuple[str, ...] = ()
     """What is worth knowing."""
 
