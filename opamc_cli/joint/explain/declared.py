@@ -22,13 +22,10 @@ less, the other one hides what is missing. Joints that it hid had 0.17 and 0.42,
 ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
-"""Of them, at most: of 24 joints' ratios none crosses the half where all are added (0.28, 0.42 and
-0.26, here 0.39; others 0.82 up), which takes twice the time."""
-
+"""At most: with all, which takes twice the time, no ratio of 24 crosses the half."""
 JUDGED = ("moving", "clear", "channels")
 """What tells which samples count. A longer window has fewer moving samples, none of them near a
 reversal: judged by its own, it is the best wherever friction is wrong."""
-
 Declared = tuple[tuple[Effect, Term | None], ...]
 """Effects, with their terms where parameters are given."""
 

@@ -300,19 +300,16 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
-    """Fit all terms jointly; where some scale with the load or the model, until that settles.
+    """Fit all terms jointly; where some follow the load or the model, until no error falls.
 
-    In one round they scale with those that the dataset has.
+    In one round they follow those of the dataset.
     """
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
-    names = frozenset(term.key for term in terms)
-    if circular and names in dataset.cache.settled:
-        # Met before, in another order or from another chain.
-        return _fit_once(
-            dataset.with_model(*dataset.cache.settled[names], static_terms(terms)), terms
-        )
-    track = dataset.fine.track
-    dataset = dataset.with_model(track.load_a, track.model_a, static_terms(terms))
+    names, kept, track = frozenset(t.key for t in terms), dataset.cache.settled, dataset.fine.track
+    # A set of terms that was met before, in another order, begins where it ended.
+    rounds = 1 if names in kept else rounds
+    load_a, model_a = kept.get(names, (track.load_a, track.model_a))
+    dataset = dataset.with_model(load_a, model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3
     best, least = dataset, np.inf
     for number in range(1, rounds + 1):
@@ -325,8 +322,7 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUN
             break
         dataset = _with_newton_load(fitted)
     if circular and rounds > 1:
-        track = best.fine.track
-        dataset.cache.settled[names] = track.load_a, track.model_a
+        kept[names] = best.fine.track.load_a, best.fine.track.model_a
     return found
 
 

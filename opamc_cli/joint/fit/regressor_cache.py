@@ -23,6 +23,7 @@ class RegressorCache:
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
         self._columns: dict[Hashable, Floats] = {}
+        # The load and the model, (n,) each, that sets of terms which follow them were fitted with.
         self.settled: dict[Hashable, tuple[Floats, Floats]] = {}
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}

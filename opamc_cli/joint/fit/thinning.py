@@ -10,14 +10,11 @@ from opamc_cli.joint.motion.track import Bools, Track, excerpt
 MOST_SAMPLES = 50_000
 """Of more moving samples evenly spread parts stand for all, of the open groups and of the sealed
 ones alike. What is shorter is then never dearer."""
-
 FEWEST_GROUPS = 12
 """What happens at some time is consistent over groups only if there are some on both sides."""
-
 LEAD_S = 1.0
 """Before each piece, so that what has a memory (wind-up, hysteresis, a drive's answer from 1 Hz on)
 has settled: of two minutes' error 2 s leave as much to five digits, and take a fifth longer."""
-
 TAIL_S = 0.15
 """After each piece, so that a delayed current finds its motion."""
 

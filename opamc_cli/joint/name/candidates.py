@@ -115,13 +115,14 @@ class Beside:
         Those with terms that stay the same are `kept` from one chain to the next.
         """
         kept = {} if kept is None else kept
-        asked = [i for i, term in enumerate(self.terms) if term.key not in kept]
-        found = self.parts.products_of([self.blocks[i] for i in asked], columns)
-        known = dict(zip(asked, found, strict=True))
-        kept |= {self.terms[i].key: one for i, one in known.items() if self.terms[i].is_constant}
-        every = [known[i] if i in known else kept[one.key] for i, one in enumerate(self.terms)]
+        asked = [
+            pair for pair in zip(self.terms, self.blocks, strict=True) if pair[0].key not in kept
+        ]
+        found = self.parts.products_of([block for _, block in asked], columns)
+        known = kept | {term.key: one for (term, _), one in zip(asked, found, strict=True)}
+        kept |= {term.key: known[term.key] for term, _ in asked if term.is_constant}
         none = np.zeros((len(self.parts.slices), 0, columns.shape[1]))
-        return np.concatenate([none, *every], axis=1)
+        return np.concatenate([none, *(known[term.key] for term in self.terms)], axis=1)
 
     def candidate(self, term: Term) -> Candidate:
         """Judge one guess."""

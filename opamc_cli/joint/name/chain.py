@@ -149,9 +149,9 @@ def extended(chain: Chain, *terms: Term, rounds: int = MOST_ROUNDS) -> Chain:
 
 def without(chain: Chain, place: int, rounds: int = MOST_ROUNDS) -> Chain:
     """Take one of the added terms out, and fit the rest anew, in so many rounds at most."""
-    terms = list(chain.fit.terms)
-    del terms[len(terms) - chain.added + place]
-    return chain_of(fit_terms(chain.fit.dataset, tuple(terms), rounds), chain.added - 1)
+    place += len(chain.fit.terms) - chain.added
+    terms = chain.fit.terms[:place] + chain.fit.terms[place + 1 :]
+    return chain_of(fit_terms(chain.fit.dataset, terms, rounds), chain.added - 1)
 
 
 def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:

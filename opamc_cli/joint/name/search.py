@@ -238,10 +238,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
 
 
 def beam(start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS) -> Chain:
-    """Follow `width` chains side by side as far as the score falls; return the best.
-
-    Of up to so many `steps`.
-    """
+    """Follow `width` chains side by side as far as the score falls, `steps` at most."""
     chains = [start]
     best, width = start, 1 if "beam" in pool.without else width
     known: set[Signature] = set()

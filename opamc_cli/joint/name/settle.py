@@ -55,10 +55,7 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
 
 
 def worth_their_price(chain: Chain) -> Chain:
-    """Drop what is not worth its price beside all the others.
-
-    Which that is shows beside the load that all were fitted with; what stays is fitted anew.
-    """
+    """Drop what is not worth its price beside all the others, at the load of the whole chain."""
     kept, place = chain, 0
     while place < kept.added:
         parent = without(kept, place, rounds=1)
