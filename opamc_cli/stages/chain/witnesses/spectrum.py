@@ -1,6 +1,7 @@
 """Second witness: the short-time spectrum of the envelope, or of a reported current."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from opamc_cli.storage.schemas.tables import PLACE, SPECTRA
 NAME = "spectrum"
 FILE_NAME = files.SPECTRA
 SCHEMA = SPECTRA
+
+LEAST_LOG_POWER = -1.0
+"""Beside the median of all cycles: what is below counts as this."""
 
 
 def rows(
@@ -44,9 +48,16 @@ def rows(
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> SpectrumEvidence:
-    """Average the log power of each session's cycles, for every motion of an axis."""
+    """Average the log power of each session's cycles, for every motion of an axis.
+
+    Where noise is all, power is exponentially distributed, its logarithm is low without bound, and
+    a single such part outweighs hundreds: what lies far below the median of all cycles, which does
+    not know whose they are, is as good as that.
+    """
     cells = []
     for found in rows_by_motion(baseline, target, axis, names, "log_power", ("frames", "bins")):
+        least = np.median(found.values, axis=0) + LEAST_LOG_POWER
+        found = replace(found, values=np.maximum(found.values, least))
         means, counts = found.means()
         cells.append(
             SpectrumCell(
