@@ -52,8 +52,8 @@ def test_sessions_of_the_cells_are_the_means_of_their_cycles(both):
         for row in side.witnesses[files.SPECTRA].to_pylist():
             if (row["axis"], row["motion"]) == (3, 2):
                 rows.setdefault(sessions.of_run[row["run"]], []).append(row["log_power"])
-    # a part that happens to be next to nothing counts as a third of all cycles' median
-    least = np.median([power for own in rows.values() for power in own], axis=0) - 1.0
+    # a part that happens to be next to nothing counts as a third of all sessions' median
+    least = np.median([np.median(own, axis=0) for own in rows.values()], axis=0) - 1.0
     own = rows[names[1][0]]
     cell = next(c for c in cells if c.motion == 2)
     expected = np.maximum(own, least).mean(axis=0)
@@ -73,13 +73,25 @@ def test_one_part_without_power_makes_no_distance():
     assert found[1] == pytest.approx(found[0], abs=0.05)
 
 
-def evidence_of(powers):
-    """One cycle in each of as many sessions, the last of them the target's."""
-    runs = [f"night {k}" for k in range(len(powers))]
+def test_a_target_of_many_cycles_does_not_hide_how_much_it_grew():
+    rng = np.random.default_rng(0)
+    powers = np.log(rng.exponential(size=(8, 64)))
+    powers[7] += 5.0
+    few = evidence_of(powers).effect()
+    assert few == pytest.approx(2.5, rel=0.2)
+    many = np.concatenate([powers, powers[7] + rng.normal(0, 0.1, size=(40, 64))])
+    runs = [f"night {k}" for k in range(7)] + ["night 7"] * 41
+    assert evidence_of(many, runs).effect() == pytest.approx(few, rel=0.05)
+
+
+def evidence_of(powers, runs=None):
+    """One cycle in each of as many sessions, or in those named; the last is the target's."""
+    runs = runs or [f"night {k}" for k in range(len(powers))]
     shape = {"axis": 1, "motion": 0, "frames": 4, "bins": 16, "bin_hz": 1.0}
     rows = [{"run": run, **shape, "log_power": own} for run, own in zip(runs, powers, strict=True)]
-    sides = (runs[:-1], runs[-1:])
-    tables = (pa.Table.from_pylist(rows[:-1]), pa.Table.from_pylist(rows[-1:]))
+    n_own = runs.index(runs[-1])
+    sides = (runs[:n_own], runs[-1:])
+    tables = (pa.Table.from_pylist(rows[:n_own]), pa.Table.from_pylist(rows[n_own:]))
     names = Names(sides, tuple(Sessions({run: run for run in own}, ("file",)) for own in sides))
     return spectrum.evidence(*tables, 1, names)
 

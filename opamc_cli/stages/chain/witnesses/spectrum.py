@@ -21,7 +21,7 @@ FILE_NAME = files.SPECTRA
 SCHEMA = SPECTRA
 
 LEAST_LOG_POWER = -1.0
-"""Beside the median of all cycles: what is below counts as this."""
+"""Beside the median of all sessions: what is below counts as this."""
 
 
 def rows(
@@ -51,12 +51,16 @@ def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> S
     """Average the log power of each session's cycles, for every motion of an axis.
 
     Where noise is all, power is exponentially distributed, its logarithm is low without bound, and
-    a single such part outweighs hundreds: what lies far below the median of all cycles, which does
-    not know whose they are, is as good as that.
+    a single such part outweighs hundreds: what lies far below the median of all sessions, which
+    does not know whose they are, is as good as that.
     """
     cells = []
     for found in rows_by_motion(baseline, target, axis, names, "log_power", ("frames", "bins")):
-        least = np.median(found.values, axis=0) + LEAST_LOG_POWER
+        # of sessions, not of cycles: the target may have more of these than all of the baseline
+        middles = [
+            np.median(found.values[found.session == k], axis=0) for k in np.unique(found.session)
+        ]
+        least = np.median(middles, axis=0) + LEAST_LOG_POWER
         found = replace(found, values=np.maximum(found.values, least))
         means, counts = found.means()
         cells.append(
