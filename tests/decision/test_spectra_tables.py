@@ -57,7 +57,8 @@ def test_sessions_of_the_cells_are_the_means_of_their_cycles(both):
     own = rows[names[1][0]]
     cell = next(c for c in cells if c.motion == 2)
     expected = np.maximum(own, least).mean(axis=0)
-    np.testing.assert_allclose(cell.sessions[len(names[0])], expected, rtol=1e-6)
+    np.testing.assert_allclose(cell.limited[len(names[0])], expected, rtol=1e-6)
+    np.testing.assert_allclose(cell.sessions[len(names[0])], np.mean(own, axis=0), rtol=1e-6)
     assert cell.cycles[len(names[0])] == len(own)
 
 

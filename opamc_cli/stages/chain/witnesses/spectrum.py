@@ -61,7 +61,7 @@ def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> S
             np.median(found.values[found.session == k], axis=0) for k in np.unique(found.session)
         ]
         least = np.median(middles, axis=0) + LEAST_LOG_POWER
-        found = replace(found, values=np.maximum(found.values, least))
+        limited = replace(found, values=np.maximum(found.values, least))
         means, counts = found.means()
         cells.append(
             SpectrumCell(
@@ -69,10 +69,11 @@ def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> S
                 sessions=means,
                 cycles=counts,
                 # of all sessions: of the baseline's alone it would tell the target from them
-                within=variance_within_sessions(found.values, found.session),
+                within=variance_within_sessions(limited.values, found.session),
                 frames=found.key[1],
                 bins=found.key[2],
                 bin_hz=found.first["bin_hz"],
+                limited=limited.means()[0],
             )
         )
     return SpectrumEvidence(cells, len(names.sessions[0]))
