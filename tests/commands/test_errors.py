@@ -777,3 +777,13 @@ def test_by_another_robots_baseline_nobody_is_healthy(opamc, tmp_path):
     ended = opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
     assert ended.code == ExitCode.NOT_ENOUGH_DATA
     assert [text for text in ended.sentences if "is of robot 'R2', the baseline of 'R1'" in text]
+
+
+def test_tables_of_another_robot_are_no_healthy_ones_either(opamc, tmp_path):
+    own = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(2)]
+    other = bad_runs.good(tmp_path / "other.parquet", seed=2, robot="R2")
+    sides = ("--baseline", own[0], "--baseline", own[1], "--target", other)
+    opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
+    ended = opamc("decide", "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    assert [text for text in ended.sentences if "is of robot 'R2', the baseline of 'R1'" in text]

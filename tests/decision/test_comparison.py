@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
-from opamc_cli.decision.comparison import compare_sessions
+from opamc_cli.decision.comparison import FAR_OUT, Joint, compare_sessions
 from opamc_cli.decision.significance.multiplicity import harmonic_mean
+from opamc_cli.decision.significance.spread import spliced_p_value
+from opamc_cli.decision.witnesses.evidence import soft_maximum
 from opamc_cli.decision.witnesses.patterns import Cell, PatternEvidence
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
@@ -106,3 +109,17 @@ def test_several_targets_are_exchanged_as_whole_sessions():
     healthy = compared({1: joint(3, n_target=3)}, n_target=3)[1]
     assert changed.p_value < 0.01
     assert healthy.p_value > 0.01
+
+
+def test_how_far_in_a_healthy_session_lies_is_uniform_below_the_last_rank():
+    own = Joint(joint(0), 6, 1)
+    weights, rng = own.weights(own.voices), np.random.default_rng(0)
+    p = []
+    for draw in range(2000):
+        voices = rng.normal(size=(len(weights), 4 + draw % 6))
+        places = soft_maximum(voices - np.median(voices, axis=1, keepdims=True), weights)
+        places -= np.median(places)
+        p.append(spliced_p_value(places[:-1], places[-1], FAR_OUT, below=own.far_in()))
+    inner = np.array([one for one in p if one > 0.5])
+    assert kstest(2 * inner - 1, "uniform").pvalue > 0.01
+    assert np.mean(inner > 0.95) == pytest.approx(0.1, abs=0.025)

@@ -1,13 +1,17 @@
 """Spectra on their way from recordings to the verdict."""
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from opamc_cli.config import load_config
+from opamc_cli.decision.witnesses.evidence import session_distances
 from opamc_cli.decision.witnesses.spectra import clearest_change
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import spectrum
+from opamc_cli.stages.chain.witnesses.kept_rows import Names
+from opamc_cli.stages.recordings.sessions import Sessions
 from opamc_cli.stages.verdict.evidence import bundles, session_names
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import read_table
@@ -43,15 +47,54 @@ def test_sessions_of_the_cells_are_the_means_of_their_cycles(both):
     own, cells = bundles(sides)[3].cells, bundles(sides)[3].witnesses["spectrum"].cells
     assert [c.motion for c in cells] == sorted({c.motion for c in own})
     assert {c.sessions.shape[0] for c in cells} == {len(own[0].baseline) + len(own[0].target)}
-    rows = [
-        row["log_power"]
-        for row in sides.target.witnesses[files.SPECTRA].to_pylist()
-        if (row["axis"], row["motion"]) == (3, 2)
-        and sides.sessions[1].of_run[row["run"]] == names[1][0]
-    ]
+    rows: dict[str, list] = {}
+    for side, sessions in zip((sides.baseline, sides.target), sides.sessions, strict=True):
+        for row in side.witnesses[files.SPECTRA].to_pylist():
+            if (row["axis"], row["motion"]) == (3, 2):
+                rows.setdefault(sessions.of_run[row["run"]], []).append(row["log_power"])
+    # a part that happens to be next to nothing counts as a third of all sessions' median
+    least = np.median([np.median(own, axis=0) for own in rows.values()], axis=0) - 1.0
+    own = rows[names[1][0]]
     cell = next(c for c in cells if c.motion == 2)
-    np.testing.assert_allclose(cell.sessions[len(names[0])], np.mean(rows, axis=0), rtol=1e-6)
-    assert cell.cycles[len(names[0])] == len(rows)
+    expected = np.maximum(own, least).mean(axis=0)
+    np.testing.assert_allclose(cell.limited[len(names[0])], expected, rtol=1e-6)
+    np.testing.assert_allclose(cell.sessions[len(names[0])], np.mean(own, axis=0), rtol=1e-6)
+    assert cell.cycles[len(names[0])] == len(own)
+
+
+def test_one_part_without_power_makes_no_distance():
+    """Where noise is all, a part's power is exponential: its logarithm is low without bound."""
+    rng = np.random.default_rng(0)
+    powers = np.log(rng.exponential(size=(8, 64))).astype(np.float32)
+    found = []
+    for last in (powers[7, 0], -30.0):
+        powers[7, 0] = last
+        evidence = evidence_of(powers)
+        found.append(session_distances(evidence, 7, 1)["orthogonal"].each[7])
+    assert found[1] == pytest.approx(found[0], abs=0.05)
+
+
+def test_a_target_of_many_cycles_does_not_hide_how_much_it_grew():
+    rng = np.random.default_rng(0)
+    powers = np.log(rng.exponential(size=(8, 64)))
+    powers[7] += 5.0
+    few = evidence_of(powers).effect()
+    assert few == pytest.approx(2.5, rel=0.2)
+    many = np.concatenate([powers, powers[7] + rng.normal(0, 0.1, size=(40, 64))])
+    runs = [f"night {k}" for k in range(7)] + ["night 7"] * 41
+    assert evidence_of(many, runs).effect() == pytest.approx(few, rel=0.05)
+
+
+def evidence_of(powers, runs=None):
+    """One cycle in each of as many sessions, or in those named; the last is the target's."""
+    runs = runs or [f"night {k}" for k in range(len(powers))]
+    shape = {"axis": 1, "motion": 0, "frames": 4, "bins": 16, "bin_hz": 1.0}
+    rows = [{"run": run, **shape, "log_power": own} for run, own in zip(runs, powers, strict=True)]
+    n_own = runs.index(runs[-1])
+    sides = (runs[:n_own], runs[-1:])
+    tables = (pa.Table.from_pylist(rows[:n_own]), pa.Table.from_pylist(rows[n_own:]))
+    names = Names(sides, tuple(Sessions({run: run for run in own}, ("file",)) for own in sides))
+    return spectrum.evidence(*tables, 1, names)
 
 
 def test_the_fault_shows_at_the_order_of_the_flexspline(both):

@@ -58,5 +58,7 @@ def decide(
         f"verdict: {path}",
         urgent=outcome.exit_code is not ExitCode.DONE,
     )
+    for error in outcome.errors:
+        output.failure(str(error))
     excused = exit_zero and outcome.exit_code is ExitCode.UNHEALTHY
     raise typer.Exit(ExitCode.DONE if excused else outcome.exit_code)

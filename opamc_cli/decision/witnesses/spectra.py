@@ -51,6 +51,9 @@ class SpectrumCell:
     """With `frames`: f is their product, frames first."""
     bin_hz: float
     """Frequency of the first bin; bin k lies at k + 1 times it."""
+    limited: FloatArray | None = None
+    """`sessions` with empty parts limited, by which sessions are told apart; None: the same. How
+    large a change is needs no limit."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,13 @@ class SpectrumEvidence:
     def blocks(self) -> list[Block]:
         """Return the log powers of each motion's frames and bins."""
         return [
-            Block(cell.sessions, cell.cycles, cell.within, LEAST_VARIANCE) for cell in self.cells
+            Block(
+                cell.sessions if cell.limited is None else cell.limited,
+                cell.cycles,
+                cell.within,
+                LEAST_VARIANCE,
+            )
+            for cell in self.cells
         ]
 
     def effect(self) -> float:
@@ -92,7 +101,12 @@ class SpectrumEvidence:
     def of_target(self, session: int) -> "SpectrumEvidence":
         """Return the evidence with one of the target's sessions alone."""
         rows = [*range(self.n_baseline), self.n_baseline + session]
-        return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
+        cells = chosen(self.cells, ("sessions", "cycles"), rows)
+        limited = [
+            cell if cell.limited is None else replace(cell, limited=cell.limited[rows])
+            for cell in cells
+        ]
+        return replace(self, cells=limited)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from opamc_cli.config import Config
-from opamc_cli.errors import ExitCode
+from opamc_cli.errors import ExitCode, InputError, OpamcError
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.verdict import verdict
@@ -20,6 +20,7 @@ from opamc_cli.stages.verdict.findings import read_findings
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs import file_sha256
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.sources import other_robot
 
 FILES = (files.VERDICT, *score.FILES)
 
@@ -32,6 +33,8 @@ class DecideOutcome:
     """Content of verdict.json."""
     exit_code: ExitCode
     """What it ends with."""
+    errors: tuple[OpamcError, ...] = ()
+    """Why nothing that was found unchanged is a verdict."""
 
 
 def default_tables(folder: Path) -> tuple[Path, Path]:
@@ -75,7 +78,11 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
         return named | head | {"tables": head["tables"] | _beside(folder, (baseline, target))}
 
     written = verdict.write(decided, scored, config, out, causes=found.causes, complete=complete)
-    return DecideOutcome(written.verdict, written.exit_code)
+    stranger = other_robot(sides.baseline.sources, sides.target.sources)
+    if stranger is None:
+        return DecideOutcome(written.verdict, written.exit_code)
+    exit_code = written.exit_code or ExitCode.NOT_ENOUGH_DATA
+    return DecideOutcome(written.verdict, exit_code, (InputError(stranger),))
 
 
 def _beside(folder: Path, tables: tuple[Path, Path]) -> dict[str, str]:

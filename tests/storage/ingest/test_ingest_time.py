@@ -74,10 +74,22 @@ def test_uneven_stamps_end_on_the_grid(tmp_path):
 @pytest.mark.parametrize("slower", [2, 4])
 def test_a_rate_that_changes_midway_is_refused(tmp_path, slower):
     fast, slow = np.arange(3000) / 1000, 3 + np.arange(1500) * slower / 1000
-    for stamps in (np.r_[fast, slow], np.r_[slow - 3, fast + 1.5 * slower]):
+    for stamps, row in ((np.r_[fast, slow], 3001), (np.r_[slow - 3, fast + 1.5 * slower], 1501)):
         rows = [(f"{t:.6f}", 1) for t in stamps]
-        with pytest.raises(InputError, match=r"Hz at row \d+: the rate changes; split"):
+        said = rf"Hz up to row {row} and [\d.]+ Hz from there: the rate changes; split"
+        with pytest.raises(InputError, match=said):
             ingested(tmp_path, rows, "{source: t, unit: s}")
+
+
+def test_where_the_rate_changes_is_found_among_jitter_gaps_and_repeated_stamps(tmp_path):
+    rng = np.random.default_rng(0)
+    stamps = np.r_[np.arange(5000) / 500, 10 + np.arange(2000) / 250]
+    stamps += rng.uniform(-4e-4, 4e-4, stamps.size)
+    stamps[1000:] += 0.5
+    stamps[2000:2010] = stamps[1999]
+    rows = [(f"{t:.6f}", 1) for t in stamps]
+    with pytest.raises(InputError, match=r"Hz up to row 500[012] and [\d.]+ Hz from there"):
+        ingested(tmp_path, rows, "{source: t, unit: s}")
 
 
 def test_lost_samples_here_and_there_are_no_other_rate(tmp_path):

@@ -1,6 +1,7 @@
 """Second witness: the short-time spectrum of the envelope, or of a reported current."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,9 @@ from opamc_cli.storage.schemas.tables import PLACE, SPECTRA
 NAME = "spectrum"
 FILE_NAME = files.SPECTRA
 SCHEMA = SPECTRA
+
+LEAST_LOG_POWER = -1.0
+"""Beside the median of all sessions: what is below counts as this."""
 
 
 def rows(
@@ -44,9 +48,20 @@ def rows(
 
 
 def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> SpectrumEvidence:
-    """Average the log power of each session's cycles, for every motion of an axis."""
+    """Average the log power of each session's cycles, for every motion of an axis.
+
+    Where noise is all, power is exponentially distributed, its logarithm is low without bound, and
+    a single such part outweighs hundreds: what lies far below the median of all sessions, which
+    does not know whose they are, is as good as that.
+    """
     cells = []
     for found in rows_by_motion(baseline, target, axis, names, "log_power", ("frames", "bins")):
+        # of sessions, not of cycles: the target may have more of these than all of the baseline
+        middles = [
+            np.median(found.values[found.session == k], axis=0) for k in np.unique(found.session)
+        ]
+        least = np.median(middles, axis=0) + LEAST_LOG_POWER
+        limited = replace(found, values=np.maximum(found.values, least))
         means, counts = found.means()
         cells.append(
             SpectrumCell(
@@ -54,10 +69,11 @@ def evidence(baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> S
                 sessions=means,
                 cycles=counts,
                 # of all sessions: of the baseline's alone it would tell the target from them
-                within=variance_within_sessions(found.values, found.session),
+                within=variance_within_sessions(limited.values, found.session),
                 frames=found.key[1],
                 bins=found.key[2],
                 bin_hz=found.first["bin_hz"],
+                limited=limited.means()[0],
             )
         )
     return SpectrumEvidence(cells, len(names.sessions[0]))

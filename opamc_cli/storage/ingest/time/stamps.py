@@ -233,7 +233,7 @@ def _uneven_clock(
         raise InputError(msg)
     step = np.diff(times_s[kept])
     missing = _missing_samples(step)
-    _refuse_two_rates(path, source, step, max_gap_samples)
+    _refuse_two_rates(path, source, step, np.flatnonzero(kept), max_gap_samples)
     measured = 1.0 / float(step[~missing].mean())
     rate = grid_rate_hz or declared_rate_hz or float(f"{measured:.6g}")
     for declared in (declared_rate_hz, grid_rate_hz):
@@ -283,7 +283,9 @@ def _missing_samples(step: Seconds) -> npt.NDArray[np.bool_]:
     return np.asarray((step >= 1.5 * typical) & (together >= 3.5 * typical))
 
 
-def _refuse_two_rates(path: Path, source: Name, step: Seconds, max_gap_samples: float) -> None:
+def _refuse_two_rates(
+    path: Path, source: Name, step: Seconds, rows: npt.NDArray[np.intp], max_gap_samples: float
+) -> None:
     """Refuse a recording whose rate changes: to resample it would alias a part, or invent one."""
     n_stretches = min(STRETCHES, len(step) // STRETCH_ROWS)
     if n_stretches < 2:
@@ -299,12 +301,30 @@ def _refuse_two_rates(path: Path, source: Name, step: Seconds, max_gap_samples: 
     fast, slow = int(rates.argmax()), int(rates.argmin())
     if rates[fast] > ONE_RATE_WITHIN * rates[slow]:
         first, last = sorted((fast, slow))
+        between = step[edges[first] : edges[last + 1]]
+        change = edges[first] + _change(between, 1.0 / rates[first], 1.0 / rates[last])
         msg = (
-            f"{path}: time column {source!r} says {rates[first]:.4g} Hz at row {edges[first] + 1} "
-            f"and {rates[last]:.4g} Hz at row {edges[last] + 1}: the rate changes; split the "
+            f"{path}: time column {source!r} says {rates[first]:.4g} Hz up to row "
+            f"{rows[change] + 1} and {rates[last]:.4g} Hz from there: the rate changes; split the "
             "recording there, or log at one rate"
         )
         raise InputError(msg)
+
+
+def _change(step: Seconds, before_s: float, after_s: float) -> int:
+    """Return how many steps fit the first of two periods before the second fits better.
+
+    By the sum of the logarithms' absolute deviations, to which a gap or a late stamp counts no
+    more than the ratio of both periods.
+
+    Examples
+    --------
+    >>> _change(np.array([1.1, 0.9, 30.0, 1.0, 1.0, 2.1, 1.9, 2.0]), 1.0, 2.0)
+    5
+    """
+    logs = np.log(step)
+    worse = np.abs(logs - np.log(before_s)) - np.abs(logs - np.log(after_s))
+    return int(np.argmin(np.concatenate(([0.0], np.cumsum(worse)))))
 
 
 def _fitted_period(times_s: Seconds) -> float:
