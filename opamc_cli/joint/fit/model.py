@@ -300,10 +300,7 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
-    """Fit all terms jointly; where some follow the load or the model, until no error falls.
-
-    In one round they follow those of the dataset.
-    """
+    """Fit all terms jointly; what follows the load or the model, until no error falls."""
     circular = not all(term.is_constant or term.effect.from_terms for term in terms)
     names, kept, track = frozenset(t.key for t in terms), dataset.cache.settled, dataset.fine.track
     # A set of terms that was met before, in another order, begins where it ended.

@@ -69,13 +69,13 @@ class Chain:
     def plausible_beside(self, other: "Chain") -> bool:
         """Whether coefficients have the sign that physics gives them, or had another before.
 
-        All of the added terms' have to. A declared one's may not be turned by friction that grows
-        with the load: where that never passes zero, it does little else.
+        All of the added terms' have to. Declared dry friction may not be turned by friction that
+        grows with the load: where that never passes zero, it does little else.
         """
         signs = self._signs
         first = len(signs) - self.added
-        kept = zip(signs[:first], other._signs, strict=False)
-        turned = any(before and not now for now, before in kept)
+        kept = zip(signs[:first], other._signs, self.fit.terms, strict=False)
+        turned = any(b and not n and t.effect.name == "coulomb" for n, b, t in kept)
         return all(signs[first:]) and not (turned and self.terms[-1].effect.follows_load)
 
     @property

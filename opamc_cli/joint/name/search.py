@@ -42,8 +42,7 @@ class Pool:
     asked: dict[Hashable, list[Candidate]] = field(
         default_factory=dict, init=False, repr=False, compare=False
     )
-    """What `candidates` found beside which terms: a chain is met again when each of its effects is
-    asked beside the others."""
+    """What `candidates` found beside which terms: chains are met again."""
 
     @classmethod
     def of(cls, dataset: Dataset, library: Library, without: Collection[str] = ()) -> "Pool":
@@ -244,7 +243,11 @@ def beam(start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS)
     known: set[Signature] = set()
     for _ in range(steps):
         following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
-        chains = sorted(following, key=lambda chain: chain.score)[:width]
+        # One of each kind: two lines, or two places, are one idea.
+        kinds: dict[tuple[str, ...], Chain] = {}
+        for chain in sorted(following, key=lambda chain: chain.score):
+            kinds.setdefault(tuple(sorted(term.effect.name for term in chain.terms)), chain)
+        chains = list(kinds.values())[:width]
         if not chains or chains[0].score >= best.score:
             break
         best = chains[0]

@@ -167,19 +167,20 @@ def test_what_never_turns_round_may_have_its_dry_friction_in_the_offset(
 
 
 @pytest.mark.parametrize(
-    ("before", "now", "follows_load", "plausible"),
+    ("name", "before", "now", "follows_load", "plausible"),
     [
-        (True, False, True, False),
-        (True, False, False, True),  # only what follows the load may not turn it
-        (False, False, True, True),  # it was so before
-        (True, True, True, True),
+        ("coulomb", True, False, True, False),
+        ("viscous", True, False, True, True),  # something else that lacks may have turned it
+        ("coulomb", True, False, False, True),  # only what follows the load may not turn it
+        ("coulomb", False, False, True, True),  # it was so before
+        ("coulomb", True, True, True, True),
     ],
 )
-def test_a_declared_sign_may_not_be_turned_by_what_follows_the_load(
-    before, now, follows_load, plausible
+def test_dry_friction_may_not_be_turned_by_what_follows_the_load(
+    name, before, now, follows_load, plausible
 ):
-    start = made(effect("declared", before), added=0)
-    longer = made(effect("declared", now), effect("new", follows_load=follows_load))
+    start = made(effect(name, before), added=0)
+    longer = made(effect(name, now), effect("new", follows_load=follows_load))
     assert longer.plausible_beside(start) is plausible
 
 

@@ -170,9 +170,28 @@ def test_friction_that_follows_the_weight_alone_is_found_in_its_own_form(motion,
     assert found.chain.fit.rmse(sealed=False) == pytest.approx(0.02, rel=0.05)
 
 
+def called(name):
+    return SimpleNamespace(effect=SimpleNamespace(name=name))
+
+
+def test_of_chains_that_hold_the_same_effects_the_best_alone_is_followed(monkeypatch):
+    kinds = ("ripple", -3.0), ("ripple", -2.0), ("drag", -1.0), ("spring", -0.5)
+    made = [SimpleNamespace(score=score, terms=[called(name)]) for name, score in kinds]
+    start, asked = SimpleNamespace(score=0.0, terms=[]), []
+
+    def possible(chain, pool, known):
+        asked.append(chain)
+        return [SimpleNamespace(chain=one) for one in made] if chain is start else []
+
+    monkeypatch.setattr(search, "_possible", possible)
+    assert beam(start, Pool([], {}), 2) is made[0]
+    assert asked == [start, made[0], made[2]]
+
+
 @pytest.mark.parametrize("width", [1, 2])
 def test_chains_are_followed_as_far_as_the_score_falls(monkeypatch, width):
-    chains = [SimpleNamespace(score=score, added=0) for score in (0.0, -1.0, -0.5, -3.0)]
+    scores = enumerate((0.0, -1.0, -0.5, -3.0))
+    chains = [SimpleNamespace(score=score, terms=[called(str(place))]) for place, score in scores]
 
     def possible(chain, pool, known):
         following = chains[chains.index(chain) + 1 :][:1]
