@@ -17,6 +17,9 @@ from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
 
+TWICE = 2.0
+"""The open samples' error: sealed ones of 34 joints had 0.7 to 1.7 times it, one changed 2.6."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -116,7 +119,6 @@ def close_loop(
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    # Only now, and only once, are the sealed groups looked at.
     return _opened(before, only_named.fit, final.fit, explained.fit, steps, tried, library)
 
 
@@ -188,8 +190,8 @@ def _opened(
     # Where functions without a name explain nothing, all of the error may be there to explain.
     reach = rmse_before**2 * (found.share or 1.0)
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
-    # A model that predicts no better than the mean lacks something, whatever was found.
-    predicts = after.sealed_r2 > 0
+    # What predicts no better than the mean, or far worse than it fits, lacks something for certain.
+    predicts = after.sealed_r2 > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:

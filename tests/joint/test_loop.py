@@ -151,6 +151,16 @@ def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
     assert abs(found - start / made.rate_hz) < 0.05 * 7.3
 
 
+def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():
+    made = simulate(3, (), rate=250.0, cycles=5)
+    changed = made.current.copy()
+    start = round(0.8 * changed.size)
+    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
+    _, loop = close_recording(made, changed)
+    assert (loop.steps, loop.verdict) == ((), "not-in-library")
+    assert loop.rmse_after_a > 2 * loop.after.rmse(sealed=False)
+
+
 EXACT = {
     "offset": {"spring", "asymmetric_friction"},
     "spring": set(),

@@ -12,10 +12,7 @@ MOST_BYTES = 200e6
 
 
 class RegressorCache:
-    """Regressors by term, and sums of products by pair of regressor arrays.
-
-    A chain of effects differs from its neighbour by one; nearly all products are known.
-    """
+    """Regressors by term, and sums of products by pair of regressor arrays: most are met again."""
 
     def __init__(self) -> None:
         self.clear()

@@ -11,7 +11,7 @@ from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Dataset, Fit, Term
-from opamc_cli.joint.loop import Loop, Step
+from opamc_cli.joint.loop import TWICE, Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
@@ -197,8 +197,18 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         },
         "groups": grouping.kind,
         "orders": loop.orders_note,
-        "notes": laid.notes,
+        "notes": [*laid.notes, *_sealed_note(loop)],
     }
+
+
+def _sealed_note(loop: Loop) -> list[str]:
+    fitted = loop.after.rmse(sealed=False)
+    if loop.rmse_after_a <= TWICE * fitted:
+        return []
+    times = loop.rmse_after_a / max(fitted, 1e-300)
+    return [
+        f"the sealed part's error is {times:.1f} times that of the rest: something changed there"
+    ]
 
 
 def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict[str, Any]:
