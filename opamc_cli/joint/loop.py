@@ -182,10 +182,13 @@ def _opened(
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
     refused: list[Tried] = []
     if rmse_after > rmse_before:
-        # As a whole, or not at all: steps are never chosen among by the sealed data.
+        # Functions without a name first, then all: steps are never chosen among by the sealed data.
+        hold = rmse_named <= rmse_before
         why = "does not hold on the sealed data"
-        refused = [replace(step.trial, why_not=why) for step in steps]
-        steps, after, rmse_named, rmse_after = [], before, rmse_before, rmse_before
+        refused = [replace(one.trial, why_not=why) for one in steps if not (one.named and hold)]
+        steps = [one for one in steps if one.named and hold]
+        after, rmse_named = (named, rmse_named) if hold else (before, rmse_before)
+        rmse_after = rmse_named
     added = {one.term.effect.name for one in [step.trial for step in steps] + refused}
     # Where functions without a name explain nothing, all of the error may be there to explain.
     reach = rmse_before**2 * (found.share or 1.0)

@@ -161,6 +161,21 @@ def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():
     assert loop.rmse_after_a > 2 * loop.after.rmse(sealed=False)
 
 
+def test_names_hold_where_a_function_of_time_does_not(monkeypatch):
+    swaying = Term(unnamed_library()["unnamed_time"], {"degree": 8.0})
+    monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: extended(chain, swaying))
+    recording = joint_of("cyclic", SHAPES["stribeck"], strength=5.0)
+    size = recording.current_a.size
+    # It sways while nothing is sealed, and is elsewhere afterwards.
+    time = np.arange(size) / size
+    sway = 0.2 * np.where(time < 0.7, np.sin(9 * time), -1.0 - 4 * time)
+    loop = close(replace(recording, current_a=recording.current_a + sway))
+    assert names_of(loop) == [{"stribeck"}]
+    assert loop.rmse_after_a < loop.rmse_before_a
+    why_not = {one.term.effect.name: one.why_not for one in loop.rejected}
+    assert why_not["unnamed_time"] == "does not hold on the sealed data"
+
+
 EXACT = {
     "offset": {"spring", "asymmetric_friction"},
     "spring": set(),

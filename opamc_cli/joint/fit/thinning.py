@@ -51,10 +51,7 @@ def thinned(
 
 
 def cut(track: Track, pieces: Pieces) -> Track:
-    """Cut half-open pieces, ascending, out of a track, each with what comes before and after it.
-
-    Outside the pieces samples belong to no group.
-    """
+    """Cut half-open pieces, ascending, out of a track, with their surroundings, in no group."""
     inside: Bools = np.zeros(track.size, dtype=bool)
     spans: Pieces = []
     for start, stop in pieces:
