@@ -197,7 +197,7 @@ def test_a_term_keeps_some_of_its_columns_and_is_known_by_that():
 
 
 def test_fast_terms_are_taken_as_fitted_on_the_coarse_grid():
-    recording = joint_of("cyclic", lambda q, v, a, t: np.sin(40 * q), rate=1000.0)
+    recording = joint_of("cyclic", lambda q, v, a, t: np.sin(40 * q), rate=500.0)
     terms = (*rigid(), term("ripple", order=40.0))
     fitted = fit_terms(dataset_from(recording), terms)
     dataset, track = fitted.dataset, fitted.dataset.coarse.track
