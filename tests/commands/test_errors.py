@@ -770,20 +770,12 @@ def test_a_recording_that_lacks_most_numbers_is_not_healthy_without_a_word(opamc
     assert [one for one in ended.sentences if "50% of the current of axis 1 is no numbers" in one]
 
 
-def test_by_another_robots_baseline_nobody_is_healthy(opamc, tmp_path):
+def test_by_another_robots_baseline_or_its_tables_nobody_is_healthy(opamc, tmp_path):
     own = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(2)]
     other = bad_runs.good(tmp_path / "other.parquet", seed=2, robot="R2")
     sides = ("--baseline", own[0], "--baseline", own[1], "--target", other)
-    ended = opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
-    assert ended.code == ExitCode.NOT_ENOUGH_DATA
-    assert [text for text in ended.sentences if "is of robot 'R2', the baseline of 'R1'" in text]
-
-
-def test_tables_of_another_robot_are_no_healthy_ones_either(opamc, tmp_path):
-    own = [bad_runs.good(tmp_path / f"{k}.parquet", seed=k) for k in range(2)]
-    other = bad_runs.good(tmp_path / "other.parquet", seed=2, robot="R2")
-    sides = ("--baseline", own[0], "--baseline", own[1], "--target", other)
-    opamc("diagnose", *sides, "--out", tmp_path / "out", "--quiet")
-    ended = opamc("decide", "--out", tmp_path / "out", "--quiet")
-    assert ended.code == ExitCode.NOT_ENOUGH_DATA
-    assert [text for text in ended.sentences if "is of robot 'R2', the baseline of 'R1'" in text]
+    for command in (("diagnose", *sides), ("decide",)):
+        ended = opamc(*command, "--out", tmp_path / "out", "--quiet")
+        assert ended.code == ExitCode.NOT_ENOUGH_DATA
+        told = "is of robot 'R2', the baseline of 'R1'"
+        assert [text for text in ended.sentences if told in text]

@@ -137,14 +137,19 @@ def test_two_runs_of_the_loop_are_equal():
     assert [s.trial.p_value for s in first.steps] == [s.trial.p_value for s in second.steps]
 
 
-@pytest.mark.long
-def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
-    # Of five cycles the last is sealed, and the fourth alone knows the new payload.
+def loaded_from(share):
+    """Close the loop on five cycles, of which the last is sealed, with a payload from then on."""
     made = simulate(3, (), rate=250.0, cycles=5)
     changed = made.current.copy()
-    start = round(0.6 * changed.size)
+    start = round(share * changed.size)
     changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
-    _, loop = close_recording(made, changed)
+    return made, start, close_recording(made, changed)[1]
+
+
+@pytest.mark.long
+def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
+    # The fourth cycle alone knows the new payload.
+    made, start, loop = loaded_from(0.6)
     assert [step.term.effect.name for step in loop.steps] == ["payload_change"]
     # A twentieth of a cycle: the refinement ends where a slow stretch tells little.
     found = loop.steps[0].term.parameters["since_s"]
@@ -152,11 +157,7 @@ def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
 
 
 def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():
-    made = simulate(3, (), rate=250.0, cycles=5)
-    changed = made.current.copy()
-    start = round(0.8 * changed.size)
-    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
-    _, loop = close_recording(made, changed)
+    _, _, loop = loaded_from(0.8)
     assert (loop.steps, loop.verdict) == ((), "not-in-library")
     assert loop.rmse_after_a > 2 * loop.after.rmse(sealed=False)
 

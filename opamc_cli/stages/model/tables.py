@@ -206,9 +206,7 @@ def _sealed_note(loop: Loop) -> list[str]:
     if loop.rmse_after_a <= TWICE * fitted:
         return []
     times = loop.rmse_after_a / max(fitted, 1e-300)
-    return [
-        f"the sealed part's error is {times:.1f} times that of the rest: something changed there"
-    ]
+    return [f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"]
 
 
 def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict[str, Any]:
