@@ -56,6 +56,20 @@ def close(folder, *more, model=None):
     )  # fmt: skip
 
 
+def test_a_fit_that_fails_on_the_sealed_data_is_said_also_if_quiet(tmp_path, capsys):
+    made = simulate(3, (), rate=250.0, cycles=5)
+    changed = made.current.copy()
+    start = round(0.8 * changed.size)  # The last cycle, which is sealed, alone has the payload.
+    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
+    write_run(tmp_path / "run.parquet", 250.0, axis1_current=changed, axis1_position=made.position)
+    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert "times that of the rest: the fit fails there" in said.err
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert entry["fails"] in said.err
+
+
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):
     assert close(folder, "--axis", "1") == 0
     shown = capsys.readouterr().out

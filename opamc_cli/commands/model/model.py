@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from opamc_cli.commands.model.effects import effects
-from opamc_cli.commands.model.shown import fields_table, loop_tables, parameters, untestable
+from opamc_cli.commands.model.shown import (
+    fields_table,
+    headline,
+    loop_tables,
+    parameters,
+    untestable,
+)
 from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import ConfigError
@@ -123,6 +129,9 @@ def close(
         *(shown for result in outcome.results for shown in loop_tables(result)),
         *(str(published(path)) for path in outcome.written),
     )
+    for entry in outcome.results:
+        if quiet and entry["fails"]:
+            output.failure(headline(entry))
     _end(outcome, output)
 
 

@@ -54,12 +54,13 @@ def _headline(result: Mapping[str, Any]) -> str:
             name = effect + (", approximately" if step.get("approximate") else "")
             words.append(f"{meaning.split(':')[0].split(' (')[0]} ({name})")
     error = f"error {before} → {after} {unit}"
+    fails = f"; {result['fails']}" if result.get("fails") else ""
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
     if share is not None and result.get("ceiling", {}).get("share") != 0:
         reached = f"{share:.0%} of what can be explained"
     if words:
-        return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}"
+        return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}{fails}"
     if result.get("verdict") == "nothing-missing":
         from opamc_cli.stages.report.wording import unexplained
 
@@ -76,13 +77,7 @@ def _headline(result: Mapping[str, Any]) -> str:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")
     what = "; ".join(curves) or "something" + (f" in the {domain} domain" if domain else "")
-    r2 = result.get("after", {}).get("r2")
-    if r2 is not None and r2 <= 0:
-        error += (
-            f"; the model predicts sealed data no better than their mean (r2 {r2:.2g}): check "
-            "gear ratio, pole pairs, units and phases"
-        )
-    return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}"
+    return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}{fails}"
 
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:

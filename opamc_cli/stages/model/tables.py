@@ -197,16 +197,23 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         },
         "groups": grouping.kind,
         "orders": loop.orders_note,
-        "notes": [*laid.notes, *_sealed_note(loop)],
+        "fails": _failure(loop),
+        "notes": laid.notes,
     }
 
 
-def _sealed_note(loop: Loop) -> list[str]:
+def _failure(loop: Loop) -> str | None:
+    """Say why the extended model is no model of the sealed data; None where it is one."""
+    if loop.r2_after <= 0:
+        return (
+            f"the model predicts sealed data no better than their mean (r2 {loop.r2_after:.2g}): "
+            "check gear ratio, pole pairs, units and phases"
+        )
     fitted = loop.after.rmse(sealed=False)
     if loop.rmse_after_a <= TWICE * fitted:
-        return []
+        return None
     times = loop.rmse_after_a / max(fitted, 1e-300)
-    return [f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"]
+    return f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"
 
 
 def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict[str, Any]:

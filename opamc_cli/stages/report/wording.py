@@ -373,5 +373,7 @@ def remains(entry: Mapping[str, Any]) -> str:
     ]
     if domains:
         parts.append(f"what is left has structure over {', '.join(domains)}")
+    if entry.get("fails"):
+        parts.append(str(entry["fails"]))
     text = "; ".join(parts) or "loop.json does not say"
     return text[0].upper() + text[1:] + "."
