@@ -8,6 +8,7 @@ import numpy as np
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
+from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
@@ -76,6 +77,8 @@ class Loop:
     """Effects that the recordings cannot show, and why."""
     ceiling: Ceiling
     """What can be explained of the sealed data without a name."""
+    predicts: bool
+    """Whether the extended model holds on the sealed data as on the open ones."""
     verdict: str
     """"nothing-missing", "closed", "partial" or "not-in-library"."""
     rmse_before_a: float
@@ -194,7 +197,9 @@ def _opened(
     reach = rmse_before**2 * (found.share or 1.0)
     reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
     # What predicts no better than the mean, or far worse than it fits, lacks something for certain.
-    predicts = after.sealed_r2 > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
+    r2_after = after.sealed_r2
+    predicts = r2_after > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
+    predicts |= r2_after > 1 - ROUNDING
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
@@ -215,11 +220,12 @@ def _opened(
         rejected=(*refused, *_rejected(tried, added)),
         untestable=untestable(before, library),
         ceiling=found,
+        predicts=predicts,
         verdict=verdict,
         rmse_before_a=rmse_before,
         rmse_after_a=rmse_after,
         r2_before=before.sealed_r2,
-        r2_after=after.sealed_r2,
+        r2_after=r2_after,
         floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
         noise_a=measurement_noise(after.residual_a[after.dataset.sharp.fit]),
         explained_share=float(np.clip(reached, 0.0, 1.0)),

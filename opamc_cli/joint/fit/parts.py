@@ -206,7 +206,7 @@ class Sums:
         """Sum of squared errors of each part, (p,), with given coefficients, (k,) or (p, k)."""
         predicted = (self.gram @ coefficients[..., None])[..., 0]
         square = np.sum(coefficients * (predicted - 2 * self.moment), axis=-1)
-        error: Floats = np.maximum(self.power + square, 0.0)
+        error: Floats = np.maximum(self.power + square, ROUNDING * self.power)
         return error
 
 

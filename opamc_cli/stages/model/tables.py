@@ -11,7 +11,7 @@ from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Dataset, Fit, Term
-from opamc_cli.joint.loop import TWICE, Loop, Step
+from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
@@ -204,15 +204,14 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
 
 def _failure(loop: Loop) -> str | None:
     """Say why the extended model is no model of the sealed data; None where it is one."""
+    if loop.predicts:
+        return None
     if loop.r2_after <= 0:
         return (
             f"the model predicts sealed data no better than their mean (r2 {loop.r2_after:.2g}): "
             "check gear ratio, pole pairs, units and phases"
         )
-    fitted = loop.after.rmse(sealed=False)
-    if loop.rmse_after_a <= TWICE * fitted:
-        return None
-    times = loop.rmse_after_a / max(fitted, 1e-300)
+    times = loop.rmse_after_a / loop.after.rmse(sealed=False)
     return f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"
 
 
