@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.mains_hum import MainsHum
 from opamc_cli.joint.effects.ripple import Ripple
 from opamc_cli.joint.motion.track import Floats, Track
@@ -24,17 +24,9 @@ class AngleLine(Ripple):
         follows = dict.fromkeys(("speed", "direction", "current"), 1.0)
         return [{"order": order, **follows} for order, _ in order_lines(track, residual, count=2)]
 
-    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """None: all that a line may follow is explained."""
-        return []
-
-    def settled(self, parameters: Parameters, track: Track) -> Parameters:
-        """Any order."""
-        return parameters
-
-    def interpretation(self, parameters: Parameters, track: Track) -> str:
-        """Claim nothing."""
-        return self.meaning
+    # All that a line may follow is explained, at any order, and nothing claimed.
+    variants, settled = Effect.variants, Effect.settled
+    interpretation = Effect.interpretation
 
 
 class Tone(MainsHum):
@@ -43,6 +35,7 @@ class Tone(MainsHum):
     unnamed = True
     name = "unnamed_tone"
     meaning = "a line over time"
+    interpretation = Effect.interpretation
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Strongest frequency of the residual."""
@@ -57,7 +50,3 @@ class Tone(MainsHum):
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to what the rate can show."""
         return {"frequency_hz": (0.5 * LOWEST_HZ, 0.49 * track.rate_hz)}
-
-    def interpretation(self, parameters: Parameters, track: Track) -> str:
-        """Claim nothing."""
-        return self.meaning
