@@ -323,3 +323,17 @@ def test_a_gross_change_from_one_or_two_baseline_sessions_is_not_called_healthy(
     assert found["one session"].unknown_change == pytest.approx(0.303, abs=1e-3)
     assert np.isnan(found["six sessions"].unknown_change)
     assert known_fleet.judged("one session")[5].state == "healthy"
+
+
+def test_what_a_single_baseline_session_would_have_shown_lies_between_what_it_shows_and_not():
+    found = known_fleet.judged("one session")
+    assert found[2].state == "fault"
+    seen = found[2].effects["patterns"]
+    for axis in (1, 3, 5):
+        assert found[axis].effects["patterns"] < found[axis].least_effect < seen
+    strict = judge(
+        {axis: known_fleet.bundle(axis, 1, 1, (), 0.0).cells for axis in range(1, 6)},
+        Policy(false_alarm_rate=1e-4),
+    )
+    assert strict[1].least_effect > found[1].least_effect
+    assert np.isnan(known_fleet.judged("six sessions")[1].least_effect)
