@@ -28,7 +28,7 @@ one, four and sixteen files) the spread is 0.09, 0.15, 0.19 and 0.32; expected i
 and 0.28.
 """
 
-SPREAD_DOF = 12.0
+SPREAD_DOF = 8.0
 """Joints differ from what is expected as if it were known from 15, 12 and 8 sessions (closed loop,
 nights of one and of four files) or from many (sixteen files, fleets)."""
 
