@@ -7,9 +7,14 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from opamc_cli.decision.comparison import MAD_EFFICIENCY, Compared, Shift, compare_sessions
-from opamc_cli.decision.divergence.jensen_shannon import chance_divergence, jensen_shannon
+from opamc_cli.decision.divergence.jensen_shannon import (
+    chance_divergence,
+    effect_size,
+    jensen_shannon,
+)
 from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
 from opamc_cli.decision.significance.multiplicity import holm
 from opamc_cli.decision.significance.permutation import relabelled_p_value, relabellings
@@ -137,6 +142,8 @@ class Judgement:
     unknown_change: float
     """Relative change of the current's course or size, where one or two baseline sessions do not
     tell how much healthy ones differ by it; else NaN."""
+    least_effect: float
+    """Relative change of the patterns that a single baseline session would have shown; else NaN."""
     n_baseline_sessions: int
     n_target_sessions: int
     n_baseline_cycles: int
@@ -219,6 +226,16 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
                 if 0 < _present(cells[axis], "baseline") < HEARD_FROM
                 else math.nan
             ),
+            least_effect=(
+                least_effect(
+                    cells[axis],
+                    lone[axis] - compared[axis].shift.log_ratio,
+                    compared[axis].shift.spread,
+                    policy.false_alarm_rate / sum(map(math.isfinite, p_values.values())),
+                )
+                if axis in lone and math.isfinite(lone[axis])
+                else math.nan
+            ),
             n_baseline_sessions=_present(cells[axis], "baseline"),
             n_target_sessions=_present(cells[axis], "target"),
             n_baseline_cycles=max((len(cell.cycles) for cell in cells[axis]), default=0),
@@ -252,6 +269,37 @@ def one_session_log_ratio(cells: Sequence[Cell]) -> float:
         ratio = jensen_shannon(sessions, pool) / (chance + HEALTHY_SHIFT_BITS)
         ratios.append(float(np.mean(ratio)))
     return math.log(max(float(np.mean(ratios)), 1e-6)) if ratios else math.nan
+
+
+def least_effect(cells: Sequence[Cell], usual: float, spread: Spread, level: float) -> float:
+    """Relative change of the patterns from which a single baseline session shows one.
+
+    Parameters
+    ----------
+    cells : sequence of Cell
+        Motions and orders of an axis with a single baseline session.
+    usual : float
+        Log ratio of `one_session_log_ratio` at which healthy joints lie.
+    spread : Spread
+        Of it.
+    level : float
+        Probability at which a joint is called changed.
+
+    Returns
+    -------
+    float
+        Cohen's w of the divergence that lies at the level, the mean over motions and orders.
+    """
+    ratio = math.exp(min(usual - spread.scale * float(stdtrit(spread.dof, level)), 100.0))
+    excesses = []
+    for cell in cells:
+        pool, n = cell.baseline.sum(axis=0), cell.target.sum(axis=1)
+        if pool.sum() and n.any():
+            of_target = n[n > 0] / cell.inflation
+            chance = chance_divergence(pool, of_target, pool.sum() / cell.inflation)
+            excesses.append(float(np.mean(ratio * (chance + HEALTHY_SHIFT_BITS) - chance)))
+    # a divergence is one bit at most
+    return float(effect_size(min(float(np.mean(excesses)), 1.0))) if excesses else math.nan
 
 
 def one_session_shift(log_ratios: Mapping[int, float], axis: int) -> Shift:

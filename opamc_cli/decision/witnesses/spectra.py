@@ -23,10 +23,14 @@ INFLUENCED_SPREAD = 0.3
 """Expected spread of a healthy session's log distance if cycles have no noise.
 
 A few influences move all parts at once, so that their sum varies; that of many noisy parts hardly
-does. Where noise is 0.98, 0.97, 0.43 and 0.16 of the sessions' variance (closed loop, fleets,
-nights of four and of sixteen files) it is 0.09, 0.07, 0.27 and 0.38; not all of that is taken,
-since four sessions' worth of it is blended with the joint's own: healthy nights alarm in 1 % then.
+does. Where noise is 0.99, 0.70, 0.37 and 0.13 of the sessions' variance (closed loop, nights of
+one, four and sixteen files) the spread is 0.09, 0.15, 0.19 and 0.32; expected is 0.08, 0.14, 0.22
+and 0.28.
 """
+
+SPREAD_DOF = 8.0
+"""Joints differ from what is expected as if it were known from 15, 12 and 8 sessions (closed loop,
+nights of one and of four files) or from many (sixteen files, fleets)."""
 
 PARTS_IN_ONE = 3.0
 """Parts that are worth an independent one, as frames overlap: 2.5 to 5 where noise is all."""
@@ -76,7 +80,7 @@ class SpectrumEvidence:
         blocks = self.blocks()
         influenced = INFLUENCED_SPREAD * (1 - noise_share(blocks, self.n_baseline))
         n_parts = max(sum(block.sessions.shape[1] for block in blocks), 1)
-        return Spread(math.hypot(influenced, math.sqrt(2 * PARTS_IN_ONE / n_parts)), 4.0)
+        return Spread(math.hypot(influenced, math.sqrt(2 * PARTS_IN_ONE / n_parts)), SPREAD_DOF)
 
     def blocks(self) -> list[Block]:
         """Return the log powers of each motion's frames and bins."""

@@ -243,6 +243,11 @@ def _rest(judgement: Judgement, sources: Mapping[str, Sequence[RunSource]]) -> s
             "are widened to that of published healthy joints and of this robot's other joints; "
             "a few more healthy recordings on other days make the verdict sharper."
         )
+        if judgement.state == "healthy" and math.isfinite(judgement.least_effect):
+            text += (
+                f" Patterns that changed by less than {judgement.least_effect:.0%} would not have "
+                "been called changed."
+            )
     elif judgement.n_baseline_sessions < 4:
         text += " So few sessions say little of how much healthy ones vary; the limits are widened."
     return text

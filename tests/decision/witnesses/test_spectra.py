@@ -8,6 +8,7 @@ import pytest
 from opamc_cli.decision.witnesses.deviation import change_between
 from opamc_cli.decision.witnesses.spectra import (
     SpectrumCell,
+    SpectrumEvidence,
     clearest_change,
     size_effect,
     typical_ratio,
@@ -58,3 +59,13 @@ def test_the_typical_size_passes_over_motions_that_a_side_lacks():
     cells = [SpectrumCell(0, one, np.ones(4), np.ones(6), 2, 3, 5.0) for one in (whole, lacking)]
     assert typical_ratio(cells, 3) == pytest.approx(0.4)
     assert np.isnan(typical_ratio(cells[1:], 3))
+
+
+def test_sessions_of_one_cycle_are_expected_to_differ_by_more_than_noise_alone_does():
+    own, within = np.random.default_rng(0).normal(size=(6, 60)), np.ones(60)
+    noisy = SpectrumCell(0, own, np.full(6, 1.0), within, 6, 10, 5.0)
+    expected = {
+        name: SpectrumEvidence([replace(noisy, within=one)], 5).healthy_spread.scale
+        for name, one in {"noise": within, "unknown": within * np.nan, "none": 0 * within}.items()
+    }
+    assert expected["noise"] < expected["unknown"] < expected["none"]

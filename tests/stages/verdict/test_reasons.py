@@ -45,3 +45,21 @@ def test_what_one_baseline_session_cannot_tell_is_said():
     (said,) = reasons(judged, bundle, [], {"baseline": [], "target": []})
     assert said.startswith("Its current differs by 30% from 1 baseline session")
     assert "neither healthy nor changed" in said
+
+
+def test_what_one_baseline_session_would_have_missed_is_said():
+    judged = known_fleet.judged("one session")
+    entries = [
+        {
+            **{"motion": cell.motion, "order": cell.order, "tau": cell.tau},
+            **{"jsd_baseline": [0.02], "jsd_target": [0.03]},
+        }
+        for cell in known_fleet.bundle(1, 1, 1, (), 0.0).cells
+    ]
+    said = {}
+    for axis in (1, 2):
+        bundle = known_fleet.bundle(axis, 1, 1, (), 0.0)
+        text = " ".join(reasons(judged[axis], bundle, entries, {"baseline": [], "target": []}))
+        least = f"{judged[axis].least_effect:.0%}"
+        said[axis] = f"changed by less than {least} would not have been called changed" in text
+    assert said == {1: True, 2: False}
