@@ -126,6 +126,11 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
     return sorted(_as_logs(listed, pattern, robots), key=lambda one: (one.robot, one.path))
 
 
+def fits(pattern: str, path: str) -> bool:
+    """Whether a recording that is there no more was one of a pattern's."""
+    return _expression(pattern).fullmatch(path) is not None
+
+
 def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
     """List the folders of some robots that may not be listed: whatever lies there is not missing.
 
