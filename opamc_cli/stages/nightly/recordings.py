@@ -102,7 +102,8 @@ def find_recordings(
     logs += find_closed(cell.runs, tuple(robots))
     fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
     if not logs and not judged:
-        msg = f"{cell.runs}: no file fits this pattern; check `runs` of the cell's file"
+        of = f" of {some(named)}" if named else ""
+        msg = f"{cell.runs}: no file{of} fits this pattern; check `runs` of the cell's file"
         raise InputError(msg)
     known = sorted({*robots, *judged})
     for name in only or ():
