@@ -275,6 +275,7 @@ def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str,
             yield f"{scheme}://{fixed}/{below}", info.size, info.mtime_ns or 0
 
 
+@functools.cache
 def _expression(pattern: str) -> re.Pattern[str]:
     """Turn a pattern into a regular expression with the groups robot and night."""
     parts = re.split(r"(\{robot\}|\{night\}|\*\*/|\*|\?|\[[^\]]*\])", pattern)
