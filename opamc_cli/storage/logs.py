@@ -126,6 +126,11 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
     return sorted(_as_logs(listed, pattern, robots), key=lambda one: (one.robot, one.path))
 
 
+def fits(pattern: str, path: str) -> bool:
+    """Whether a recording that is there no more was one of a pattern's."""
+    return _expression(pattern).fullmatch(path) is not None
+
+
 def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
     """List the folders of some robots that may not be listed: whatever lies there is not missing.
 
@@ -270,6 +275,7 @@ def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str,
             yield f"{scheme}://{fixed}/{below}", info.size, info.mtime_ns or 0
 
 
+@functools.cache
 def _expression(pattern: str) -> re.Pattern[str]:
     """Turn a pattern into a regular expression with the groups robot and night."""
     parts = re.split(r"(\{robot\}|\{night\}|\*\*/|\*|\?|\[[^\]]*\])", pattern)

@@ -141,21 +141,10 @@ def _alarm(
     first = rows[found.raised]
     robot, axis = first["robot"], first["axis"]
     last = len(rows) if found.cleared is None else found.cleared
-    seen = [
-        row
-        for row in rows[max(0, last - MOST_NIGHTS) : last]
-        if row["state"] in JUDGED and row["distance"] is not None
-    ]
-    days = np.array([_day(row["night"]) for row in seen], dtype=np.float64)
-    distances = np.array([row["distance"] - (row["common"] or 0.0) for row in seen])
-    begun = onset(days, distances) if seen else 0
-    # a change that was there from the first night on has no before
-    since = min(seen[begun]["night"], rows[signal]["night"]) if seen else rows[signal]["night"]
-    begun = next((index for index, row in enumerate(seen) if row["night"] >= since), 0)
-    growing = seen[begun:]
-    slope = robust_slope(
-        days[begun:], np.array([row["effect"] or 0.0 for row in growing], dtype=np.float64)
-    )
+    since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
+    lately = rows[max(0, last - MOST_NIGHTS) : last]
+    growing = _measured([row for row in lately if row["night"] >= since])
+    slope = robust_slope(_days(growing), np.array([row["effect"] or 0.0 for row in growing]))
     trend: dict[str, Any] = {}
     if slope is not None and math.isfinite(slope.low) and math.isfinite(slope.high):
         reach = nights_until(slope, fault_effect)
@@ -203,6 +192,27 @@ def _alarm(
         trend=json.dumps(trend, sort_keys=True),
     )
     return alarm, events
+
+
+def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any]) -> str:
+    """Return the night in which a change began.
+
+    How it goes on after the alarm does not say: a distance grows ever faster, and then slower.
+    """
+    seen = _measured(until_raised)
+    if not seen:
+        return str(signal["night"])
+    begun = onset(_days(seen), np.array([row["distance"] - (row["common"] or 0.0) for row in seen]))
+    # a change that was there from the first night on has no before
+    return str(min(seen[begun]["night"], signal["night"]))
+
+
+def _measured(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    return [row for row in rows if row["state"] in JUDGED and row["distance"] is not None]
+
+
+def _days(rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
+    return np.array([_day(row["night"]) for row in rows], dtype=np.float64)
 
 
 def _last_stands(

@@ -4,11 +4,12 @@ import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
-from opamc_cli.stages.nightly.recordings import Recording
+from opamc_cli.stages.nightly.recordings import Recording, some
 from opamc_cli.storage.history import NightRow
 from opamc_cli.storage.logs import Facts
 
@@ -20,6 +21,10 @@ NIGHTS_AGAIN = 6
 
 MOST_ATTEMPTS = 3
 """Starts in which a night may break (time, memory, death of its worker) before it is left alone."""
+
+
+MOST_GONE = 6
+"""Recordings of a baseline that are gone of which every choice is tried: 64."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +46,8 @@ class Comparison:
     """Nights of a baseline that is complete, with or without their recordings."""
     lost: bool = False
     """Whether some of these have none any more."""
+    gone: tuple[Recording, ...] = ()
+    """Recordings that the others once had beside those that are left."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,10 @@ class Situation:
     """How the cell tells the healthy state."""
     fixed: Sequence[Recording]
     """Recordings that `baseline.runs` names."""
+    gone: Sequence[Recording]
+    """Recordings that are there no more."""
+    gone_fixed: Sequence[Recording]
+    """Those that `baseline.runs` names."""
     begun: Sequence[str]
     """Nights from which a baseline was declared to begin anew, ascending."""
     pinned: Mapping[tuple[str, str, str], Sequence[str]]
@@ -93,7 +104,7 @@ class RobotPlan:
     nights: tuple[PlannedNight, ...]
     complete: Mapping[tuple[str, str, str], tuple[str, ...]]
     thinned: tuple[tuple[str, str], ...] = ()
-    """Of baselines that lost recordings: the last night that is gone, and a sentence."""
+    """Of baselines that lost recordings: what is gone, and a sentence."""
 
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
@@ -116,6 +127,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     baselines = _Baselines(now, series, usable)
     nights = []
     known: dict[int, list[str]] = {}
+    before: dict[str, dict[str, tuple[Recording, ...]]] = {}
     broken_of: dict[str, list[Recording]] = {}
     judged_of: dict[str, list[Recording]] = {}
     programs_of: dict[str, list[str]] = {}
@@ -147,12 +159,18 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         if not comparisons and not broken:
             continue  # all its recordings belong to the fixed baseline
         key = _key(comparisons, broken, now.config_hash, known)
-        lost = any(one.lost for one in comparisons)
-        why = _why(key, now.recorded.get(night), lost)
+        now_there = json.loads(key)["baseline"]
+        if now_there not in before:
+            before[now_there] = _before(comparisons, known)
+        earlier = before[now_there]
+        record = now.recorded.get(night)
+        why = _why(key, record, any(one.lost for one in comparisons), earlier)
+        if record is not None and earlier and not why:
+            baselines.say_gone(earlier.get(json.loads(record.key)["baseline"], ()))
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
-    return RobotPlan(tuple(nights), baselines.complete, tuple(baselines.thinned.values()))
+    return RobotPlan(tuple(nights), baselines.complete, baselines.said())
 
 
 def _without_copies(recordings: Sequence[Recording]) -> list[Recording]:
@@ -198,9 +216,12 @@ class _Baselines:
         self._series = series
         self._usable = usable
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
-        self.thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
+        self._thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
+        self._gone: dict[str, str] = {}
         self._there: dict[tuple[str, str, str], dict[str, list[Recording]]] = {}
-        self._used: dict[tuple[str, str, str], tuple[Recording, ...]] = {}
+        self._used: dict[
+            tuple[str, str, str], tuple[tuple[Recording, ...], tuple[Recording, ...]]
+        ] = {}
 
     def comparison(
         self, program: str, condition: str, night: str, targets: tuple[Recording, ...]
@@ -232,18 +253,40 @@ class _Baselines:
             )
             return Comparison(program, condition, targets, (), "", why, tuple(members), True)
         if gone:
-            self.thinned[key] = (
+            self._thinned[key] = (
                 max(set(members) - set(left)),
                 f"the recordings of the baseline's nights {gone} cannot be used any more, "
                 f"{len(left)} nights are left; put them back, with fewer than {LEAST_NIGHTS} "
                 "nothing is judged",
             )
         if key not in self._used:
-            self._used[key] = tuple(one for n in left for one in self._there[key][n])
-        used = self._used[key]
+            used = tuple(one for n in left for one in self._there[key][n])
+            self._used[key] = used, tuple(self._gone_from(key, left))
+        used, lost = self._used[key]
         name = f"{name}, {condition}"
         of = tuple(members)
-        return Comparison(program, condition, targets, used, name, members=of, lost=bool(gone))
+        return Comparison(program, condition, targets, used, name, "", of, bool(gone), lost)
+
+    def say_gone(self, recordings: Sequence[Recording]) -> None:
+        """Have it said that a baseline has lost recordings that a night was judged with."""
+        self._gone |= {one.name: one.log.path for one in recordings}
+
+    def said(self) -> tuple[tuple[str, str], ...]:
+        """Return what is gone of baselines, each with a sentence; of one start they are one."""
+        text = (
+            f"of the baseline {some(sorted(self._gone.values()))} cannot be used any more; what "
+            "was judged stays, new nights are judged by the recordings that are left"
+        )
+        return (*self._thinned.values(), *((name, text) for name in sorted(self._gone)))
+
+    def _gone_from(self, key: tuple[str, str, str], left: Sequence[str]) -> Iterator[Recording]:
+        """Yield what nights of a baseline have lost; what was renamed is there."""
+        told_by_files = self._now.baseline.runs is not None and key[2] == self._now.baseline.runs
+        there = {one.sha256 for n in left for one in self._there[key][n]}
+        for one in self._now.gone_fixed if told_by_files else self._now.gone:
+            same = (one.facts.program, one.condition) == key[:2] and one.night in left
+            if same and not one.facts.error and one.sha256 not in there:
+                yield one
 
     def _first_nights(self, key: tuple[str, str, str]) -> list[str]:
         """Return the nights of a baseline that begins with the first ones; empty: too few yet."""
@@ -299,15 +342,12 @@ def _key(
         if id(one.baseline) not in known:
             # the same tuple for all nights of a baseline, alive as long as the plan is made
             known[id(one.baseline)] = sorted(_identity(one.baseline))
-    rest = [
-        [one.program, one.condition, one.missing, known[id(one.baseline)]] for one in comparisons
-    ]
     targets = [identity for one in comparisons for identity in _identity(one.targets)]
     return json.dumps(
         {
             "version": __version__,
             "config": config_hash,
-            "baseline": digest({"of": rest}),
+            "baseline": _baseline_digest(comparisons, known, ()),
             "members": digest({"of": [[one.program, one.members] for one in comparisons]}),
             "files": sorted([*targets, *_identity(broken)]),
         },
@@ -315,11 +355,46 @@ def _key(
     )
 
 
+def _baseline_digest(
+    comparisons: Sequence[Comparison], known: Mapping[int, list[str]], gone: Sequence[Recording]
+) -> str:
+    """Return the hash of what nights are compared with, and recordings that are gone beside it."""
+    rest = [
+        [
+            one.program,
+            one.condition,
+            one.missing,
+            sorted([*known[id(one.baseline)], *_identity([r for r in one.gone if r in gone])]),
+        ]
+        for one in comparisons
+    ]
+    return digest({"of": rest})
+
+
+def _before(
+    comparisons: Sequence[Comparison], known: Mapping[int, list[str]]
+) -> dict[str, tuple[Recording, ...]]:
+    """Return what the baselines may have had before, by its hash: they lose one after the other."""
+    gone = [recording for one in comparisons for recording in one.gone]
+    # of many, all at once: what was judged in between is judged anew
+    counts = range(1, len(gone) + 1) if len(gone) <= MOST_GONE else (len(gone),)
+    return {
+        _baseline_digest(comparisons, known, choice): choice
+        for count in counts
+        for choice in combinations(gone, count)
+    }
+
+
 def _identity(recordings: Sequence[Recording]) -> Iterator[str]:
     return (f"{one.name} {one.sha256[:24]}" for one in recordings)
 
 
-def _why(key: str, record: NightRow | None, lost: bool) -> str:
+def _why(
+    key: str,
+    record: NightRow | None,
+    lost: bool,
+    earlier: Mapping[str, object],
+) -> str:
     """Say why a night is to be done; empty if its record stands."""
     if record is None:
         return "new"
@@ -329,6 +404,7 @@ def _why(key: str, record: NightRow | None, lost: bool) -> str:
     if now["config"] != then["config"]:
         return "other options"
     # what was judged stays judged when its logs are cleared away, or some of its baseline's
+    lost = lost or then["baseline"] in earlier
     kept = lost and record.status != "failed" and now["members"] == then.get("members")
     if now["baseline"] != then["baseline"] and not kept:
         return "the baseline has changed"

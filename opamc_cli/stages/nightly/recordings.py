@@ -1,6 +1,6 @@
 """What is recorded of a cell: every file with its hash and facts, read once in its life."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
@@ -10,7 +10,15 @@ from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings.sessions import night_of
 from opamc_cli.storage.history import FileRow, History
-from opamc_cli.storage.logs import Facts, LogFile, fetch, find_closed, find_logs, read_facts
+from opamc_cli.storage.logs import (
+    Facts,
+    LogFile,
+    fetch,
+    find_closed,
+    find_logs,
+    fits,
+    read_facts,
+)
 from opamc_cli.storage.schemas import files
 
 EARLIEST_NIGHT = "2001-01-01"
@@ -59,6 +67,10 @@ class CellRecordings:
     """Recordings of each robot, by path; robots without any have an empty list."""
     baseline_by_robot: dict[str, list[Recording]]
     """Those that `baseline.runs` names."""
+    gone_by_robot: dict[str, list[Recording]]
+    """Recordings of which only the history knows any more."""
+    gone_of_baseline: dict[str, list[Recording]]
+    """Those that `baseline.runs` names."""
 
 
 def find_recordings(
@@ -90,7 +102,8 @@ def find_recordings(
     logs += find_closed(cell.runs, tuple(robots))
     fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
     if not logs and not judged:
-        msg = f"{cell.runs}: no file fits this pattern; check `runs` of the cell's file"
+        of = f" of {some(named)}" if named else ""
+        msg = f"{cell.runs}: no file{of} fits this pattern; check `runs` of the cell's file"
         raise InputError(msg)
     known = sorted({*robots, *judged})
     for name in only or ():
@@ -102,6 +115,8 @@ def find_recordings(
     result = CellRecordings(
         {robot: [] for robot in wanted},
         {robot: [] for robot in wanted},
+        {robot: [] for robot in wanted},
+        {robot: [] for robot in wanted},
     )
     for log in logs:
         if log.robot in result.by_robot:
@@ -110,6 +125,12 @@ def find_recordings(
         if log.robot in result.by_robot:
             result.baseline_by_robot[log.robot].append(reader.read(log))
     reader.finish()
+    for one in reader.gone({log.path for log in (*logs, *fixed)}):
+        robot, path = one.log.robot, one.log.path
+        if robot in wanted and fits(cell.runs, path):
+            result.gone_by_robot[robot].append(one)
+        if robot in wanted and cell.baseline.runs and fits(cell.baseline.runs, path):
+            result.gone_of_baseline[robot].append(one)
     return result
 
 
@@ -143,6 +164,16 @@ class _Reader:
                 self._new.append(row)
             if len(self._new) >= REMEMBER_EVERY:
                 self.finish()
+        return self._recording(log, row)
+
+    def gone(self, there: set[str]) -> Iterator[Recording]:
+        """Yield what is remembered of recordings that are not there."""
+        for row in self._known.values():
+            if row.path not in there:
+                log = LogFile(row.path, row.robot, row.night, row.size, row.mtime_ns)
+                yield self._recording(log, row)
+
+    def _recording(self, log: LogFile, row: FileRow) -> Recording:
         facts = Facts.from_json(row.facts)
         told = night_of(facts.started_at, self._starts_at(log.robot))
         night = log.night or (told.isoformat() if told else None)

@@ -231,6 +231,8 @@ def _robot_plan(
     situation = Situation(
         baseline=cell.baseline,
         fixed=recordings.baseline_by_robot[robot],
+        gone=recordings.gone_by_robot[robot],
+        gone_fixed=recordings.gone_of_baseline[robot],
         begun=past.begun.get(robot, ()),
         pinned=past.pinned.get(robot, {}),
         recorded=past.recorded.get(robot, {}),

@@ -19,6 +19,17 @@ def test_the_onset_is_found(kind):
     assert np.median(missed) <= (1 if kind == "step" else 4)
 
 
+def test_the_onset_of_wear_that_shows_late_is_found():
+    """Distances as of the virtual joints, log(1 + c s^4), until they alarm: lines find half."""
+    late = []
+    for seed in range(40):
+        rng = np.random.default_rng([12, seed])
+        severity = np.clip(np.arange(63.0) - 49, 0, None) / 90
+        values = np.log1p(7400 * severity**4) + rng.normal(0, 0.13, 63)
+        late.append(onset(np.arange(63.0), values) - 50)
+    assert np.mean(np.abs(late) <= 5) >= 0.75, late
+
+
 def test_awkward_series_have_an_onset():
     for values in ([], [1.0], [1.0, 1.0, 1.0], [0.0] * 10):
         assert 0 <= onset(np.arange(float(len(values))), np.array(values)) <= len(values)
@@ -30,8 +41,9 @@ def test_onsets_by_hand():
     for start in range(1, 6):
         step = np.where(np.arange(7) >= start, 3.0, 1.0)
         assert onset(nights, step) == start
-        rise = 1.0 + np.clip(nights - nights[start - 1], 0, None)
-        assert onset(nights, rise) == start
+        rise = np.clip(nights - nights[start - 1], 0, None)
+        assert onset(nights, 1.0 + rise) == start
+        assert onset(nights, 1.0 - rise**2) == start
     # two nights after it at least, and two before in all
     assert onset(nights, np.array([0.0] * 6 + [1.0])) < 6
     assert onset(np.arange(3.0), np.array([0.0, 5.0, 5.0])) == 0

@@ -6,9 +6,9 @@ from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
 from opamc_cli.storage.history import AlarmRow, NightRow
 
 
-def said(*states):
-    """Return what is said of a joint whose nights had these states."""
-    series = [
+def nights_of(states, distances=None):
+    """Return a joint's nights with these states."""
+    return [
         {
             "robot": "r1",
             "program": "",
@@ -17,7 +17,7 @@ def said(*states):
             "state": state,
             "baseline": "b",
             "harmless": 0,
-            "distance": 0.0,
+            "distance": 0.0 if distances is None else distances[day - 1],
             "common": 0.0,
             "effect": 0.0,
             "cause": None,
@@ -25,6 +25,11 @@ def said(*states):
         }
         for day, state in enumerate(states, start=1)
     ]
+
+
+def said(*states):
+    """Return what is said of a joint whose nights had these states."""
+    series = nights_of(states)
     return [one.text for one in settle_robot("r1", series, (), (), AlarmConfig(), 0.4, 6).events]
 
 
@@ -77,3 +82,16 @@ def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():
     robot = RobotSummary("r1", tuple(joints), None)
     first = "at fault; axis 2 changed more that night, look there first"
     assert [robot.text_of(joint) for joint in joints] == [first, "at fault", first, "at fault"]
+
+
+def test_since_does_not_move_with_the_nights_after_the_alarm():
+    """Distances that end on a plateau, as a joint that is worn out or a fault that stays."""
+    told = []
+    for after in range(14):
+        rise = [0.05 * (-1) ** day for day in range(10)] + [0.4, 0.7, 1.1, 1.8, 3.0]
+        distances = [*rise, *[5.0] * after]
+        series = nights_of(["healthy"] * 12 + ["fault"] * (len(distances) - 12), distances)
+        (alarm,) = settle_robot("r1", series, (), (), AlarmConfig(), 0.4, 6).alarms
+        told.append(alarm.since)
+    assert len(set(told)) == 1, told
+    assert told[0] in ("2026-03-10", "2026-03-11")

@@ -193,6 +193,51 @@ def test_a_baseline_of_dates_or_files_that_loses_nights_leaves_verdicts(cell, lo
     assert "are gone; put them back" in failed.out
 
 
+@pytest.mark.parametrize("rule", ["nights: 3", "runs: 'good/{robot}/*.parquet'"])
+def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, logs, opamc, rule):
+    shutil.rmtree(logs / "r3")
+    cell.write_text(cell.read_text().replace("nights: 3", rule))
+    good = cell.parent / "good" / "r1"
+    good.mkdir(parents=True)
+    places = {}
+    for index in (0, 1, 2):
+        folder = logs / "r1" / night(index)
+        for name in ("second", "third"):
+            set_clock(folder / "cycle.parquet", f"{night(index)}T23:0{len(name) - 5}:00+00:00")
+            places[index, name] = folder / f"{name}.parquet"
+            if "runs" in rule:
+                places[index, name] = good / f"{index}-{name}.parquet"
+            shutil.copy(folder / "cycle.parquet", places[index, name])
+        set_clock(folder / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
+        shutil.copy(folder / "cycle.parquet", good / f"{index}-first.parquet")
+    aside = cell.parent / "aside.parquet"
+
+    def to_do():
+        return opamc("nightly", cell, "--dry-run").out.splitlines()[-1].split()[0]
+
+    assert opamc("nightly", cell).code == ExitCode.DONE
+    assert to_do() == "0"
+    shutil.move(places[0, "second"], aside)
+    assert to_do() == "0"
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert first.out.startswith("r1 of the baseline ")
+    assert f"{places[0, 'second'].name} cannot be used any more; what was judged" in first.out
+    assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
+    add_night(logs, 5)
+    opamc("nightly", cell)
+    places[0, "third"].unlink()  # one more, which all nights were judged with
+    again = opamc("nightly", cell, "--quiet")
+    assert again.out.count(places[0, "third"].name) == 1
+    assert to_do() == "0"
+    shutil.move(aside, places[0, "second"])  # the last night was judged without it
+    assert to_do() == "1"
+    opamc("nightly", cell)
+    # another recording in the place of one that is gone is another baseline
+    places[1, "second"].rename(places[1, "second"].with_name("other.parquet"))
+    set_clock(places[1, "second"].with_name("other.parquet"), f"{night(1)}T22:30:00+00:00")
+    assert int(to_do()) >= 3
+
+
 def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc):
     logs = cell.parent / "logs"
     for robot in ("r2", "r3"):

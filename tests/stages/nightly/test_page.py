@@ -107,3 +107,15 @@ def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
     assert shot
     assert pixels.std() > 0.02  # something is drawn
     assert (pixels[5, 5].mean() < 0.5) == dark
+
+
+@needs_browser
+def test_a_phone_shows_since_when_of_alarms_alone(page, tmp_path):
+    told = (
+        "<script>document.title = [...document.querySelectorAll('td.since')]"
+        ".map((cell) => Number(cell.offsetHeight > 0)).join('')</script></body>"
+    )
+    copy = tmp_path / "index.html"
+    copy.write_text(page.read_text(encoding="utf-8").replace("</body>", told), encoding="utf-8")
+    dom = browse(tmp_path, copy, "--window-size=500,900", "--dump-dom")
+    assert f"<title>1{'0' * 17}</title>" in dom
