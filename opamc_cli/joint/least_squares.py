@@ -44,8 +44,5 @@ def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
     try:
         values, vectors = np.linalg.eigh(symmetric)
     except np.linalg.LinAlgError:
-        size = symmetric.shape[-1]
-        pairs = [eigh(one, driver="ev") for one in symmetric.reshape(-1, size, size)]
-        values = np.stack([pair[0] for pair in pairs]).reshape(symmetric.shape[:-1])
-        vectors = np.stack([pair[1] for pair in pairs]).reshape(symmetric.shape)
+        values, vectors = eigh(symmetric, driver="ev")
     return values, vectors

@@ -109,14 +109,19 @@ class Effect:
         """Tell whether the regressors stay the same whatever the fitted model is."""
         return self.from_motion
 
+    def ridge(self, parameters: Parameters) -> float:
+        """Share of its size that a fit adds to each regressor, where many are nearly alike."""
+        return 0.0
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Regressors, shape (n, m), for given non-linear parameters."""
-        raise NotImplementedError
+        return self.columns_at(track, parameters, np.arange(track.size))
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Regressors at some samples, shape (rows, m)."""
-        columns: Floats = self.columns(track, parameters)[rows]
-        return columns
+        if type(self).columns is Effect.columns:
+            raise NotImplementedError
+        return np.asarray(self.columns(track, parameters)[rows])
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

@@ -22,6 +22,9 @@ velocity loop answers as if nothing moved; and the highest one as a share of the
 FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 """From which power of a line on, in units of white noise's: each of their columns must earn its
 keep. Every other filter, and every fourth, are the smaller forms."""
+RIDGE = 1e-3
+"""Of an answer's regressors: a hundred filters that are nearly alike cancel one another into any
+offset or friction on a motion that repeats (docs/loop.md)."""
 MOST_EXPANDED = 2
 """Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5
@@ -92,12 +95,12 @@ class Ripple(Effect):
         """Only the load's sign and the current follow the model."""
         return not (parameters.get("load") or parameters.get("current"))
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Pairs of cosine and sine; those that follow the model come last."""
-        return self.columns_at(track, parameters, np.arange(track.size))
+    def ridge(self, parameters: Parameters) -> float:
+        """Of a drive's answer."""
+        return RIDGE if parameters.get("answer") else 0.0
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
-        """Likewise: of a hundred columns nothing is written that nobody looks at."""
+        """Pairs of cosine and sine of the samples that are asked for; the model's come last."""
         answering = _answering(track, parameters)
         at = track.machine_angle_rad if answering else track.machine_angle_rad[rows]
         turning = [np.cos(parameters["order"] * at), np.sin(parameters["order"] * at)]
@@ -178,7 +181,7 @@ def _filters(top_hz: float, density: float) -> int:
 
 
 def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
-    """Columns of a full form that a smaller one has, in the order of `Ripple.columns`."""
+    """Columns of a full form that a smaller one has, in the order of `Ripple.columns_at`."""
     densest, density = parameters.get("answer", 0.0), form.get("answer", 0.0)
     count = _filters(parameters["top_hz"], densest) if densest else 0
     step = round(densest / density) if density else count + 1

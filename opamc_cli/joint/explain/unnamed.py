@@ -56,12 +56,8 @@ class Smooth(Effect):
         """From a bend to sixteen half waves."""
         return [{"degree": degree} for degree in DEGREES]
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Cosines of the stretched covariate times each modifier."""
-        return self.columns_at(track, parameters, np.arange(track.size))
-
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
-        """Likewise."""
+        """Cosines of the stretched covariate times each modifier."""
         place = np.pi * stretched(self._covariate(track), track.moving, rows)
         waves = cosines(place, int(parameters["degree"]))[self._first :]
         return stack(*(part[rows] * wave for part in self._modifier(track) for wave in waves))
@@ -87,14 +83,13 @@ class Response(Effect):
         full = track.full or track
         factor = round(full.rate_hz / track.rate_hz)
         highest = min(60.0, full.rate_hz / 3)
-        columns = []
-        for frequency in geometric(1.5, highest, int(parameters["filters"])):
-            w = 2 * np.pi * frequency
-            for answer in answers(
-                [full.acceleration], w, RESPONSE_DAMPING, full.rate_hz, full.bounds
-            ):
-                columns.append(block_mean(answer, full.bounds, factor))
-        return stack(*columns)
+        parts = [
+            answers(
+                [full.acceleration], 2 * np.pi * hz, RESPONSE_DAMPING, full.rate_hz, full.bounds
+            )
+            for hz in geometric(1.5, highest, int(parameters["filters"]))
+        ]
+        return stack(*(block_mean(one, full.bounds, factor) for part in parts for one in part))
 
 
 class Shift(Effect):
@@ -171,11 +166,6 @@ def _load(track: Track) -> list[Floats]:
     return [np.sin(track.position_rad), np.cos(track.position_rad), track.acceleration]
 
 
-def _temperature(track: Track) -> Floats:
-    assert track.temperature_c is not None
-    return track.temperature_c
-
-
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), _direction),
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
@@ -188,6 +178,10 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("time_and_speed", "time", lambda t: t.time_s, _friction, needs=("position", "revisits")),
     Smooth("time_and_load", "load", lambda t: t.time_s, _load, needs=("scale", "revisits")),
     Smooth(
-        "temperature", "temperature", _temperature, _friction, needs=("position", "temperature")
+        "temperature",
+        "temperature",
+        lambda t: np.asarray(t.temperature_c),
+        _friction,
+        needs=("position", "temperature"),
     ),
 )

@@ -133,15 +133,21 @@ class Dataset:
         key = term.key, fine, *(one.key for one in beside)
         return self.cache.columns(key, lambda: term.columns(track, rows))
 
-    def sums(self, terms: Iterable[Term], fine: bool, *beside: Floats) -> Sums:
+    def sums(
+        self, terms: Sequence[Term], fine: bool, *beside: Floats, blocks: Sequence[Floats] = ()
+    ) -> Sums:
         """Products of terms' regressors, and others beside, with one another and the current.
 
-        Over each part; the others are given on the whole grid, (n, k).
+        Over each part; on the whole grid the others, (n, k), and the terms' if they are at hand.
         """
         fine = fine or self.coarse is self.fine
         grid = self.grid_of(fine)
-        blocks = [*(self.columns(term, fine) for term in terms), *beside]
-        return self.cache.sums(blocks, grid.track.current_a, grid.parts, fine)
+        blocks = blocks or [self.columns(term, fine) for term in terms]
+        sums = self.cache.sums([*blocks, *beside], grid.track.current_a, grid.parts, fine)
+        ridges = [term.effect.ridge(term.parameters) for term in terms]
+        ridge = np.repeat(ridges, [block.shape[1] for block in blocks])
+        sums.ridge[: ridge.size] = ridge
+        return sums
 
     def grid_of(self, fine: bool) -> Grid:
         """Return the fine or the coarse grid."""
@@ -388,8 +394,8 @@ def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:
     current = grid.track.current_a
     blocks = [dataset.columns(term, fine=True) for term in terms]
     widths = [block.shape[1] for block in blocks]
-    sums = dataset.sums((), True, *blocks)
-    solution = solve(sums.gram.sum(axis=0), sums.moment.sum(axis=0))
+    sums = dataset.sums(terms, True, blocks=blocks)
+    solution = solve(sums.damped(sums.gram.sum(axis=0)), sums.moment.sum(axis=0))
     coefficients = tuple(np.split(solution, np.cumsum(widths)[:-1])) if terms else ()
     pairs = zip(blocks, coefficients, strict=True)
     parts = (grid.spread(block @ values) for block, values in pairs)

@@ -90,8 +90,7 @@ class Parts:
     def elsewhere(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over all units but each one."""
         units = self.by_unit(values)
-        rest: Floats = units.sum(axis=0) - units
-        return rest
+        return np.asarray(units.sum(axis=0) - units)
 
     def products(self, left: Floats, right: Floats) -> Floats:
         """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
@@ -146,6 +145,13 @@ class Sums:
     moment: Floats
     power: Floats
     parts: Parts
+    ridge: Floats
+    """Share of each regressor's size that a fit adds to it; (k,)."""
+
+    def damped(self, gram: Floats) -> Floats:
+        """Add the ridge to products, shape (..., k, k)."""
+        sizes = self.ridge * np.diagonal(gram, axis1=-2, axis2=-1)
+        return np.asarray(gram + sizes[..., None] * np.eye(gram.shape[-1]))
 
     def without_drift(self, stretches: Ints) -> "Sums":
         """Allow the current another offset in each stretch, (p,) as `Parts.stretches` tells.
@@ -173,6 +179,7 @@ class Sums:
             (moment[:, :-1] - total * mean[:, None]) * varies,
             power - number * mean**2,
             parts,
+            self.ridge[:-1],
         )
 
     def less_last(self) -> "Sums":
@@ -180,7 +187,7 @@ class Sums:
         among = self.gram[:, :, -1]
         power = self.power - 2 * self.moment[:, -1] + among[:, -1]
         moment = (self.moment - among)[:, :-1]
-        return Sums(self.gram[:, :-1, :-1], moment, power, self.parts)
+        return Sums(self.gram[:, :-1, :-1], moment, power, self.parts, self.ridge[:-1])
 
     @cached_property
     def inverses(self) -> Floats:
@@ -189,14 +196,13 @@ class Sums:
         sizes = np.diagonal(rest, axis1=1, axis2=2)
         # What only one unit excites is nothing but rounding outside of it, of any sign.
         excited = sizes > ROUNDING * np.diagonal(self.gram.sum(axis=0))
-        return inverse(rest * (excited[:, :, None] & excited[:, None, :]))
+        return inverse(self.damped(rest * (excited[:, :, None] & excited[:, None, :])))
 
     @cached_property
     def coefficients(self) -> Floats:
         """Fit to all units but each one, shape (units, k)."""
         moment = self.parts.elsewhere(self.moment)
-        found: Floats = np.einsum("uij,uj->ui", self.inverses, moment)
-        return found
+        return np.asarray(np.einsum("uij,uj->ui", self.inverses, moment))
 
     def held_out(self) -> Floats:
         """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
@@ -206,11 +212,10 @@ class Sums:
         """Sum of squared errors of each part, (p,), with given coefficients, (k,) or (p, k)."""
         predicted = (self.gram @ coefficients[..., None])[..., 0]
         square = np.sum(coefficients * (predicted - 2 * self.moment), axis=-1)
-        error: Floats = np.maximum(self.power + square, ROUNDING * self.power)
-        return error
+        return np.asarray(np.maximum(self.power + square, ROUNDING * self.power))
 
 
 def _summed(values: Floats, places: Ints) -> Floats:
     """Sum parts' values over each place; places ascend from 0, and none is left out."""
-    summed: Floats = np.add.reduceat(values, np.flatnonzero(np.diff(places, prepend=-1)), axis=0)
-    return summed
+    firsts = np.flatnonzero(np.diff(places, prepend=-1))
+    return np.asarray(np.add.reduceat(values, firsts, axis=0))

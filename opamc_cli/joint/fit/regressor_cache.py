@@ -59,7 +59,8 @@ class RegressorCache:
             ],
             axis=1,
         )
-        return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts)
+        ridge = np.zeros(whole.shape[1] - 1)
+        return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts, ridge)
 
     def rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
         """Return the parts' rows of a regressor array."""

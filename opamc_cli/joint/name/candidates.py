@@ -84,7 +84,7 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     for term, keep in forms:
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
-        gain = float(beside.gains_of(cross[..., index], own, batch.moment[..., index])[0])
+        gain = float(beside.gains_of(term, cross[..., index], own, batch.moment[..., index])[0])
         found.append(judged(term, gain, index.size))
     return min(found, key=lambda one: one.score)
 
@@ -105,7 +105,7 @@ class Beside:
             self.fast_part = fast[self.parts.rows]
         else:
             blocks = [dataset.columns(term, True) for term in terms]
-            self.sums = dataset.sums((), True, *blocks)
+            self.sums = dataset.sums(terms, True, blocks=blocks)
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses
 
@@ -145,12 +145,13 @@ class Beside:
         if self.fast_part is not None:
             fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
             moment = moment - fast.reshape(moment.shape)
-        return self.gains_of(cross, batch.own, moment, whole=batch.terms[0].effect.whole)
+        return self.gains_of(batch.terms[0], cross, batch.own, moment)
 
-    def gains_of(
-        self, cross: Floats, own: Floats, moment: Floats, *, whole: bool = False
-    ) -> Floats:
-        """Likewise, from products: cross (p, K, b, w), own (p, K, w, w), moment (p, K, w)."""
+    def gains_of(self, term: Term, cross: Floats, own: Floats, moment: Floats) -> Floats:
+        """Likewise of terms like this one, from products.
+
+        These are cross (p, K, b, w), own (p, K, w, w), moment (p, K, w).
+        """
         unit, alone = self.parts.unit, self.sums.coefficients
         rest_cross, rest_own, rest_moment = (
             self.parts.elsewhere(one) for one in (cross, own, moment)
@@ -161,10 +162,18 @@ class Beside:
         width = own.shape[-1]
         # What nothing outside a unit excites has no coefficient there, nor what the model leaves
         # next to nothing of.
-        floor = SINGULAR_BELOW * (energy + 1e-3 * energy.max(axis=0, keepdims=True)) + 1e-200
+        floor = (
+            max(term.effect.ridge(term.parameters), SINGULAR_BELOW)
+            * (energy + 1e-3 * energy.max(axis=0, keepdims=True))
+            + 1e-200
+        )
         left = left + floor[..., None] * np.eye(width)
         asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, alone)
-        gamma = np.ones_like(asked) if whole else np.linalg.solve(left, asked[..., None])[..., 0]
+        gamma = (
+            np.ones_like(asked)
+            if term.effect.whole
+            else np.linalg.solve(left, asked[..., None])[..., 0]
+        )
         beta = alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
         gamma, beta = gamma[unit], beta[unit]
         sums = self.sums

@@ -156,20 +156,13 @@ def without(chain: Chain, place: int, rounds: int = MOST_ROUNDS) -> Chain:
 
 def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
     """Effects, with the lines that they are and their other parameters to two digits."""
-    return frozenset(
-        (
-            term.effect.name,
-            line_of(term, track),
-            tuple(
-                sorted(
-                    (k, float(f"{v:.2g}"))
-                    for k, v in term.parameters.items()
-                    if not (term.effect.several and k == next(iter(term.parameters)))
-                )
-            ),
-        )
-        for term in terms
-    )
+
+    def told(term: Term) -> tuple[object, ...]:
+        line = next(iter(term.parameters), None) if term.effect.several else None
+        rest = sorted((k, f"{v:.2g}") for k, v in term.parameters.items() if k != line)
+        return term.effect.name, line_of(term, track), *rest
+
+    return frozenset(map(told, terms))
 
 
 def line_of(term: Term, track: Track) -> float:

@@ -17,6 +17,7 @@ APPROXIMATE = 0.5
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 
+TURN = 2 * np.pi
 COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | None]]] = {
     "velocity": ("speed", "rad/s", True, lambda t, _: np.abs(t.velocity)),
     "acceleration": ("acceleration", "rad/s²", False, lambda t, _: t.acceleration),
@@ -28,20 +29,15 @@ COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | No
         "angle within the period",
         "turns",
         False,
-        lambda t, order: (order * t.machine_angle_rad / (2 * np.pi)) % 1.0,
+        lambda t, k: (k * t.machine_angle_rad / TURN) % 1,
     ),
     "electrical": (
         "electrical angle",
         "turns",
         False,
-        lambda t, _: None if t.electrical_rad is None else (t.electrical_rad / (2 * np.pi)) % 1.0,
+        lambda t, _: None if t.electrical_rad is None else (t.electrical_rad / TURN) % 1,
     ),
-    "frequency": (
-        "time within the period",
-        "periods",
-        False,
-        lambda t, frequency_hz: (frequency_hz * t.time_s) % 1.0,
-    ),
+    "frequency": ("time within the period", "periods", False, lambda t, hz: (hz * t.time_s) % 1),
 }
 """Of each domain: name, unit, whether friction resists there, and its values, (n,) or None."""
 
@@ -75,11 +71,9 @@ def share_of_form(best: Chain, drop: float, term: Term, unnamed: Pool) -> float:
         for name, effect in unnamed.library.items()
         if effect.domain == term.effect.domain and not effect.fast
     }
-    more = 0.0
-    for trial in trials(best, replace(unnamed, library=library, least_share=0.0)):
-        gained = best.mean_square - trial.chain.mean_square
-        if trial.t_value > LEAST_T and trial.chain.score < best.score:
-            more = max(more, gained)
+    tried = trials(best, replace(unnamed, library=library, least_share=0.0))
+    better = [one for one in tried if one.t_value > LEAST_T and one.chain.score < best.score]
+    more = max([0.0, *(best.mean_square - one.chain.mean_square for one in better)])
     return max(drop, 0.0) / max(drop + more, 1e-300)
 
 

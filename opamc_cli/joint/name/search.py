@@ -23,8 +23,6 @@ MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
 TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
-PROMISING = 0.25
-"""Share of the best candidate's fall in the score below which none is refined."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
             for parameters in effect.guesses(dataset.fine.track, residual):
                 note(best_form(dataset, fast, Term(effect, parameters)))
     ordered = sorted(found.values(), key=lambda candidate: candidate.score)
-    least = min(PROMISING * ordered[0].score, 0.0) if ordered and not every else np.inf
+    least = np.inf if every else 0.0
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow

@@ -41,6 +41,6 @@ def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
     gains = []
     for _ in range(DECOYS):
         signs = draw.choice([-1.0, 1.0], size=fine.units)[fine.unit]
-        left = Sums(gram, moment * signs[:, None], power, fine).held_out()
+        left = Sums(gram, moment * signs[:, None], power, fine, np.zeros(gram.shape[-1])).held_out()
         gains.append(1.0 - float(left.sum()) / max(float(power.sum()), 1e-300))
     return max(gains)

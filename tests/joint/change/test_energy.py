@@ -25,7 +25,8 @@ def compared_of(before, after):
     def sums(terms, fine=False, taken=None):
         ones = np.ones((count, len(terms)))
         gram = currents.shape[1] * ones[:, :, None] * ones[:, None, :]
-        return Sums(gram, currents.sum(axis=1)[:, None] * ones, (currents**2).sum(axis=1), parts)
+        moment, power = currents.sum(axis=1)[:, None] * ones, (currents**2).sum(axis=1)
+        return Sums(gram, moment, power, parts, np.zeros(len(terms)))
 
     return SimpleNamespace(after=np.arange(count) >= len(before), sums=sums)
 
