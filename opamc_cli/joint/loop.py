@@ -10,7 +10,7 @@ from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnam
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.smoothing import measurement_noise
-from opamc_cli.joint.name.chain import Chain, chain_of, extended, without
+from opamc_cli.joint.name.chain import Chain, chain_of, extended, released, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
@@ -119,6 +119,7 @@ def close_loop(
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
+    final, only_named = released(final), released(only_named)
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]

@@ -146,8 +146,7 @@ def travel_since_reversal(track: Track) -> Floats:
     path = np.cumsum(np.abs(np.diff(track.position_rad, prepend=track.position_rad[:1])))
     known = np.maximum.accumulate(np.where(track.direction != 0, np.arange(track.size), 0))
     turned = np.diff(track.direction[known], prepend=np.nan) != 0
-    since: Floats = path - np.maximum.accumulate(np.where(turned, path, 0.0))
-    return since
+    return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0)))
 
 
 def _direction(track: Track) -> list[Floats]:
@@ -166,6 +165,7 @@ def _load(track: Track) -> list[Floats]:
     return [np.sin(track.position_rad), np.cos(track.position_rad), track.acceleration]
 
 
+WARM = ("position", "temperature")
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), _direction),
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
@@ -177,11 +177,5 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),
     Smooth("time_and_speed", "time", lambda t: t.time_s, _friction, needs=("position", "revisits")),
     Smooth("time_and_load", "load", lambda t: t.time_s, _load, needs=("scale", "revisits")),
-    Smooth(
-        "temperature",
-        "temperature",
-        lambda t: np.asarray(t.temperature_c),
-        _friction,
-        needs=("position", "temperature"),
-    ),
+    Smooth("temperature", "temperature", lambda t: np.asarray(t.temperature_c), _friction, WARM),
 )

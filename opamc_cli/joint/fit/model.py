@@ -95,6 +95,8 @@ class Dataset:
     """What is left out as one, and what is sealed."""
     opened: "Dataset | None" = None
     """The same open samples with some of every sealed group beside them, where `fine` has none."""
+    held: bool = True
+    """Whether effects of many regressors are fitted with their ridge."""
     cache: RegressorCache = field(default_factory=RegressorCache, repr=False, compare=False)
     """Regressors and products that fits share."""
 
@@ -144,7 +146,7 @@ class Dataset:
         grid = self.grid_of(fine)
         blocks = blocks or [self.columns(term, fine) for term in terms]
         sums = self.cache.sums([*blocks, *beside], grid.track.current_a, grid.parts, fine)
-        ridges = [term.effect.ridge(term.parameters) for term in terms]
+        ridges = [self.held * term.effect.ridge(term.parameters) for term in terms]
         ridge = np.repeat(ridges, [block.shape[1] for block in blocks])
         sums.ridge[: ridge.size] = ridge
         return sums
@@ -278,7 +280,7 @@ class Fit:
             return self
         # This is the end: what is kept would only take memory from here on.
         self.dataset.cache.clear()
-        return fit_terms(dataset, self.terms)
+        return fit_terms(replace(dataset, held=self.dataset.held), self.terms)
 
     def rmse(self, sealed: bool) -> float:
         """Root mean square residual on the open or on the sealed samples."""

@@ -80,8 +80,7 @@ class Parts:
                 place, both = place + 1, np.zeros(2)
         if place < FEWEST_STRETCHES:
             return halves
-        found: Ints = np.minimum(stretch, place - 1)[halves]
-        return found
+        return np.asarray(np.minimum(stretch, place - 1)[halves])
 
     def by_unit(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over each unit."""

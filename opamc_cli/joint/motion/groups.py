@@ -118,8 +118,7 @@ def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:
     if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None
     group = np.full(moving.size, -1, dtype=np.int64)
-    chunks = np.array_split(indices, BLOCKS_WITHOUT_CYCLES)
-    for i, chunk in enumerate(chunks):
+    for i, chunk in enumerate(np.array_split(indices, BLOCKS_WITHOUT_CYCLES)):
         group[chunk[0] : chunk[-1] + 1] = i
     names = tuple(f"{run_names[0]}:block{i}" for i in range(BLOCKS_WITHOUT_CYCLES))
     return Grouping(group, names, SEALED_BLOCKS, "blocks")

@@ -186,5 +186,4 @@ class Beside:
         counts = self.parts.counts[self.counted]
         before = deviation_of(self.before[self.counted], counts).sum()
         after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
-        gain: Floats = 1.0 - (after / max(before, 1e-300)) ** 2
-        return gain
+        return np.asarray(1.0 - (after / max(before, 1e-300)) ** 2)

@@ -1,6 +1,6 @@
 """A chain of effects: a fit with what it predicts of data that it was not fitted to."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -137,8 +137,7 @@ def chain_of(fit: Fit, added: int) -> Chain:
 
 def deviation_of(error: Floats, counts: Floats) -> Floats:
     """Root mean squares times samples, from sums of squares over the first axis' parts."""
-    found: Floats = np.sqrt(np.maximum(error, 0.0) * counts)
-    return found
+    return np.asarray(np.sqrt(np.maximum(error, 0.0) * counts))
 
 
 def extended(chain: Chain, *terms: Term, rounds: int = MOST_ROUNDS) -> Chain:
@@ -152,6 +151,12 @@ def without(chain: Chain, place: int, rounds: int = MOST_ROUNDS) -> Chain:
     place += len(chain.fit.terms) - chain.added
     terms = chain.fit.terms[:place] + chain.fit.terms[place + 1 :]
     return chain_of(fit_terms(chain.fit.dataset, terms, rounds), chain.added - 1)
+
+
+def released(chain: Chain) -> Chain:
+    """Fit a chain without ridges, where it predicts held-out data better so."""
+    free = fit_terms(replace(chain.fit.dataset, held=False), chain.fit.terms)
+    return min(chain, chain_of(free, chain.added), key=lambda one: one.score)
 
 
 def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
