@@ -155,6 +155,8 @@ def without(chain: Chain, place: int, rounds: int = MOST_ROUNDS) -> Chain:
 
 def released(chain: Chain) -> Chain:
     """Fit a chain without ridges, where it predicts held-out data better so."""
+    if not any(term.effect.ridge(term.parameters) for term in chain.terms):
+        return chain
     free = fit_terms(replace(chain.fit.dataset, held=False), chain.fit.terms)
     return min(chain, chain_of(free, chain.added), key=lambda one: one.score)
 

@@ -211,7 +211,7 @@ def _failure(loop: Loop) -> str | None:
             f"the model predicts sealed data no better than their mean (r2 {loop.r2_after:.2g}): "
             "check gear ratio, pole pairs, units and phases"
         )
-    times = loop.rmse_after_a / loop.after.rmse(sealed=False)
+    times = loop.rmse_after_a / max(loop.after.rmse(sealed=False), 1e-300)
     return f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"
 
 

@@ -19,6 +19,7 @@ from opamc_cli.joint.name.chain import (
     extended,
     line_of,
     price_of,
+    released,
     signature_of,
     without,
 )
@@ -232,6 +233,23 @@ def test_what_is_put_in_can_be_taken_out_again(chain):
         assert (shorter.added, shorter.terms) == (1, (kept,))
         np.testing.assert_allclose(shorter.error, direct.error)
     assert extended(chain, spring, speed).error == pytest.approx(longer.error)
+
+
+def test_a_drive_s_answer_is_held_and_let_go_of_where_that_predicts_better(chain):
+    offset = Term(LIBRARY["offset"], {})
+    assert released(extended(chain, offset)).fit.dataset.held
+    form = {"order": 40.0, "direction": 1.0, "answer": 2.0, "top_hz": 20.0}
+    held = extended(chain, Term(LIBRARY["ripple"], form))
+    sizes = [values.size for values in held.fit.coefficients]
+    assert set(held.fit.sums.ridge[: -sizes[-1]]) == {0.0}
+    assert set(held.fit.sums.ridge[-sizes[-1] :]) == {1e-3}
+    free = fit_terms(replace(held.fit.dataset, held=False), held.fit.terms)
+    assert not free.sums.ridge.any()
+    # Nothing repeats at this order: filters that cancel one another only fit the noise.
+    answer, unheld = (fit.coefficients[-1] for fit in (held.fit, free))
+    assert np.linalg.norm(answer) < 0.5 * np.linalg.norm(unheld)
+    better = min(held, chain_of(free, held.added), key=lambda one: one.score)
+    assert released(held).score == better.score
 
 
 def test_on_one_grid_the_error_is_that_of_the_parts_that_are_judged(chain):
