@@ -342,9 +342,10 @@ class Joint:
         joined = soft_maximum(np.array(list(rows.values())), self.weights(rows))
         values = np.exp(np.clip(joined, -300, 300))
         relabelled = relabelled_p_value(values, self.n_baseline + self.n_target)
-        # Half-changed labellings fatten the tail of a gross change. Where none exceeds the
-        # observed one, the pairs' own tail may go below it, doubled for the second look.
-        return min(relabelled, 2 * tail) if (values[1:] < values[0]).all() else relabelled
+        if (values[1:] >= values[0]).any():
+            return relabelled
+        # the first of all is in the lowest step; how deep in it, only the tails know
+        return min(max(relabelled, 0.5 / len(labels)), max(tail, 1e-300))
 
 
 def scales_of(joints: Iterable[Joint]) -> dict[Voice, float]:

@@ -11,6 +11,7 @@ from opamc_cli.decision.witnesses.evidence import soft_maximum
 from opamc_cli.decision.witnesses.patterns import Cell, PatternEvidence
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
+from tests.decision.fleet import Fleet, cells, spectra
 
 BINS = 40
 
@@ -109,6 +110,25 @@ def test_several_targets_are_exchanged_as_whole_sessions():
     healthy = compared({1: joint(3, n_target=3)}, n_target=3)[1]
     assert changed.p_value < 0.01
     assert healthy.p_value > 0.01
+
+
+def test_the_first_of_all_labellings_is_in_the_lowest_step_and_no_deeper_by_its_rank():
+    """Ten labellings of three sessions against three: how far apart they lie says no more."""
+    plan, first = Fleet(n_baseline=3, n_target=3, n_axes=3, n_motions=1, influences=1), 0
+    for seed in range(20):
+        patterns, powers = cells(plan, seed), spectra(plan, seed)
+        joints = {
+            axis: {
+                "patterns": PatternEvidence(own),
+                "spectrum": SpectrumEvidence(powers[axis], 3),
+            }
+            for axis, own in patterns.items()
+        }
+        found = compare_sessions(joints, dict.fromkeys(joints, (3, 3)), 1000, 0)
+        for one in found.values():
+            first += one.p_value <= 1 / 10
+            assert one.p_value >= min(0.5 / 10, min(one.witnesses.values()))
+    assert first
 
 
 def test_how_far_in_a_healthy_session_lies_is_uniform_below_the_last_rank():
