@@ -112,7 +112,6 @@ def close_loop(
     pool = Pool.of(before.dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
-    # Beside a function without a name an effect may no longer be worth its price.
     final = worth_their_price(beam(best, unnamed, width=1))
     if "unnamed" not in without_rules:  # Or beside the functions that explain most.
         beside = worth_their_price(extended(explained, *(one.term for one in named)))

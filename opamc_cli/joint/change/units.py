@@ -11,7 +11,7 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.smoothing import SHORTEST_WINDOW
+from opamc_cli.joint.motion.smoothing import CORNER_WINDOW, averaging_kernel
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, coarsen, joined
 
 FEWEST_SAMPLES = 10
@@ -108,8 +108,9 @@ def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
     track = joined(tracks)
     # a noisy path's acceleration, averaged over less, hides friction: a ball screw without grease
     # was viscous or dry friction in 6 of 10 draws, and is in 10
-    noisy = "logged" in track.channels and track.kernel.size > SHORTEST_WINDOW
-    width = (1.4 if noisy else 0.8) / float(np.sum(track.kernel**2))
+    kernel = max(track.kernel, averaging_kernel(CORNER_WINDOW, 2), key=len)
+    noisy = "logged" in track.channels and kernel.size > CORNER_WINDOW
+    width = (1.4 if noisy else 0.8) / float(np.sum(kernel**2))
     factor = max(int(track.rate_hz / COARSE_RATE_HZ), int(width), 1)
     coarse = coarsen(track, factor)
     fine = replace(track, moving=track.moving & track.clear)

@@ -6,6 +6,9 @@ from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
+MOST_DAMPED = 0.25
+"""Damping ratio: joints have 0.02 to 0.15."""
+
 
 class Elasticity(Effect):
     """Response of a sprung load to the acceleration: what it adds to the rigid model.
@@ -36,7 +39,7 @@ class Elasticity(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to what the grid can show; damped more, nothing rings."""
-        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
+        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, MOST_DAMPED)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
@@ -48,8 +51,12 @@ class Elasticity(Effect):
         return stack(*(block_mean(one, full.bounds, factor) for one in (load - acceleration, rate)))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
-        return bool(coefficients[0] > 0 and abs(coefficients[1]) < coefficients[0])
+        """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
+
+        What would rather be damped more than the limits allow does not ring.
+        """
+        rings = parameters["damping"] < MOST_DAMPED
+        return bool(rings and coefficients[0] > 0 and abs(coefficients[1]) < coefficients[0])
 
 
 def _highest(track: Track) -> float:

@@ -13,6 +13,7 @@ from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.phases.torque_axis import side_of_torque, torque_current
 from opamc_cli.joint.motion.smoothing import (
+    CORNER_WINDOW,
     SHORTEST_WINDOW,
     averaging_kernel,
     blurred,
@@ -354,7 +355,8 @@ def _one(
     moving = moving_samples(motion, usable)
     # Of vibration the window takes a little everywhere.
     uncertain = max(motion.taken_noise, LEAST_CORNER * float(np.std(motion.acceleration)))
-    clear = clear_of_corners(motion.acceleration, current, moving, motion.kernel, uncertain)
+    kernel = max(motion.kernel, averaging_kernel(CORNER_WINDOW, 2), key=len)
+    clear = clear_of_corners(motion.acceleration, current, moving, kernel, uncertain)
     if motion.window <= SHORTEST_WINDOW:
         # The coarse grid has no counterpart for so short an average.
         moving &= clear

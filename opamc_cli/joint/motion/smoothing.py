@@ -8,7 +8,9 @@ from scipy.ndimage import correlate1d
 from opamc_cli.joint.motion.track import Floats, Ints
 
 POLYNOMIAL_ORDER = 3
-SHORTEST_WINDOW = 5
+SHORTEST_WINDOW = 3
+CORNER_WINDOW = 5
+"""Samples that show what the shortest window, which takes nothing a second time, may take."""
 LONGEST_WINDOW_S = 0.2
 LONGEST_WINDOW = 15
 """Samples that a window may have however long they last: of a noisy position logged at 25 Hz, five
@@ -72,7 +74,7 @@ def polynomial_weights(rate_hz: float, window: int, derivative: int, at: int | I
     """
     half = window // 2
     places = np.arange(-half, half + 1) / half
-    fit = np.linalg.pinv(np.vander(places, POLYNOMIAL_ORDER + 1, increasing=True))
+    fit = np.linalg.pinv(np.vander(places, min(POLYNOMIAL_ORDER + 1, window), increasing=True))
     place = np.asarray(at) / half
     asked = [perm(k, derivative) * place ** max(k - derivative, 0) for k in range(len(fit))]
     weights: Floats = np.stack(asked, axis=-1) @ fit * (rate_hz / half) ** derivative

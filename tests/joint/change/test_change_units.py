@@ -21,6 +21,7 @@ from sessions import (
 from opamc_cli.joint.change.units import followed, own_fit, read_side, side_by_side
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.smoothing import CORNER_WINDOW, SHORTEST_WINDOW, averaging_kernel
 from opamc_cli.joint.motion.track import block_mean
 
 
@@ -51,7 +52,8 @@ def test_a_unit_s_samples_move_and_are_clear(units):
 @pytest.mark.parametrize("rate", [100.0, 450.0])
 def test_the_coarse_grid_has_a_hundred_hertz_or_what_smoothing_leaves(rate):
     units = units_of(before=1, after=1, rate=rate)
-    width = 1 / np.sum(units.track.kernel**2)
+    assert units.track.kernel.size == SHORTEST_WINDOW
+    width = 1 / np.sum(averaging_kernel(CORNER_WINDOW, 2) ** 2)
     factor = max(int(rate / 100.0), int(0.8 * width), 1)
     assert units.dataset.coarse.track.rate_hz == rate / factor
 
@@ -98,10 +100,8 @@ def test_the_own_fit_finds_the_coefficients_and_leaves_the_noise(units):
             ))  # fmt: skip
             slow = np.linalg.lstsq(columns, current)[0]
             assert left[unit] == pytest.approx(np.mean((current - columns @ slow) ** 2))
-        if fine:
-            np.testing.assert_allclose(left, 0.02**2, rtol=0.2)
-        else:
-            assert left.max() < 0.02**2 / units.dataset.factor
+        factor = 1 if fine else units.dataset.factor
+        np.testing.assert_allclose(left, 0.02**2 / factor, rtol=0.2)
 
 
 def test_what_is_taken_is_fitted_no_more_and_the_blur_stands_beside(units):

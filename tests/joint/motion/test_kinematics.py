@@ -51,13 +51,13 @@ def test_a_part_of_a_recording_has_that_part_of_every_channel():
 def test_ways_to_differentiate_are_windows_that_fit_and_speeds_that_were_logged():
     alone = smoothings([recorded(position_rad=PLACE)])
     assert [(one.window_s, one.from_velocity) for one in alone] == [
-        (0.02, False), (0.05, False), (0.12, False)
+        (0.01, False), (0.02, False), (0.05, False), (0.12, False)
     ]  # fmt: skip
     both = smoothings([recorded(position_rad=PLACE, velocity_rad_s=SPEED)])
     assert len(both) == 2 * len(alone)
     assert smoothings([recorded(position_rad=PLACE), recorded()]) == []
     short = recorded(position_rad=PLACE).cut(slice(0, 10))
-    assert [one.window_s for one in smoothings([short])] == [0.02]
+    assert [one.window_s for one in smoothings([short])] == [0.01, 0.02]
 
 
 def test_motion_is_the_derivative_of_what_was_logged():

@@ -86,7 +86,7 @@ def test_a_name_that_holds_nine_tenths_of_a_function_keeps_its_place():
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
 
 
-@pytest.mark.parametrize("resonance_hz", [6.0, 12.0])
+@pytest.mark.parametrize("resonance_hz", [18.0, 25.0])
 def test_a_ripple_that_shakes_the_measured_motion_keeps_its_name(resonance_hz):
     """What looks at the acceleration fits the current better: the acceleration is the ripple's."""
     rng, rate, order, w = np.random.default_rng(2), 1000.0, 60.0, 2 * np.pi * resonance_hz
