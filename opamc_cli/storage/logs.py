@@ -71,6 +71,8 @@ class Facts:
     """With `speed_percent`, `payload_kg`: its conditions."""
     started_at: str | None = None
     """ISO 8601."""
+    robot: str = ""
+    """That it names; empty if it names none."""
     error: str = ""
     """Why it is no recording; empty if it is one."""
 
@@ -83,6 +85,7 @@ class Facts:
             info.payload_kg,
             info.sampling_rate_hz,
             info.started_at,
+            info.robot or "",
         )
 
     @classmethod

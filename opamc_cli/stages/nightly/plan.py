@@ -341,15 +341,15 @@ def _key(
     for one in comparisons:
         if id(one.baseline) not in known:
             # the same tuple for all nights of a baseline, alive as long as the plan is made
-            known[id(one.baseline)] = sorted(_identity(one.baseline))
-    targets = [identity for one in comparisons for identity in _identity(one.targets)]
+            known[id(one.baseline)] = sorted(map(identity, one.baseline))
+    targets = [identity(one) for each in comparisons for one in each.targets]
     return json.dumps(
         {
             "version": __version__,
             "config": config_hash,
             "baseline": _baseline_digest(comparisons, known, ()),
             "members": digest({"of": [[one.program, one.members] for one in comparisons]}),
-            "files": sorted([*targets, *_identity(broken)]),
+            "files": sorted([*targets, *map(identity, broken)]),
         },
         sort_keys=True,
     )
@@ -364,7 +364,7 @@ def _baseline_digest(
             one.program,
             one.condition,
             one.missing,
-            sorted([*known[id(one.baseline)], *_identity([r for r in one.gone if r in gone])]),
+            sorted([*known[id(one.baseline)], *(identity(r) for r in one.gone if r in gone)]),
         ]
         for one in comparisons
     ]
@@ -385,8 +385,9 @@ def _before(
     }
 
 
-def _identity(recordings: Sequence[Recording]) -> Iterator[str]:
-    return (f"{one.name} {one.sha256[:24]}" for one in recordings)
+def identity(one: Recording) -> str:
+    """Return how a night's key calls a recording."""
+    return f"{one.name} {one.sha256[:24]}"
 
 
 def _why(

@@ -21,6 +21,7 @@ from opamc_cli.stages.nightly.recordings import (
     some,
 )
 from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
+from opamc_cli.stages.nightly.strangers import said_of_baselines, without_strangers
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import (
@@ -94,6 +95,7 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     outcome = CellOutcome()
     past = _Past(history)
+    recordings = _own(recordings, past)
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
@@ -142,6 +144,18 @@ def run(
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     jobs_of: dict[tuple[str, str], PlannedNight] = {}
     past = _Past(history)
+    recordings = _own(recordings, past)
+    outcome.thinned += [
+        Event(
+            one.night,
+            robot,
+            None,
+            "lacking",
+            f"its baseline: {one.log.path} has the same bytes as {other.log.path} of "
+            f"{other.log.robot}",
+        )
+        for robot, one, other in said_of_baselines(recordings.baseline_by_robot)
+    ]
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         for key, members in planned.complete.items():
@@ -221,6 +235,11 @@ class _Past:
         self.begun: dict[str, list[str]] = {}
         for robot, night in begun_anew(history.declared()):
             self.begun.setdefault(robot, []).append(night)
+
+
+def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:
+    own = without_strangers(recordings.by_robot, recordings.beside, past.recorded)
+    return replace(recordings, by_robot=own)
 
 
 def _robot_plan(
