@@ -21,7 +21,11 @@ from opamc_cli.stages.nightly.recordings import (
     some,
 )
 from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
-from opamc_cli.stages.nightly.strangers import said_of_baselines, without_strangers
+from opamc_cli.stages.nightly.strangers import (
+    said_of_baselines,
+    several_named,
+    without_strangers,
+)
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import (
@@ -441,11 +445,12 @@ def _record(
             text = f"{one.night} axis {one.axis} {one.state}, was {was} ({night.why})"
             news.append(Event(one.night, one.robot, one.axis, "judged-anew", text))
     for result in judged:
-        if result.of_baseline:
+        held = next(one for one in night.comparisons if one.program == result.program)
+        wrong = [*result.of_baseline, *several_named(held.baseline)]
+        if wrong:
             # dated by the baseline: the same of all nights that are held against it
-            held = next(one for one in night.comparisons if one.program == result.program)
             last = max(one.night for one in held.baseline)
-            text = f"its baseline: {'; '.join(_first(result.of_baseline))}"
+            text = f"its baseline: {'; '.join(_first(wrong))}"
             news.append(Event(last, night.robot, None, "lacking", text))
     history.record_night(row, verdicts, measures, news)
     _note(outcome, row)

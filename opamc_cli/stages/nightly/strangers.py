@@ -1,7 +1,7 @@
 """Recordings that lie under one robot and are another's: by their bytes, or by what they say."""
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 
@@ -56,6 +56,14 @@ def said_of_baselines(fixed: ByRobot) -> list[tuple[str, Recording, Recording]]:
         for one in copies
         if (other := _of_another(one, copies)).log.path != one.log.path
     ]
+
+
+def several_named(baseline: Sequence[Recording]) -> Iterator[str]:
+    """Say that recordings of one baseline name several robots; one of them is a stranger."""
+    named = {one.facts.robot: one.log.path for one in reversed(baseline) if one.facts.robot}
+    if len(named) > 1:
+        found = ", ".join(f"{path} {robot}" for robot, path in sorted(named.items()))
+        yield f"its recordings name several robots ({found}); it is of one"
 
 
 def _held_by_several(every: Iterable[Recording]) -> dict[str, list[Recording]]:

@@ -107,6 +107,15 @@ def test_the_metadata_tells_whose_a_recording_is(cell, logs, opamc):
     assert opamc("nightly", cell).code == ExitCode.DONE
 
 
+def test_a_baseline_that_names_several_robots_is_said_once(cell, logs, opamc):
+    for index, name in enumerate(("UR-1", "UR-2", "UR-1")):
+        set_robot(run_of(logs, "r1", index), name)
+    first, second = (opamc("nightly", cell, "--quiet") for _ in range(2))
+    assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
+    several = f"({run_of(logs, 'r1', 0)} UR-1, {run_of(logs, 'r1', 1)} UR-2); it is of one"
+    assert f"r1 its baseline: its recordings name several robots {several}" in first.out
+
+
 def test_a_baseline_that_another_robot_has_as_well_is_said_once(cell, logs, opamc):
     for robot in ("r1", "r3"):
         for index in range(3):
