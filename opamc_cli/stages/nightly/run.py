@@ -13,19 +13,19 @@ from pathlib import Path
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
-from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
-from opamc_cli.stages.nightly.recordings import (
+from opamc_cli.stages.nightly.inputs.recordings import (
     CellRecordings,
     Recording,
     find_recordings,
     some,
 )
-from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
-from opamc_cli.stages.nightly.strangers import (
+from opamc_cli.stages.nightly.inputs.strangers import (
     said_of_baselines,
     several_named,
     without_strangers,
 )
+from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
+from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import (

@@ -47,6 +47,11 @@ class Recording:
         file = self.log.path.rpartition("/")[2]
         return f"{self.night}/{file.rpartition('.')[0] or file}"
 
+    @property
+    def identity(self) -> str:
+        """How the record of a night calls it."""
+        return f"{self.name} {self.sha256[:24]}"
+
     @cached_property
     def condition(self) -> str:
         """The conditions that recordings to be compared have in common, in words."""

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 
-from opamc_cli.stages.nightly.plan import identity
-from opamc_cli.stages.nightly.recordings import Recording
+from opamc_cli.stages.nightly.inputs.recordings import Recording
 from opamc_cli.storage.history import NightRow
 from opamc_cli.storage.logs import Facts
 
@@ -88,7 +87,7 @@ def _owner(
     before = set()
     for one in copies:
         record = recorded.get(one.log.robot, {}).get(one.night)
-        if record is not None and identity(one) in json.loads(record.key)["files"]:
+        if record is not None and one.identity in json.loads(record.key)["files"]:
             before.add(one.log.robot)
     return before.pop() if len(before) == 1 else None
 
