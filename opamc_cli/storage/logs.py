@@ -134,6 +134,17 @@ def fits(pattern: str, path: str) -> bool:
     return _expression(pattern).fullmatch(path) is not None
 
 
+def robot_of(pattern: str, path: str) -> str | None:
+    """Return whose recording a file is to a pattern, empty if it is all robots'; None if none's."""
+    found = _expression(pattern).fullmatch(path)
+    return None if found is None else found.groupdict().get("robot") or ""
+
+
+def holds_logs(pattern: str, folder: str) -> bool:
+    """Whether recordings of a pattern may lie in a folder, or below it."""
+    return any(_expression(of).fullmatch(folder) for of in _folders(pattern))
+
+
 def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
     """List the folders of some robots that may not be listed: whatever lies there is not missing.
 
