@@ -71,6 +71,8 @@ class Facts:
     """With `speed_percent`, `payload_kg`: its conditions."""
     started_at: str | None = None
     """ISO 8601."""
+    robot: str = ""
+    """That it names; empty if it names none."""
     error: str = ""
     """Why it is no recording; empty if it is one."""
 
@@ -83,6 +85,7 @@ class Facts:
             info.payload_kg,
             info.sampling_rate_hz,
             info.started_at,
+            info.robot or "",
         )
 
     @classmethod
@@ -129,6 +132,17 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
 def fits(pattern: str, path: str) -> bool:
     """Whether a recording that is there no more was one of a pattern's."""
     return _expression(pattern).fullmatch(path) is not None
+
+
+def robot_of(pattern: str, path: str) -> str | None:
+    """Return whose recording a file is to a pattern, empty if it is all robots'; None if none's."""
+    found = _expression(pattern).fullmatch(path)
+    return None if found is None else found.groupdict().get("robot") or ""
+
+
+def holds_logs(pattern: str, folder: str) -> bool:
+    """Whether recordings of a pattern may lie in a folder, or below it."""
+    return any(_expression(of).fullmatch(folder) for of in _folders(pattern))
 
 
 def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:

@@ -90,7 +90,7 @@ def test_facts_of_a_recording_and_of_none(tmp_path):
     log = LogFile("s3://place/a.parquet", "r1", None, 1, 2)
     digest, facts = read_facts(log, path)
     assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
-    assert facts == Facts("pick", 50.0, 1.5, 100.0, "2026-03-02T00:00:00Z")
+    assert facts == Facts("pick", 50.0, 1.5, 100.0, "2026-03-02T00:00:00Z", "R1")
     assert Facts.from_json(facts.to_json()) == facts
     assert Facts.of(RunInfo(100.0)) == Facts(sampling_rate_hz=100.0)
     path.write_bytes(b"no run")

@@ -34,7 +34,7 @@ def history(
 ) -> None:
     """Show or export the history of a cell; the whole table is history.sqlite below its `out`."""
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.recordings import some
+    from opamc_cli.stages.nightly.inputs.recordings import some
     from opamc_cli.stages.nightly.run import open_history
 
     if out is not None and out.suffix not in (".csv", ".parquet", ".json"):

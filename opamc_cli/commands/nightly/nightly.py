@@ -84,7 +84,7 @@ def run(
     # numpy with threads of its own could not be copied into the workers
     with one_thread_each():
         from opamc_cli.stages.nightly import run as stage
-    from opamc_cli.commands.nightly.claim import claim
+    from opamc_cli.commands.nightly.claim import check_apart, claim
     from opamc_cli.config.cell import load_cell
     from opamc_cli.stages.nightly.morning import left, silent, tell
     from opamc_cli.storage.files.lock import output_lock
@@ -98,6 +98,7 @@ def run(
     if wanted.night and wanted.since and wanted.night < wanted.since:
         msg = f"--night {wanted.night} is before --since {wanted.since}; give one of them"
         raise UsageError(msg)
+    check_apart(loaded, cell)
     with output_lock(loaded.out, OUT), stage.open_history(loaded) as history:
         claim(loaded, cell)
         if dry_run:

@@ -37,6 +37,9 @@ def diagnose(
     verbose: options.Verbose = False,
 ) -> None:
     """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
+    from opamc_cli.stages.processes.documentation import forgo_documentation
+
+    forgo_documentation()
     from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.stages import diagnose as stage

@@ -9,7 +9,7 @@ from typing import Any
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly.recordings import some
+from opamc_cli.stages.nightly.inputs.recordings import some
 from opamc_cli.stages.nightly.run import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History

@@ -9,7 +9,7 @@ from itertools import combinations
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
-from opamc_cli.stages.nightly.recordings import Recording, some
+from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.storage.history import NightRow
 from opamc_cli.storage.logs import Facts
 
@@ -341,15 +341,15 @@ def _key(
     for one in comparisons:
         if id(one.baseline) not in known:
             # the same tuple for all nights of a baseline, alive as long as the plan is made
-            known[id(one.baseline)] = sorted(_identity(one.baseline))
-    targets = [identity for one in comparisons for identity in _identity(one.targets)]
+            known[id(one.baseline)] = sorted(each.identity for each in one.baseline)
+    targets = [one.identity for each in comparisons for one in each.targets]
     return json.dumps(
         {
             "version": __version__,
             "config": config_hash,
             "baseline": _baseline_digest(comparisons, known, ()),
             "members": digest({"of": [[one.program, one.members] for one in comparisons]}),
-            "files": sorted([*targets, *_identity(broken)]),
+            "files": sorted([*targets, *(one.identity for one in broken)]),
         },
         sort_keys=True,
     )
@@ -364,7 +364,7 @@ def _baseline_digest(
             one.program,
             one.condition,
             one.missing,
-            sorted([*known[id(one.baseline)], *_identity([r for r in one.gone if r in gone])]),
+            sorted([*known[id(one.baseline)], *(r.identity for r in one.gone if r in gone)]),
         ]
         for one in comparisons
     ]
@@ -383,10 +383,6 @@ def _before(
         for count in counts
         for choice in combinations(gone, count)
     }
-
-
-def _identity(recordings: Sequence[Recording]) -> Iterator[str]:
-    return (f"{one.name} {one.sha256[:24]}" for one in recordings)
 
 
 def _why(

@@ -13,13 +13,18 @@ from pathlib import Path
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
-from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
-from opamc_cli.stages.nightly.recordings import (
+from opamc_cli.stages.nightly.inputs.recordings import (
     CellRecordings,
     Recording,
     find_recordings,
     some,
 )
+from opamc_cli.stages.nightly.inputs.strangers import (
+    said_of_baselines,
+    several_named,
+    without_strangers,
+)
+from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
 from opamc_cli.stages.nightly.settle import OF_NIGHT, settle_cell
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.nightly.workers import cluster
@@ -94,6 +99,7 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     outcome = CellOutcome()
     past = _Past(history)
+    recordings = _own(recordings, past)
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
@@ -142,6 +148,18 @@ def run(
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     jobs_of: dict[tuple[str, str], PlannedNight] = {}
     past = _Past(history)
+    recordings = _own(recordings, past)
+    outcome.thinned += [
+        Event(
+            one.night,
+            robot,
+            None,
+            "lacking",
+            f"its baseline: {one.log.path} has the same bytes as {other.log.path} of "
+            f"{other.log.robot}",
+        )
+        for robot, one, other in said_of_baselines(recordings.baseline_by_robot)
+    ]
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
         for key, members in planned.complete.items():
@@ -221,6 +239,11 @@ class _Past:
         self.begun: dict[str, list[str]] = {}
         for robot, night in begun_anew(history.declared()):
             self.begun.setdefault(robot, []).append(night)
+
+
+def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:
+    own = without_strangers(recordings.by_robot, recordings.beside, past.recorded)
+    return replace(recordings, by_robot=own)
 
 
 def _robot_plan(
@@ -422,11 +445,12 @@ def _record(
             text = f"{one.night} axis {one.axis} {one.state}, was {was} ({night.why})"
             news.append(Event(one.night, one.robot, one.axis, "judged-anew", text))
     for result in judged:
-        if result.of_baseline:
+        held = next(one for one in night.comparisons if one.program == result.program)
+        wrong = [*result.of_baseline, *several_named(held.baseline)]
+        if wrong:
             # dated by the baseline: the same of all nights that are held against it
-            held = next(one for one in night.comparisons if one.program == result.program)
             last = max(one.night for one in held.baseline)
-            text = f"its baseline: {'; '.join(_first(result.of_baseline))}"
+            text = f"its baseline: {'; '.join(_first(wrong))}"
             news.append(Event(last, night.robot, None, "lacking", text))
     history.record_night(row, verdicts, measures, news)
     _note(outcome, row)

@@ -107,6 +107,8 @@ def test_hundreds_of_broken_files_are_one_short_line(cell, logs, opamc):
 def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
     for name in ("r4", "r5"):
         shutil.copytree(logs / "r1", logs / name)
+        for path in (logs / name).glob("*/*.parquet"):
+            set_clock(path, f"{path.parent.name}T22:00:0{name[1]}+00:00")
     for name in ("r1", "r4", "r5"):
         shutil.rmtree(logs / name / night(4))
     said = opamc("nightly", cell, "--quiet").out

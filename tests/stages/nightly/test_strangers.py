@@ -27,13 +27,54 @@ def small(cell):
     return cell
 
 
-def test_logs_are_never_taken_for_results(small, opamc):
-    small.write_text(small.read_text() + "out: logs\n")
+@pytest.mark.parametrize(
+    ("out", "runs"),
+    [
+        ("logs", "logs/{robot}/{night}/*.parquet"),
+        ("logs/../logs/", "logs/{robot}/{night}/*.parquet"),
+        ("logs", "logs/{robot}/{night}/raw/*.parquet"),
+        ("logs", "logs/{robot}/*/*.parquet"),
+        ("logs", "logs/{robot}/**/*.parquet"),
+        ("logs/nightly", "logs/{robot}/*"),
+        ("logs/r1/nightly", "logs/{robot}/**/*"),
+    ],
+)
+def test_logs_are_never_taken_for_results_nor_results_for_logs(small, opamc, out, runs):
+    text = small.read_text().replace("logs/{robot}/{night}/*.parquet", runs)
+    small.write_text(f"{text}out: {out}\n")
+    before = {path: path.read_bytes() for path in small.parent.rglob("*") if path.is_file()}
+    for more in ((), ("--dry-run",), ("--quiet",)):
+        ended = opamc("nightly", small, *more)
+        assert ended.code == ExitCode.USAGE
+        assert "name a folder apart from the logs" in ended.err
+        assert ended.err.count("\n") == 1
+    after = {path: path.read_bytes() for path in small.parent.rglob("*") if path.is_file()}
+    assert after == before
+
+
+def test_a_baseline_of_all_robots_lies_apart_from_the_results(small, opamc):
+    text = small.read_text().replace("{nights: 3}", '{runs: "normal/*"}')
+    small.write_text(f"{text}robots: {{r1: {{}}}}\nout: normal\n")
+    assert "name a folder apart from the logs" in opamc("nightly", small, "--dry-run").err
+
+
+def test_logs_behind_a_link_are_never_taken_for_results(small, opamc):
+    (small.parent / "elsewhere").symlink_to(small.parent / "logs")
+    small.write_text(small.read_text() + "out: elsewhere\n")
     before = {path: path.read_bytes() for path in small.parent.rglob("*.parquet")}
     ended = opamc("nightly", small)
     assert ended.code == ExitCode.USAGE
     assert "cycle.parquet: would be removed and is no result; choose another" in ended.err
     assert {path: path.read_bytes() for path in small.parent.rglob("*.parquet")} == before
+
+
+@pytest.mark.parametrize("out", ["logs/nightly", "logs/r1", "nightly"])
+def test_results_that_no_pattern_takes_for_logs_may_lie_beside_them(small, opamc, out):
+    small.write_text(f"{small.read_text()}out: {out}\n")
+    for _ in range(2):
+        assert opamc("nightly", small, "--dry-run").code == ExitCode.DONE
+        ended = opamc("nightly", small, "--json")
+        assert (ended.code, list(json.loads(ended.out)["robots"])) == (ExitCode.DONE, ["r1"])
 
 
 @pytest.mark.parametrize(

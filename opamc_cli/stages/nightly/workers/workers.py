@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from opamc_cli.errors import OpamcError
+from opamc_cli.stages.processes.documentation import forgo_documentation
 from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
 from opamc_cli.stages.processes.interruption import SIGNALS
 from opamc_cli.stages.processes.parallel import die_with, one_thread_each
@@ -230,6 +231,7 @@ def _serve(pipe: Connection, name: str, memory: int | None, parent: int, forked:
     die_with(parent)
     _take_signals()
     look_for_garbage_seldom()
+    forgo_documentation()
     function = called(name)
     forgo_pandas()
     if memory is not None:

@@ -47,6 +47,11 @@ class Recording:
         file = self.log.path.rpartition("/")[2]
         return f"{self.night}/{file.rpartition('.')[0] or file}"
 
+    @property
+    def identity(self) -> str:
+        """How the record of a night calls it."""
+        return f"{self.name} {self.sha256[:24]}"
+
     @cached_property
     def condition(self) -> str:
         """The conditions that recordings to be compared have in common, in words."""
@@ -71,6 +76,8 @@ class CellRecordings:
     """Recordings of which only the history knows any more."""
     gone_of_baseline: dict[str, list[Recording]]
     """Those that `baseline.runs` names."""
+    beside: dict[str, list[Recording]]
+    """What is known of the recordings of robots that are not asked for."""
 
 
 def find_recordings(
@@ -117,10 +124,13 @@ def find_recordings(
         {robot: [] for robot in wanted},
         {robot: [] for robot in wanted},
         {robot: [] for robot in wanted},
+        {},
     )
     for log in logs:
         if log.robot in result.by_robot:
             result.by_robot[log.robot].append(reader.read(log))
+        else:
+            result.beside.setdefault(log.robot, []).extend(reader.known(log))
     for log in fixed:
         if log.robot in result.by_robot:
             result.baseline_by_robot[log.robot].append(reader.read(log))
@@ -146,6 +156,12 @@ class _Reader:
         # the logger's day may have begun already
         self._latest_night = (datetime.now(UTC).date() + timedelta(1)).isoformat()
         self._cell = cell
+
+    def known(self, log: LogFile) -> Iterator[Recording]:
+        """Yield a recording as it is remembered, if it is that still."""
+        row = self._known.get(log.path)
+        if row is not None and (row.size, row.mtime_ns) == (log.size, log.mtime_ns):
+            yield self._recording(log, row)
 
     def read(self, log: LogFile) -> Recording:
         if not _is_free(log.robot):
