@@ -204,9 +204,8 @@ def _next(
         name = shift.terms[-1].effect.name
         part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
         p_value = min(shift.p_value / part, 1.0)
-        if name in best:
-            continue
-        if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
+        seen = shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power
+        if name not in best and seen:
             best[name] = (p_value, shift)
     if not best:
         return None

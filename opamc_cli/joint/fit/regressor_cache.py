@@ -25,13 +25,11 @@ class RegressorCache:
         self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
-        # Bytes of what is kept, by identity: rows may be a view of the block, and both of another.
-        self._bytes: dict[int, int] = {}
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
         if key not in self._columns:
-            self._columns[key] = self._counted(compute())
+            self._columns[key] = compute()
         return self._columns[key]
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
@@ -69,15 +67,14 @@ class RegressorCache:
         key = (id(block), fine)
         if key not in self._taken:
             # The block itself is kept beside its rows, so that its identity stays its own.
-            self._taken[key] = (self._counted(block), self._counted(parts.taken(block)))
+            self._taken[key] = (block, parts.taken(block))
         return self._taken[key][1]
-
-    def _counted(self, block: Floats) -> Floats:
-        owner = block if block.base is None else block.base
-        self._bytes[id(owner)] = owner.nbytes
-        return block
 
     def _bounded(self) -> None:
         """Forget everything where it takes too much memory: products are known by their blocks."""
-        if sum(self._bytes.values()) > MOST_BYTES:
+        pairs = self._taken.values()
+        every = (*self._columns.values(), *(one for pair in pairs for one in pair))
+        # Rows may be a view of the block, and both of what was computed.
+        owners = (block if block.base is None else block.base for block in every)
+        if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()
