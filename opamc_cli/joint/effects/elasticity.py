@@ -51,12 +51,9 @@ class Elasticity(Effect):
         return stack(*(block_mean(one, full.bounds, factor) for one in (load - acceleration, rate)))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
-
-        What would rather be damped more than the limits allow does not ring.
-        """
+        """Inertia is positive, damping turns its torque by an eighth at most, and it rings."""
         rings = parameters["damping"] < MOST_DAMPED
-        return bool(rings and coefficients[0] > 0 and abs(coefficients[1]) < coefficients[0])
+        return bool(rings and abs(coefficients[1]) < coefficients[0])
 
 
 def _highest(track: Track) -> float:

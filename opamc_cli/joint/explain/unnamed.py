@@ -17,7 +17,13 @@ SAMPLES_OF_EACH = 100
 RESPONSE_DAMPING = 0.3
 
 Covariate = Callable[[Track], Floats]
-Modifier = Callable[[Track], Sequence[Floats]]
+MODIFIED: dict[str, Callable[[Track], Sequence[Floats]]] = {
+    "one": lambda t: [np.ones(t.size)],
+    "direction": lambda t: [t.direction],
+    "friction": lambda t: [t.direction, t.velocity],
+    "load": lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration],
+}
+"""What a function may change."""
 
 
 class Smooth(Effect):
@@ -35,7 +41,7 @@ class Smooth(Effect):
         name: str,
         domain: str,
         covariate: Covariate,
-        modifier: Modifier,
+        modified: str,
         needs: tuple[str, ...] = ("position",),
         follows_model: bool = False,
         constant: bool = True,
@@ -49,7 +55,7 @@ class Smooth(Effect):
         self.from_motion = not follows_model
         self.changes_in_time = domain in ("time", "temperature") or name.startswith("time")
         self._covariate = covariate
-        self._modifier = modifier
+        self._modified = MODIFIED[modified]
         self._first = 0 if constant else 1
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
@@ -57,10 +63,10 @@ class Smooth(Effect):
         return [{"degree": degree} for degree in DEGREES]
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
-        """Cosines of the stretched covariate times each modifier."""
+        """Cosines of the stretched covariate times each that they modify."""
         place = np.pi * stretched(self._covariate(track), track.moving, rows)
         waves = cosines(place, int(parameters["degree"]))[self._first :]
-        return stack(*(part[rows] * wave for part in self._modifier(track) for wave in waves))
+        return stack(*(part[rows] * wave for part in self._modified(track) for wave in waves))
 
 
 class Response(Effect):
@@ -149,33 +155,17 @@ def travel_since_reversal(track: Track) -> Floats:
     return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0)))
 
 
-def _direction(track: Track) -> list[Floats]:
-    return [track.direction]
-
-
-def _one(track: Track) -> list[Floats]:
-    return [np.ones(track.size)]
-
-
-def _friction(track: Track) -> list[Floats]:
-    return [track.direction, track.velocity]
-
-
-def _load(track: Track) -> list[Floats]:
-    return [np.sin(track.position_rad), np.cos(track.position_rad), track.acceleration]
-
-
-WARM = ("position", "temperature")
+WARM, AGAIN = ("position", "temperature"), ("position", "revisits")
 SMOOTH: tuple[Smooth, ...] = (
-    Smooth("speed", "velocity", lambda t: np.abs(t.velocity), _direction),
-    Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), _one),
-    Smooth("angle", "joint-angle", lambda t: t.position_rad, _one),
-    Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, _direction),
-    Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, _direction),
-    Smooth("load", "load", lambda t: np.abs(t.load_a), _direction, follows_model=True),
-    Smooth("acceleration", "acceleration", lambda t: t.acceleration, _one, constant=False),
-    Smooth("time", "time", lambda t: t.time_s, _one, needs=("position", "revisits")),
-    Smooth("time_and_speed", "time", lambda t: t.time_s, _friction, needs=("position", "revisits")),
-    Smooth("time_and_load", "load", lambda t: t.time_s, _load, needs=("scale", "revisits")),
-    Smooth("temperature", "temperature", lambda t: np.asarray(t.temperature_c), _friction, WARM),
+    Smooth("speed", "velocity", lambda t: np.abs(t.velocity), "direction"),
+    Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), "one"),
+    Smooth("angle", "joint-angle", lambda t: t.position_rad, "one"),
+    Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, "direction"),
+    Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, "direction"),
+    Smooth("load", "load", lambda t: np.abs(t.load_a), "direction", follows_model=True),
+    Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
+    Smooth("time", "time", lambda t: t.time_s, "one", AGAIN),
+    Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", AGAIN),
+    Smooth("time_and_load", "load", lambda t: t.time_s, "load", needs=("scale", "revisits")),
+    Smooth("temperature", "temperature", lambda t: np.asarray(t.temperature_c), "friction", WARM),
 )
