@@ -1,4 +1,4 @@
-"""The panel: measured joints and seven kinds of simulated ones, the loop beside its plain rivals.
+"""The panel: measured joints and eight kinds of simulated ones, the loop beside its plain rivals.
 
     python benchmarks/panel.py [--first-seed 50000] [--seeds 1] [--source measured,testbed]
         [--without-source NAME] [--contestants loop,plain,beam] [--sizes 0.6,1.5] [--effects none]
@@ -9,9 +9,10 @@
 A row is a recording and what was hidden in it; every contestant closes it in a child of its own.
 Each seals other parts of the motion, so both errors are given. Sources: measured, actuator,
 testbed, smooth (the tests' simulator), algebraic, two-mass, arm (another joint moves beside),
-cobot (coupled links and elastic gears, every effect in one size), and messy, of whose joints nobody
-knows what they lack. Sizes, rates and strokes take turns over effects and seeds; five seeds hold
-every effect at every size. One seed has some 170 rows.
+cobot (coupled links and elastic gears, every effect in one size), servo (an industrial drive,
+logged slowly), and messy, of whose joints nobody knows what they lack. Sizes, rates and strokes
+take turns over effects and seeds; five seeds hold every effect at every size. One seed has some
+240 rows.
 `--compare` lays an earlier result of the same seeds beside this one as a further contestant.
 """
 
@@ -35,6 +36,7 @@ from panel import (
     measured,
     messy,
     run,
+    servo,
     table,
     testbed,
     two_mass_cases,
@@ -51,6 +53,7 @@ SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "messy": messy.cases,
     "arm": arm.cases,
     "cobot": cobot.cases,
+    "servo": servo.cases,
 }
 MEASURED = ("measured", "actuator")
 
