@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from panel import cobot, messy, run, table, two_mass, two_mass_cases
 from panel.case import RIGID, Case, Wanted
+from sources import servo_joint
 
 
 def test_a_name_is_right_where_it_or_its_tie_is_and_wrong_where_neither_is():
@@ -29,6 +30,17 @@ def test_an_effect_has_the_size_that_was_asked_for(effect):
     # What the rigid model leaves of a joint that lacks nothing stays below the noise.
     assert 1.0 < errors[0] < 1.3
     assert np.sqrt(errors[1] ** 2 - errors[0] ** 2) == pytest.approx(5.0, rel=0.35)
+
+
+@pytest.mark.parametrize("effect", ["", "spring", "hysteresis", "payload_change"])
+def test_an_industrial_drive_comes_back_and_hides_what_was_asked_for(effect):
+    size = 5.0 if effect else 0.0
+    made = servo_joint.record(8, effect, size, "cyclic", 250.0)
+    assert made.size == pytest.approx(size, rel=0.35)
+    assert effect not in made.declared
+    # The drive follows: it comes back to where it began.
+    assert abs(made.position[-1] - made.position[0]) < 0.01 * np.ptp(made.position)
+    assert made.current.shape == made.position.shape == made.temperature.shape
 
 
 def test_rows_are_run_and_what_fails_is_told():
