@@ -261,11 +261,15 @@ def measured_cell(n_robots: int, n_nights: int, first_seed: int, only_known: boo
 
 
 def history_of(life: Life, rows: list[Measured], *, chart: bool) -> list[dict[str, object]]:
-    """Return what the history would hold; without the chart, nothing but each night's verdict."""
+    """Return what the history would hold.
+
+    Without the chart, nothing but each night's verdict, and nights that only changed count, too.
+    """
     return [
         {
             **{"robot": str(life.seed), "program": "cycle", "axis": one.axis},
-            **{"night": day(one.night), "state": one.state, "effect": one.effect},
+            **{"night": day(one.night), "effect": one.effect},
+            "state": "fault" if one.state == "changed" and not chart else one.state,
             **{"distance": one.distance if chart else None, "common": one.common},
             **{"harmless": 0, "cause": None, "reason": ""},
             "baseline": f"{one.payload_kg} {one.night >= life.exchanged_at}"
@@ -296,14 +300,12 @@ class Score:
     forecasts: list[tuple[int, bool]] = field(default_factory=list)
 
 
-def evaluate(cell: Cell, *, chart: bool) -> Score:
+def evaluate(cell: Cell, rule: AlarmConfig, *, chart: bool) -> Score:
     """Let every robot's nights go through the command's own alarm rule."""
     score = Score()
     for life, rows in cell:
         series = history_of(life, rows, chart=chart)
-        settled = settle_robot(
-            str(life.seed), series, [], [], AlarmConfig(), FAULT_EFFECT, BASELINE_NIGHTS
-        )
+        settled = settle_robot(str(life.seed), series, [], [], rule, FAULT_EFFECT, BASELINE_NIGHTS)
         found = False
         for alarm in settled.alarms:
             raised = number(alarm.raised)
@@ -313,7 +315,7 @@ def evaluate(cell: Cell, *, chart: bool) -> Score:
             elif not found:
                 found = True
                 until_half = life.wear_starts + life.wear_nights / 2 - raised
-                since = number(as_first_told(life, series, alarm.raised).since)
+                since = number(as_first_told(life, series, alarm.raised, rule).since)
                 score.alarmed.append((life.seed, severity, round(until_half), since))
         if life.wearing_axis and not found:
             score.missed.append(life.seed)
@@ -322,12 +324,14 @@ def evaluate(cell: Cell, *, chart: bool) -> Score:
     return score
 
 
-def as_first_told(life: Life, series: list[dict[str, object]], until: str) -> AlarmRow:
+def as_first_told(
+    life: Life, series: list[dict[str, object]], until: str, rule: AlarmConfig
+) -> AlarmRow:
     """Return the wearing joint's alarm as it was told in a night."""
     known = [row for row in series if row["axis"] == life.wearing_axis and row["night"] <= until]
-    return settle_robot(
-        str(life.seed), known, [], [], AlarmConfig(), FAULT_EFFECT, BASELINE_NIGHTS
-    ).alarms[-1]
+    return settle_robot(str(life.seed), known, [], [], rule, FAULT_EFFECT, BASELINE_NIGHTS).alarms[
+        -1
+    ]
 
 
 def forecasts(
@@ -364,10 +368,14 @@ def report(cell: Cell) -> str:
     lines = [
         f"{len(cell)} robots, {nights / 365:.1f} robot-years judged, {wearing} joints that wear",
         "",
-        "| | with memory | each night alone, 2 of 3 |",
-        "|---|---|---|",
+        "| | with memory | each night alone, 2 of 3 | 3 of 4 |",
+        "|---|---|---|---|",
     ]
-    scores = [evaluate(cell, chart=True), evaluate(cell, chart=False)]
+    scores = [
+        evaluate(cell, AlarmConfig(), chart=True),
+        evaluate(cell, AlarmConfig(), chart=False),
+        evaluate(cell, AlarmConfig(nights=3, of=4), chart=False),
+    ]
     rows = {
         "false alarms (per robot-year)": lambda s: f"{s.false} ({s.false / (nights / 365):.2f})",
         "wearing joints alarmed": lambda s: f"{len(s.alarmed)} of {wearing}",

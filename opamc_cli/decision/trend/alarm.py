@@ -9,7 +9,7 @@ class Night:
     """What the rule looks at."""
 
     signal: bool
-    """The joint is not as it was, by the night's own verdict or by the chart."""
+    """The joint is at fault by the night's own verdict, or not as it was by the chart."""
     gross: bool = False
     """So much so that one night is enough."""
     judged: bool = True

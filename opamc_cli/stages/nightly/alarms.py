@@ -14,16 +14,10 @@ from numpy.typing import NDArray
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import Episode, Night, episodes
-from opamc_cli.decision.trend.chart import control_chart
+from opamc_cli.decision.trend.chart import LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
 from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow, begun_anew
-
-LIMIT = 5.0
-"""Standard deviations of the chart's average that count as a signal. On 24 virtual robots over half
-a year (benchmarks/year.py, first seed 44000) 4 gave nine false alarms, 4.5 three and 5 one; those
-that wear were alarmed 21, 20.5 and 20.5 nights (median) before half their damage. On 24 others
-(45000) five gave one instead of six, one night later."""
 
 MOST_NIGHTS = 365
 """Nights that the beginning of a change is sought in."""
@@ -107,7 +101,8 @@ def chart_of(rows: Sequence[Mapping[str, Any]], baseline_nights: int) -> NDArray
         else math.nan
         for row in rows
     ]
-    return control_chart(np.array(values, dtype=np.float64), baseline_nights).average
+    healthy = np.array([row["state"] == "healthy" for row in rows], dtype=np.bool_)
+    return control_chart(np.array(values, dtype=np.float64), healthy, baseline_nights)
 
 
 def _nights(
@@ -116,10 +111,11 @@ def _nights(
     averages = chart_of(rows, baseline_nights)
     found = []
     for row, average in zip(rows, averages.tolist(), strict=True):
-        # a change whose cause lies outside the joint is no wear of it
-        own = row["state"] in ("changed", "fault") and not row["harmless"]
-        gross = row["state"] == "fault" and (row["effect"] or 0.0) > rule.gross
-        found.append(Night(own or average > LIMIT, own and gross, judged=row["state"] in JUDGED))
+        # a fault whose cause lies outside the joint is none of it; nights that only changed are
+        # left to the chart: by chance a baseline is so even that every tenth night of it differs
+        fault = row["state"] == "fault" and not row["harmless"]
+        gross = fault and (row["effect"] or 0.0) > rule.gross
+        found.append(Night(fault or average > LIMIT, gross, judged=row["state"] in JUDGED))
     return found
 
 

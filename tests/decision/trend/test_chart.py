@@ -5,9 +5,9 @@ import pytest
 
 from opamc_cli.decision.trend.chart import (
     LEAST_SPREAD,
+    LIMIT,
     MAD_TO_SIGMA,
     MOST,
-    REFERENCE_NIGHTS,
     USUAL_NIGHTS,
     USUAL_SPREAD,
     WEIGHT,
@@ -15,32 +15,34 @@ from opamc_cli.decision.trend.chart import (
 )
 
 
-def slow_chart(values, n_baseline):
+def slow_chart(values, healthy, n_baseline):
     """The chart as its definition reads: every night from all nights before it, from scratch."""
-    found = []
+    shifts, found = [], []
     for t in range(len(values)):
+        found.append(np.nan)
         if np.isnan(values[t]):
-            found.append(np.nan)
             continue
-        shifts = []
-        for u in range(t + 1):
-            if np.isnan(values[u]):
-                continue
-            before = [v for v in values[:u] if not np.isnan(v)][:REFERENCE_NIGHTS]
-            n, centre, spread = len(before), 0.0, USUAL_SPREAD
-            if n:
-                median = np.median(before)
-                mad = MAD_TO_SIGMA * np.median(np.abs(np.array(before) - median))
-                centre = n * median / (n + n_baseline)
-                variance = (USUAL_NIGHTS * USUAL_SPREAD**2 + n * mad**2) / (USUAL_NIGHTS + n)
-                spread = max(np.sqrt(variance), LEAST_SPREAD)
-            shifts.append(np.clip((values[u] - centre) / spread, -MOST, MOST))
-        ages = np.arange(len(shifts))[::-1]
-        weights = WEIGHT * (1 - WEIGHT) ** ages
-        n = min(len(shifts) - 1, REFERENCE_NIGHTS)
+        usual = [
+            v for v, ok, a in zip(values[:t], healthy, found, strict=False) if ok and a <= LIMIT
+        ]
+        n, centre, spread = len(usual), 0.0, USUAL_SPREAD
+        if n:
+            median = np.median(usual)
+            mad = MAD_TO_SIGMA * np.median(np.abs(np.array(usual) - median))
+            centre = n * median / (n + n_baseline)
+            variance = (USUAL_NIGHTS * USUAL_SPREAD**2 + n * mad**2) / (USUAL_NIGHTS + n)
+            spread = max(np.sqrt(variance), LEAST_SPREAD)
+        shifts.append(np.clip((values[t] - centre) / spread, -MOST, MOST))
+        weights = WEIGHT * (1 - WEIGHT) ** np.arange(len(shifts))[::-1]
         scale = np.sqrt(np.sum(weights**2) + 1 / (n_baseline + n + 1))
-        found.append(np.sum(weights * shifts) / scale)
+        found[t] = np.sum(weights * shifts) / scale
     return np.array(found)
+
+
+def average(values, healthy=None):
+    """The chart's average beside a baseline of six nights."""
+    healthy = np.ones(len(values), dtype=bool) if healthy is None else healthy
+    return control_chart(np.array(values, dtype=float), healthy, 6)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -49,31 +51,50 @@ def test_the_chart_is_its_definition(seed):
     values = rng.normal(0, 0.1, 60)
     values[rng.random(60) < 0.1] = np.nan
     values[40:] += 0.3
-    np.testing.assert_allclose(control_chart(values, 6).average, slow_chart(values, 6), rtol=1e-9)
+    healthy = rng.random(60) < 0.9
+    expected = slow_chart(values, healthy, 6)
+    assert np.nanmax(expected) > LIMIT
+    np.testing.assert_allclose(average(values, healthy), expected, rtol=1e-9)
 
 
 def test_no_night_of_the_chart_knows_the_future():
     values = np.random.default_rng(1).normal(0, 0.1, 50)
-    whole = control_chart(values, 6).average
-    np.testing.assert_array_equal(control_chart(values[:30], 6).average, whole[:30])
+    whole = average(values)
+    np.testing.assert_array_equal(average(values[:30]), whole[:30])
 
 
 def test_a_small_shift_that_lasts_is_seen_and_one_odd_night_is_not():
     rng = np.random.default_rng(2)
     healthy = rng.normal(0.05, 0.08, 120)
-    assert np.nanmax(control_chart(healthy, 6).average) < 4
+    assert np.nanmax(average(healthy)) < LIMIT
     odd = healthy.copy()
     odd[70] += 5
-    assert np.nanmax(control_chart(odd, 6).average) < 4
+    assert np.nanmax(average(odd)) < LIMIT
     worn = healthy.copy()
     worn[80:] += 0.2
-    assert np.nanmax(control_chart(worn, 6).average[:80]) < 4
-    assert np.nanmax(control_chart(worn, 6).average[80:95]) > 4
+    assert np.nanmax(average(worn)[:80]) < LIMIT
+    assert np.nanmax(average(worn)[80:95]) > LIMIT
+
+
+def test_a_season_is_no_shift():
+    """A gear exchanged in summer: all nights of the winter lie above the first twenty."""
+    noise = np.random.default_rng(3).normal(0, 0.13, 180)
+    season = 0.14 * (1 - np.cos(2 * np.pi * np.arange(180) / 365))
+    assert np.max(average(season + noise)) < LIMIT
+
+
+def test_a_change_that_lasts_does_not_become_the_usual():
+    noise = np.random.default_rng(4).normal(0, 0.13, 300)
+    late = noise + 0.8 * (np.arange(300) >= 60)
+    assert np.min(average(late)[70:]) > LIMIT
+    # nor does one that was there from the first night on, where each night says so
+    always = noise + 0.8
+    assert np.min(average(always, np.zeros(300, dtype=bool))[5:]) > LIMIT
 
 
 @pytest.mark.parametrize("values", [[], [np.nan] * 5, [0.1], [0.0] * 40, [np.nan, 0.2, np.nan]])
 def test_awkward_series_have_a_chart(values):
-    chart = control_chart(np.array(values, dtype=float), 6)
-    assert len(chart.average) == len(values)
+    found = average(values)
+    assert len(found) == len(values)
     known = np.isfinite(values) if values else []
-    assert np.array_equal(np.isfinite(chart.average), known)
+    assert np.array_equal(np.isfinite(found), known)

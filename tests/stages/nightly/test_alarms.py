@@ -95,3 +95,23 @@ def test_since_does_not_move_with_the_nights_after_the_alarm():
         told.append(alarm.since)
     assert len(set(told)) == 1, told
     assert told[0] in ("2026-03-10", "2026-03-11")
+
+
+def raised(states, distances):
+    """Return the days on which alarms were raised."""
+    series = nights_of(states, distances)
+    found = settle_robot("r1", series, (), (), AlarmConfig(), 0.4, 6).alarms
+    return [int(one.raised[-2:]) for one in found]
+
+
+def test_nights_that_only_changed_are_an_alarm_once_the_chart_says_so():
+    """A baseline that is too even by chance: every few nights of its joint differ, as they did."""
+    even = [0.1 * (-1) ** day for day in range(30)]
+    odd = [day in (8, 10, 20, 21) for day in range(30)]
+    states = ["changed" if one else "healthy" for one in odd]
+    assert (
+        raised(states, [0.5 if one else usual for one, usual in zip(odd, even, strict=True)]) == []
+    )
+    lasting = ["healthy"] * 20 + ["changed"] * 10
+    assert raised(lasting, [*even[:20], *[0.6] * 10]) == [25]
+    assert raised(["healthy"] * 20 + ["fault"] * 10, even) == [22]
