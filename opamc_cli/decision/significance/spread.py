@@ -66,7 +66,7 @@ def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> S
 
 
 def spread_among_siblings(
-    variance: float, siblings: ArrayLike, dof: float, expected: Spread
+    variance: float, siblings: ArrayLike, dof: float, expected: Spread, *, alike: bool = False
 ) -> Spread:
     """Spread of one joint's healthy sessions, from its own and its siblings'.
 
@@ -80,6 +80,8 @@ def spread_among_siblings(
         Degrees of freedom of each, positive.
     expected : Spread
         Spread expected beforehand.
+    alike : bool
+        Whether joints are known to vary alike.
 
     Returns
     -------
@@ -99,7 +101,7 @@ def spread_among_siblings(
     prior = expected
     if values.size:
         logs = np.log(np.maximum([variance, *values], LEAST_VARIANCE))
-        unlike = max(float(logs.var(ddof=1) - polygamma(1, dof / 2)), 0.0)
+        unlike = 0.0 if alike else max(float(logs.var(ddof=1) - polygamma(1, dof / 2)), 0.0)
         shared = 1 / (1 / (dof * values.size) + unlike / 2)
         median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
         share = prior.dof / (prior.dof + shared)
