@@ -389,6 +389,8 @@ def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
                 [variances[key] for key in siblings],
                 len(one.own) - 1,
                 joints[axis].expected(voice),
+                # conditions bend what they move by each joint's own load
+                alike=not joints[axis].depends_on_conditions(voice),
             )
         else:
             unit = _spread_by_siblings([distances[key] for key in siblings], shares[axis])

@@ -143,3 +143,34 @@ def test_how_far_in_a_healthy_session_lies_is_uniform_below_the_last_rank():
     inner = np.array([one for one in p if one > 0.5])
     assert kstest(2 * inner - 1, "uniform").pvalue > 0.01
     assert np.mean(inner > 0.95) == pytest.approx(0.1, abs=0.025)
+
+
+def test_two_sessions_of_the_same_few_patterns_are_not_certain_of_a_third():
+    """Ten patterns a motion, which a drive repeats; one of them is another in the target."""
+    same = np.zeros((2, 24))
+    same[:, :5] = 2
+    target = same[:1].copy()
+    target[0, :2] = 1, 3
+    joints = {
+        axis: {"patterns": PatternEvidence([Cell(0, 4, 1, same, last, same, last, 1.0)])}
+        for axis, last in {1: target, 2: same[:1], 3: same[:1]}.items()
+    }
+    found = compare_sessions(joints, dict.fromkeys(joints, (2, 1)), 1000, 0)
+    assert found[1].p_value > 0.05
+    assert found[2].p_value > 0.2
+
+
+def test_three_sessions_of_the_same_patterns_leave_the_word_to_others():
+    same = np.zeros((3, 24))
+    same[:, :5] = 2
+    target = same[:1].copy()
+    target[0, :2] = 1, 3
+    patterns = PatternEvidence([Cell(0, 4, 1, same, target, same, target, 1.0)])
+    plan = Fleet(n_baseline=3, n_axes=1, n_motions=1)
+    powers = SpectrumEvidence(spectra(plan, 0)[1], 3)
+    both, alone = (
+        compare_sessions({1: own}, {1: (3, 1)}, 1000, 0)[1]
+        for own in ({"patterns": patterns, "spectrum": powers}, {"spectrum": powers})
+    )
+    assert both.p_value == alone.p_value
+    assert np.isnan(both.witnesses["patterns"])

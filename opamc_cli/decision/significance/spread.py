@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import digamma, fdtrc, stdtr
+from scipy.special import digamma, fdtrc, polygamma, stdtr
 
 FloatArray = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ def moderated_spread(variance: float, dof: float, prior: Spread = EXPECTED) -> S
 
 
 def spread_among_siblings(
-    variance: float, siblings: ArrayLike, dof: float, expected: Spread
+    variance: float, siblings: ArrayLike, dof: float, expected: Spread, *, alike: bool = False
 ) -> Spread:
     """Spread of one joint's healthy sessions, from its own and its siblings'.
 
@@ -80,18 +80,29 @@ def spread_among_siblings(
         Degrees of freedom of each, positive.
     expected : Spread
         Spread expected beforehand.
+    alike : bool
+        Whether joints are known to vary alike.
 
     Returns
     -------
     Spread
         Of the joint's own, the siblings' median, which one odd sibling cannot move, and what is
         expected.
+
+    Notes
+    -----
+    Joints of one robot need not vary alike. The siblings are worth what their sessions are, but
+    no more than `2 / u`, where u is the variance of the joints' log variances beyond that of a
+    sample, trigamma(dof / 2) (Smyth, 2004): about that many degrees of freedom have a log variance
+    that varies by u.
     """
     values = np.asarray(siblings, dtype=np.float64)
     values = values[np.isfinite(values)]
     prior = expected
     if values.size:
-        shared = dof * values.size
+        logs = np.log(np.maximum([variance, *values], LEAST_VARIANCE))
+        unlike = 0.0 if alike else max(float(logs.var(ddof=1) - polygamma(1, dof / 2)), 0.0)
+        shared = 1 / (1 / (dof * values.size) + unlike / 2)
         median = moderated_spread(float(np.median(values)), dof, Spread(1.0, 0.0))
         share = prior.dof / (prior.dof + shared)
         scale = prior.scale**share * median.scale ** (1 - share)

@@ -23,6 +23,11 @@ USUAL_NOISE = 0.7
 """Share of noise in the variance of sessions of one cycle: by nights of four and sixteen cycles, in
 which it is 0.37 and 0.13, it is 0.70 and 0.71."""
 
+ROUNDING = 1 / 12
+"""Variance of a count's rounding over that of its chance where a pattern is seen once (W. F.
+Sheppard, 1898): two sessions of few patterns that agree better than that do so by luck, and have no
+other to show it."""
+
 LEAST_DISTANCE = 1e-9
 """Identical recordings have distance zero; a billionth of a healthy one's stands for it."""
 
@@ -100,13 +105,15 @@ def distances(
         with np.errstate(invalid="ignore"):
             expected = np.fmax(variance + noise * (of_own - of_unit), noise * of_own)
         relative = np.where(np.isfinite(noise).all(), expected / variance, 1.0).mean(axis=1)
-        orthogonal[number, both], score[number, both] = _of_kernel(
+        beyond, score[number, both] = _of_kernel(
             scaled @ scaled.transpose(0, 2, 1),
             own,
             others,
             _ridge(noise * of_unit, variance),
             relative,
         )
+        # the unit of a lone session is chance
+        orthogonal[number, both] = beyond + ROUNDING * (unit.sum(axis=1) == 1)
     return Distances(_log_mean(orthogonal), _log_mean(score))
 
 

@@ -69,7 +69,13 @@ class SessionDistances:
 
     @property
     def known(self) -> bool:
-        """Whether no session lacks its distance."""
+        """Whether no session lacks its distance, nor differs from three or more that are the same.
+
+        As those of few patterns may be: whether a difference is much is then not known.
+        """
+        agree = len(self.own) > 2 and np.ptp(self.own) == 0
+        if agree and (self.target != self.own[:, np.newaxis]).any():
+            return False
         return all(np.isfinite(part).all() for part in (self.own, self.target, self.each))
 
     def log_ratio(self, kind: Kind) -> float:
