@@ -6,9 +6,6 @@ from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track, block_mean
 
-MOST_DAMPED = 0.25
-"""Damping ratio: joints have 0.02 to 0.15."""
-
 
 class Elasticity(Effect):
     """Response of a sprung load to the acceleration: what it adds to the rigid model.
@@ -27,6 +24,7 @@ class Elasticity(Effect):
     as_smoothing = True
     needs = ("position", "logged")
     from_motion = True
+    most_damped = 0.25  # joints have 0.02 to 0.15
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz up, three dampings."""
@@ -39,7 +37,7 @@ class Elasticity(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to what the grid can show; damped more, nothing rings."""
-        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, MOST_DAMPED)}
+        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, self.most_damped)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
@@ -52,8 +50,8 @@ class Elasticity(Effect):
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, damping turns its torque by an eighth at most, and it rings."""
-        rings = parameters["damping"] < MOST_DAMPED
-        return bool(rings and abs(coefficients[1]) < coefficients[0])
+        inertia, damping = coefficients
+        return bool(parameters["damping"] < self.most_damped and abs(damping) < inertia)
 
 
 def _highest(track: Track) -> float:

@@ -91,10 +91,8 @@ def smoothings(recordings: Sequence[Recording]) -> list[Smoothing]:
     if any(recording.position_rad is None for recording in recordings):
         return []
     speeds = all(recording.velocity_rad_s is not None for recording in recordings)
-    windows = {
-        max(int(window * recordings[0].rate_hz) | 1, SHORTEST_WINDOW): window
-        for window in WINDOWS_S
-    }
+    rate = recordings[0].rate_hz
+    windows = {max(int(window * rate) | 1, SHORTEST_WINDOW): window for window in WINDOWS_S}
     ways = [False, True] if speeds else [False]
     shortest = min(recording.size for recording in recordings)
     kept = [window for samples, window in windows.items() if samples <= shortest]
