@@ -24,7 +24,6 @@ class Elasticity(Effect):
     as_smoothing = True
     needs = ("position", "logged")
     from_motion = True
-    most_damped = 0.25  # joints have 0.02 to 0.15
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz up, three dampings."""
@@ -37,7 +36,7 @@ class Elasticity(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to what the grid can show; damped more, nothing rings."""
-        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, self.most_damped)}
+        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Acceleration of the sprung load less that of the motor, and its rate of change."""
@@ -49,9 +48,8 @@ class Elasticity(Effect):
         return stack(*(block_mean(one, full.bounds, factor) for one in (load - acceleration, rate)))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Inertia is positive, damping turns its torque by an eighth at most, and it rings."""
-        inertia, damping = coefficients
-        return bool(parameters["damping"] < self.most_damped and abs(damping) < inertia)
+        """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
+        return bool(abs(coefficients[1]) < coefficients[0])
 
 
 def _highest(track: Track) -> float:

@@ -355,7 +355,7 @@ def _one(
     uncertain = max(motion.taken_noise, LEAST_CORNER * float(np.std(motion.acceleration)))
     kernel = max(motion.kernel, averaging_kernel(CORNER_WINDOW, 2), key=len)
     clear = clear_of_corners(motion.acceleration, current, moving, kernel, uncertain)
-    if motion.window <= SHORTEST_WINDOW:
+    if motion.window <= CORNER_WINDOW:
         # The coarse grid has no counterpart for so short an average.
         moving &= clear
     return Track(
