@@ -66,8 +66,9 @@ def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
         others += [j.state for axis, j in judgements.items() if axis != 3]
         assert max(judgements, key=lambda axis: judgements[axis].health_index) == 3
     # From two sessions, which have one distance between them, no spread can be had, and little
-    # from three where patterns decide alone.
-    assert found.count("fault") >= {2: 31, 3: 37}.get(n_baseline, 40)
+    # from three where patterns decide alone: 37 if siblings were held to vary alike, which made
+    # one in nine of the slow logs a false alarm (docs/decision.md).
+    assert found.count("fault") >= {2: 31, 3: 34}.get(n_baseline, 40)
     assert others.count("healthy") >= len(others) - 1
 
 

@@ -276,18 +276,13 @@ def test_half_of_a_known_error_is_not_called_closed():
     assert loop.explained_share < 0.9
 
 
-LEAK = pytest.mark.xfail(
-    reason="the moving average of the coarse grid reaches over the border of a sealed group"
-)
-
-
 @pytest.mark.parametrize(
     ("motion", "margin"),
     [
         (MOTIONS[1], 0.0),
         long(MOTIONS[1], 0.25),
         long(MOTIONS[2], 0.25),
-        pytest.param(MOTIONS[2], 0.0, marks=[LEAK, pytest.mark.long]),
+        long(MOTIONS[2], 0.0),
     ],
 )
 def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):

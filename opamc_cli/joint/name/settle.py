@@ -55,11 +55,12 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
 
 
 def worth_their_price(chain: Chain) -> Chain:
-    """Drop functions that are not worth their price, at the load of the whole chain."""
+    """Drop functions and lines that are not worth their price, at the load of the whole chain."""
     kept, place = chain, 0
     while place < kept.added:
         parent = without(kept, place, rounds=1)
-        drop = kept.terms[place].effect.unnamed and parent.score <= kept.score
+        effect = kept.terms[place].effect
+        drop = (effect.unnamed or effect.fast) and parent.score <= kept.score
         kept, place = (parent, 0) if drop else (kept, place + 1)
     return chain if kept is chain else extended(kept)
 
