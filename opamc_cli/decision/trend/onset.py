@@ -3,8 +3,6 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.decision.trend.median import median
-
 FloatArray = NDArray[np.float64]
 
 LEAST_AFTER = 2
@@ -45,9 +43,9 @@ def onset(nights: FloatArray, values: FloatArray) -> int:
     best, place = np.inf, 0
     for start in range(1, n - LEAST_AFTER + 1):
         before, after = values[:start], values[start:]
-        level = median(before)
+        level = float(np.median(before))
         below = float(np.abs(before - level).sum())
-        step = float(np.abs(after - median(after)).sum())
+        step = float(np.abs(after - np.median(after)).sum())
         time = nights[start:] - nights[start - 1]
         error = below + min(step, *(_misfit(after - level, time**power) for power in RISES))
         if error < best:
