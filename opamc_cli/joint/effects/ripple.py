@@ -186,14 +186,9 @@ def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:
     count = _filters(parameters["top_hz"], densest) if densest else 0
     step = round(densest / density) if density else count + 1
     answers = [density > 0 and k % step == 0 for k in range(count) for _ in range(4)]
-    parts = {
-        "order": [True, True],
-        "speed": [True, True],
-        "answer": answers,
-        "direction": [True, True, *answers],
-        "load": [True, True],
-        "current": [True, True],
-    }
+    pair = [True, True]
+    parts = {"order": pair, "speed": pair, "answer": answers, "direction": pair + answers}
+    parts |= {"load": pair, "current": pair}
     flags = [
         kept and name in form
         for name, columns in parts.items()
@@ -291,12 +286,8 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
             for k in (1, 2, 6)
         ]
         known += [
-            (
-                math.lcm(slots, 2 * poles),
-                "cogging",
-                f"cogging of {slots} slots and {2 * poles} poles",
-            )
-            for slots in (6, 9, 12, 15, 18, 24, 27, 36)
+            (math.lcm(n, 2 * poles), "cogging", f"cogging of {n} slots and {2 * poles} poles")
+            for n in (6, 9, 12, 15, 18, 24, 27, 36)
         ]
     for meant, kind, text in known:
         if abs(order - meant) < width:
