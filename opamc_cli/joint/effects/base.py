@@ -139,7 +139,7 @@ class Effect:
         """Say what the effect with these parameters means to a maintainer."""
         return self.meaning
 
-    def coefficient_units(self, count: int, unit: str = "A") -> list[str]:
+    def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:
         """Return the units of some coefficients, where the current's is `unit`."""
         if self.per is None:
             return [f"{unit} per regressor"] * count

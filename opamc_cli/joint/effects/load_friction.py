@@ -7,19 +7,19 @@ from opamc_cli.joint.motion.track import Floats, Track
 
 
 class LoadFriction(Effect):
-    """Meshing losses: dry friction in proportion to the load's magnitude.
+    """Meshing losses: dry friction in proportion to the load's magnitude, or to its square.
 
-    What accelerates the rotor itself does not pass the gear: `inertia_share` is the part of the
-    inertia's current that does.
+    The square is what a strain wave gear's teeth, preloaded against each other, come near (two of
+    a UR10's joints, docs/validation.md). What accelerates the rotor itself does not pass the gear:
+    `inertia_share` is the part of the inertia's current that does.
     """
 
     name = "load_friction"
     domain = "load"
-    per = ("current",)
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
     needs = ("position",)
     resists = True
-    searches = ("inertia_share",)
+    searches = ("inertia_share", "exponent")
     follows_load = True
 
     def untestable(self, track: Track) -> str | None:
@@ -30,13 +30,18 @@ class LoadFriction(Effect):
         return super().untestable(track)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """All of the inertia beyond the gear, half of it, or none."""
-        return [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
+        """All of the inertia beyond the gear, half of it, or none; the load, or its square."""
+        shares = [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
+        return [*shares, *(share | {"exponent": 2.0} for share in shares)]
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Direction times the magnitude of the fitted load current that passes the gear."""
+        """Direction times a power of the fitted load current that passes the gear."""
         load = track.load_a
         beyond = 1 - parameters.get("inertia_share", 1.0)
         if beyond:
             load = load - beyond * track.load_inertia * track.acceleration
-        return stack(track.direction * np.abs(load))
+        return stack(track.direction * np.abs(load) ** parameters.get("exponent", 1.0))
+
+    def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:
+        """Return a share of the load, or one per unit of it."""
+        return [f"per {unit}" if "exponent" in parameters else ""] * count

@@ -30,7 +30,7 @@ def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[s
     for term, values, errors in zip(
         result.terms, result.coefficients, known.standard_errors, strict=True
     ):
-        units = term.effect.coefficient_units(len(values), unit)
+        units = term.effect.coefficient_units(term.parameters, len(values), unit)
         for k, (value, error) in enumerate(zip(values, errors, strict=True)):
             rows.append(
                 {
@@ -65,7 +65,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
                 "effect": term.effect.name,
                 "parameters": shown_parameters(term),
                 "coefficients": [float(value) for value in values],
-                "units": term.effect.coefficient_units(len(values), laid.unit),
+                "units": term.effect.coefficient_units(term.parameters, len(values), laid.unit),
                 "low": [float(v - known.factor * e) for v, e in zip(values, errors, strict=True)],
                 "high": [float(v + known.factor * e) for v, e in zip(values, errors, strict=True)],
             }

@@ -39,9 +39,9 @@ def test_searched_parameters_are_counted_where_they_are_given():
 
 
 def test_units_repeat_the_last_one_and_follow_the_current():
-    assert Named().coefficient_units(5, "Nm") == ["Nm per rad/s", "Nm", "", "", ""]
-    assert Named().coefficient_units(1) == ["A per rad/s"]
-    assert Effect().coefficient_units(2) == ["A per regressor"] * 2
+    assert Named().coefficient_units({}, 5, "Nm") == ["Nm per rad/s", "Nm", "", "", ""]
+    assert Named().coefficient_units({}, 1) == ["A per rad/s"]
+    assert Effect().coefficient_units({}, 2) == ["A per regressor"] * 2
 
 
 def test_friction_resists_and_all_else_may_do_as_it_likes():

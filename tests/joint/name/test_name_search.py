@@ -41,7 +41,7 @@ def one(values):
 def test_a_single_chain_takes_what_imitates_a_spring_and_two_find_it():
     # Forwards only, a drag at one place imitates a spring and a Stribeck curve, and comes first.
     def both(q, v, a, t):
-        return one(q) + 4 * np.sign(v) * np.exp(-((v / 0.2) ** 2))
+        return one(q) + 6 * np.sign(v) * np.exp(-((v / 0.2) ** 2))
 
     names = ("spring", "position_drag", "stribeck", "quadratic_friction", "sublinear_friction",
              "hysteresis")  # fmt: skip
@@ -157,15 +157,16 @@ def test_guesses_that_lie_ready_are_asked_only_if_their_effect_is_in_the_pool():
 
 @pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
 @pytest.mark.parametrize("strength", [5.0, 20.0])
-def test_friction_that_follows_the_weight_alone_is_found_in_its_own_form(motion, strength):
+@pytest.mark.parametrize("form", [{}, {"exponent": 2.0}])
+def test_friction_that_follows_the_weight_alone_is_found_in_its_own_form(motion, strength, form):
     # All of the inertia taken into the load, it shows as nothing; and its own form was reached
     # from a load whose zero was right alone.
     def by_weight(q, v, a, t):
-        return np.sign(v) * np.abs(np.sin(q) + 0.4 * np.cos(q))
+        return np.sign(v) * np.abs(np.sin(q) + 0.4 * np.cos(q)) ** form.get("exponent", 1.0)
 
     chain = chain_of(plain_fit(joint_of(motion, by_weight, strength)), 0)
     (found,) = trials(chain, pool_of(chain, "load_friction"))
-    assert found.term.parameters == {"inertia_share": 0.0}
+    assert found.term.parameters == {"inertia_share": 0.0} | form
     assert found.why_not is None
     assert found.chain.fit.rmse(sealed=False) == pytest.approx(0.02, rel=0.05)
 
