@@ -81,13 +81,16 @@ class Chain:
     @property
     def _signs(self) -> list[bool]:
         pairs, grid = self._valued, self.fit.dataset.fine
-        way = np.unique(grid.track.direction[grid.fit])
-        # What never turns round cannot tell an offset from dry friction: it may all be either.
-        share = {"coulomb": 1.0, "offset": float(way[0]) if way.size == 1 else 0.0}
+        way, speed = np.unique(grid.track.direction[grid.fit]), np.abs(grid.track.velocity)
+        usual = float(np.median(speed[grid.fit])) if way.size else 0.0
+        # At one speed dry and viscous friction are one, and what never turns round cannot tell an
+        # offset from either: no part alone has a sign.
+        share = {"coulomb": 1.0, "viscous": usual, "offset": float(way.sum()) * (way.size == 1)}
         dry = sum(share.get(term.effect.name, 0.0) * float(values[0]) for term, values in pairs)
         return [
             term.effect.plausible(values, term.parameters)
             or (term.effect.at_a_place and values[0] > -dry)
+            or (term.effect.name == "coulomb" and dry > 0)
             for term, values in pairs
         ]
 
@@ -192,5 +195,7 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
 
 def price_of(term: Term, width: int) -> float:
     """Price of a term: the effect, its `width` coefficients and its searched parameters, alike."""
+    # Of what turns, a cosine and its sine are one: a size, at whatever phase.
+    width = (width + 1) // 2 if term.effect.fast else width
     charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
     return PRICE * (1 + charged + term.effect.searched(term.parameters))

@@ -38,9 +38,10 @@ def chain():
     return chain_of(plain_fit(joint_of("cyclic", stribeck, strength=5.0, rate=100.0)), 0)
 
 
-def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
+def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False, fast=False):
     return SimpleNamespace(
         name=name,
+        fast=fast,
         several=False,
         at_a_place=False,
         unnamed=unnamed,
@@ -50,8 +51,9 @@ def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False):
     )
 
 
-def moves(*directions):
-    track = SimpleNamespace(direction=np.array(directions))
+def moves(*directions, speed=0.5):
+    direction = np.array(directions)
+    track = SimpleNamespace(direction=direction, velocity=speed * direction)
     return SimpleNamespace(fine=SimpleNamespace(track=track, fit=slice(None)))
 
 
@@ -65,13 +67,22 @@ def made(*terms, added=1, error=(1.0, 1.0), counts=None, widths=None, **fit):
 
 
 @pytest.mark.parametrize(
-    ("unnamed", "width", "searched", "units"),
-    [(False, 1, 0, 2), (False, 16, 0, 17), (False, 33, 2, 19), (True, 33, 2, 36)],
+    ("unnamed", "fast", "width", "searched", "units"),
+    [
+        (False, False, 1, 0, 2),
+        (False, False, 16, 0, 17),
+        (False, False, 33, 2, 19),
+        (True, False, 33, 2, 36),
+        (False, True, 1, 0, 2),  # a cosine and its sine are one
+        (False, True, 2, 1, 3),
+        (True, True, 6, 1, 5),
+    ],
 )
 def test_a_price_is_for_the_effect_its_coefficients_and_what_was_searched(
-    unnamed, width, searched, units
+    unnamed, fast, width, searched, units
 ):
-    term = SimpleNamespace(effect=effect("one", True, unnamed, searched), parameters={})
+    one = effect("one", True, unnamed, searched, fast=fast)
+    term = SimpleNamespace(effect=one, parameters={})
     assert price_of(term, width) == pytest.approx(CHARGE * units)
 
 
@@ -181,8 +192,21 @@ def test_dry_friction_may_not_be_turned_by_what_follows_the_load(
     name, before, now, follows_load, plausible
 ):
     start = made(effect(name, before), added=0)
+    start.fit.coefficients[0] = np.array([1.0 if before else -1.0])
     longer = made(effect(name, now), effect("new", follows_load=follows_load))
+    longer.fit.coefficients[0] = np.array([1.0 if now else -1.0])
     assert longer.plausible_beside(start) is plausible
+
+
+@pytest.mark.parametrize(("per_speed", "plausible"), [(22.0, True), (4.0, False)])
+def test_at_one_speed_dry_friction_is_judged_together_with_viscous(per_speed, plausible):
+    """A weight of 15 times the noise that rubs, to and fro at 0.02 rad/s, was refused for it."""
+    declared = effect("coulomb"), effect("viscous")
+    turned = effect("coulomb", plausible=False), effect("viscous")
+    following = effect("new", follows_load=True)
+    longer = made(*turned, following, dataset=moves(-1.0, 1.0, speed=0.02))
+    longer.fit.coefficients[:2] = np.array([-0.1]), np.array([per_speed])
+    assert longer.plausible_beside(made(*declared, added=0)) is plausible
 
 
 def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
