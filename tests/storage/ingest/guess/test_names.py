@@ -6,7 +6,7 @@ from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.source import Listed
 
 KNOWN = {
-    "current": "cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1 A1_Strom_1",
+    "current": "i1 cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1 A1_Strom_1",
     "torque": "torque_1 torques_1 effort_1 tau_1 moment_1 JointTrq1",
     "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1",
     "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1",
