@@ -2,7 +2,9 @@
 
 Virtual robots run their program once a recording, from edge to edge, without standing still
 between its motions; the drive reports torque current and position. Three healthy recordings are
-held against three of the same robot, healthy or with one damaged joint.
+held against three of the same robot, healthy or with one damaged joint. Two plain rivals are given
+the same motions: how far the sides' mean courses lie apart, and the logarithms of three sizes (root
+mean square, that of successive differences, mean), over what the baseline's recordings differ by.
 
     python benchmarks/slow_logs.py --quick
     python benchmarks/slow_logs.py --seeds 40:52
@@ -24,6 +26,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict import verdict
 from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.schemas import files
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -33,6 +36,10 @@ SPEEDS_PERCENT = (5.0, 20.0, 100.0)
 SEVERITIES = (0.0, 0.5, 1.0)
 AXES = (1, 2, 3, 4, 5, 6)
 SESSIONS = 3
+RIVALS = {
+    "course": (files.PROFILES, "current_a"),
+    "sizes": (files.AMPLITUDES, "log_amplitude"),
+}
 
 
 def record(seed: int, speed_percent: float) -> dict[tuple[float, int], dict]:
@@ -91,7 +98,32 @@ def judged(channels: dict, rate_hz: float, folder: Path) -> dict:
         scored = score.compare_sides(sides, config, out)
         written = verdict.write(verdict.decide(sides, config), scored, config, out)
         errors = (*baseline.errors, *target.errors)
-        found[severity] = ({a["axis"]: a for a in written.verdict["axes"]}, errors)
+        axes = {a["axis"]: a for a in written.verdict["axes"]}
+        found[severity] = (axes, errors, plain_distances(sides))
+    return found
+
+
+def plain_distances(sides: Sides) -> dict[str, dict[int, float]]:
+    """Distance of both sides' means by rival and axis, over the baseline's own scatter."""
+    found: dict[str, dict[int, float]] = {}
+    for rival, (file_name, column) in RIVALS.items():
+        by_side: list[dict[int, dict[str, dict[int, list[float]]]]] = []
+        for side in (sides.baseline, sides.target):
+            rows: dict[int, dict[str, dict[int, list[float]]]] = {}
+            for row in side.witnesses[file_name].to_pylist():
+                of_run = rows.setdefault(row["axis"], {}).setdefault(row["run"], {})
+                of_run[row["motion"]] = row[column]
+            by_side.append(rows)
+        found[rival] = {}
+        for axis in by_side[0].keys() & by_side[1].keys():
+            runs = [list(rows[axis].values()) for rows in by_side]
+            motions = sorted(set.intersection(*(set(run) for side in runs for run in side)))
+            own, other = (
+                np.array([np.concatenate([run[m] for m in motions]) for run in side])
+                for side in runs
+            )
+            apart = own.mean(axis=0) - other.mean(axis=0)
+            found[rival][axis] = float(np.sqrt((apart**2).mean() / own.var(axis=0, ddof=1).mean()))
     return found
 
 
@@ -110,7 +142,11 @@ def main() -> None:
     arguments = parser.parse_args()
     first, last = (int(part) for part in arguments.seeds.split(":"))
     seeds = range(first, first + 1 if arguments.quick else last)
-    print("speed %,rate Hz,axes,not judged,failed,false alarms,AUC 0.5,AUC 1,found 0.5,found 1")
+    rivals = ",".join(f"{rival} AUC {s:g}" for rival in RIVALS for s in SEVERITIES[1:])
+    print(
+        "speed %,rate Hz,axes,not judged,failed,false alarms,AUC 0.5,AUC 1,found 0.5,found 1,"
+        + rivals
+    )
     for speed in SPEEDS_PERCENT:
         rows: dict[float, list] = {rate: [] for rate in RATES_HZ}
         for seed in seeds:
@@ -130,9 +166,16 @@ def row(speed: float, rate: float, results: list, n_seeds: int) -> str:
     healthy, n_unjudged, n_failed, alarms = [], 0, n_seeds - len(results), 0
     faulty: dict[float, list[float]] = {severity: [] for severity in SEVERITIES[1:]}
     found: dict[float, int] = dict.fromkeys(SEVERITIES[1:], 0)
+    plain: dict[tuple[str, float], list[float]] = {}
     for seed, by_severity in results:
         bad = AXES[seed % len(AXES)]
-        axes, errors = by_severity[0.0]
+        for severity, (_, _, distances) in by_severity.items():
+            for rival, of_axis in distances.items():
+                chosen = [bad] if severity else AXES
+                # as p-values: the smaller, the worse
+                own = [-of_axis[axis] for axis in chosen if axis in of_axis]
+                plain.setdefault((rival, severity), []).extend(own)
+        axes, errors, _ = by_severity[0.0]
         n_failed += len(errors)
         for axis in AXES:
             p = axes.get(axis, {}).get("p_value")
@@ -147,7 +190,15 @@ def row(speed: float, rate: float, results: list, n_seeds: int) -> str:
     scores = ",".join(f"{auc(healthy, faulty[s]):.3f}" for s in faulty) if healthy else ","
     shares = ",".join(f"{found[s]}/{len(results)}" for s in found)
     n_axes = len(AXES) * n_seeds
-    return f"{speed:g},{rate:g},{n_axes},{n_unjudged},{n_failed},{alarms},{scores},{shares}"
+    rivals = ",".join(
+        f"{auc(plain[rival, 0.0], plain[rival, severity]):.3f}"
+        for rival in RIVALS
+        for severity in SEVERITIES[1:]
+        if results
+    )
+    return (
+        f"{speed:g},{rate:g},{n_axes},{n_unjudged},{n_failed},{alarms},{scores},{shares},{rivals}"
+    )
 
 
 if __name__ == "__main__":

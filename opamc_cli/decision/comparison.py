@@ -398,9 +398,11 @@ def _shifts(joints: Mapping[int, Joint], voice: Voice) -> dict[int, Shift]:
         if joints[axis].depends_on_conditions(voice):
             ratio -= CONDITIONS * unit.scale * joints[axis].unusual()
         scale = unit.scale * math.sqrt(shares[axis])
-        # the logarithm of a sum of squares has a light upper tail, which makes up for what the
-        # scale is not known by, if not by three sessions: see docs/decision.md
-        dof = math.inf if len(one.own) > 3 else unit.dof
+        # The logarithm of a sum of squares has a light upper tail, which makes up for what the
+        # scale is not known by: if not by three sessions, nor of what conditions bend, whose
+        # spread differs tenfold from machine to machine (docs/decision.md).
+        bent = joints[axis].depends_on_conditions(voice)
+        dof = math.inf if len(one.own) > 3 and not bent else unit.dof
         shifts[axis] = Shift(ratio, unit.scale, Spread(scale, dof))
     return shifts
 

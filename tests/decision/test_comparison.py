@@ -174,3 +174,16 @@ def test_three_sessions_of_the_same_patterns_leave_the_word_to_others():
     )
     assert both.p_value == alone.p_value
     assert np.isnan(both.witnesses["patterns"])
+
+
+def test_patterns_that_vary_more_than_is_expected_make_few_false_alarms():
+    """Each session's patterns have moved a way of their own, some hardly and some far."""
+    rng, alarms = np.random.default_rng(0), 0
+    for _ in range(250):
+        far = 0.02 * np.sqrt(rng.chisquare(1, 6))[:, np.newaxis]
+        moved = np.full((6, 24), 1 / 24) * np.exp(far * rng.normal(size=(6, 24)))
+        counts = 1e7 * moved / moved.sum(axis=1, keepdims=True)
+        cell = Cell(0, 4, 1, counts[:5], counts[5:], counts[:5], counts[5:], 1.0)
+        found = compare_sessions({1: {"patterns": PatternEvidence([cell])}}, {1: (5, 1)}, 1000, 0)
+        alarms += found[1].witnesses["patterns"] <= 0.01
+    assert alarms <= 3
