@@ -101,11 +101,11 @@ def _rivals_of(term: Term, unnamed: Pool) -> Pool:
 def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> bool:
     """Whether a smooth function without a name stands in the place of an effect.
 
-    Where a smooth function does as well as a line, it is no line. A name that holds nine tenths of
-    what the function explains stays: the rest is asked for beside it.
+    Where a smooth function does as well as a line (another joint's motion is none), it is no line.
+    A name that holds nine tenths of what it explains stays: the rest is asked for beside it.
     """
     difference, error = paired(rival.deviation, best.deviation)
-    if term.effect.fast:
+    if term.effect.fast and term.effect.domain != "acceleration":
         return rival.score < best.score + LEAST_SHARE and difference > -LEAST_T * error
     if rival.score >= best.score - LEAST_SHARE or difference <= LEAST_T * error:
         return False

@@ -1,5 +1,7 @@
 """What a chain keeps when each effect is asked again beside all others, and what ties with it."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from closing import joint_of, plain_fit
@@ -11,7 +13,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
 from opamc_cli.joint.name.search import Pool, beam, trials
-from opamc_cli.joint.name.settle import settled
+from opamc_cli.joint.name.settle import _takes_the_name, settled
 
 LIBRARY = built_in_library()
 SPEED = {"stribeck_speed": 0.1, "exponent": 2.0}
@@ -106,3 +108,14 @@ def test_a_ripple_that_shakes_the_measured_motion_keeps_its_name(resonance_hz):
     assert min(trial.chain.score for trial in trials(start, unnamed)) < best.score - 0.2
     _, named = settled(best, pool, unnamed)
     assert "ripple" in [one.term.effect.name for one in named]
+
+
+@pytest.mark.parametrize(
+    ("name", "goes"), [("ripple", True), ("mains_hum", True), ("coupling", False)]
+)
+def test_a_smooth_function_that_does_as_well_takes_a_line_s_place_and_no_joint_s(name, goes):
+    """Of a UR10's elbow a function of the time took the place of the shoulder, and failed."""
+    drawn = np.random.default_rng(0).normal(1.0, 0.01, (2, 40))
+    best, rival = (SimpleNamespace(deviation=one, score=-1.0, mean_square=1.0) for one in drawn)
+    parent = SimpleNamespace(mean_square=4.0)
+    assert _takes_the_name(rival, best, parent, term(name)) is goes
