@@ -5,6 +5,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any
 
+UNUSED = ("f2py", "testing")
+
 
 def forgo_documentation() -> None:
     """Have scipy loaded without its functions' documentation, in a process that is ours.
@@ -19,3 +21,12 @@ def forgo_documentation() -> None:
 
         reader: Any = _docscrape
         reader.FunctionDoc = partial(reader.FunctionDoc, doc="")
+        numpy: Any = sys.modules["numpy"]
+        if unused := [name for name in UNUSED if f"numpy.{name}" not in sys.modules]:
+            for name in unused:
+                setattr(numpy, name, None)
+            try:
+                import scipy._lib.array_api_compat.numpy  # copies all that numpy has
+            finally:
+                for name in unused:
+                    delattr(numpy, name)
