@@ -56,6 +56,8 @@ def said_of_baselines(fixed: ByRobot, own: ByRobot) -> list[tuple[str, Recording
     Of its baseline's, or of those that are its own.
     """
     named = [one for baseline in fixed.values() for one in baseline]
+    if not named:
+        return []
     held = _held_by_several([*named, *(one for nights in own.values() for one in nights)])
     copies = [(one, held[one.sha256]) for one in named if one.sha256 in held]
     return [(one.log.robot, one, _of_another(one, others)) for one, others in copies]
@@ -70,22 +72,27 @@ def several_named(baseline: Sequence[Recording]) -> Iterator[str]:
 
 
 def _held_by_several(every: Sequence[Recording]) -> dict[str, list[Recording]]:
-    """Return recordings of which several robots have the same bytes, by their hash.
-
-    One file may be named as the baseline of several robots: that is no copy.
-    """
-    robots: dict[str, set[str]] = {}
-    for one in every:
-        robots.setdefault(one.log.path, set()).add(one.log.robot)
+    """Return recordings of which several robots have the same bytes, by their hash."""
     by_hash: dict[str, list[Recording]] = {}
     for one in every:
-        if not one.facts.error and len(robots[one.log.path]) == 1:
+        if not one.facts.error:
             by_hash.setdefault(one.sha256, []).append(one)
+    several = {
+        content: list(_of_one_robot(alike)) for content, alike in by_hash.items() if len(alike) > 1
+    }
     return {
         content: copies
-        for content, copies in by_hash.items()
-        if len(copies) > 1 and len({one.log.robot for one in copies}) > 1
+        for content, copies in several.items()
+        if len({one.log.robot for one in copies}) > 1
     }
+
+
+def _of_one_robot(alike: Sequence[Recording]) -> Iterator[Recording]:
+    """Leave out files that are named as the baseline of several robots: those are no copies."""
+    robots: dict[str, set[str]] = {}
+    for one in alike:
+        robots.setdefault(one.log.path, set()).add(one.log.robot)
+    return (one for one in alike if len(robots[one.log.path]) == 1)
 
 
 def _owner(
