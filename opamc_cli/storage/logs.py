@@ -244,8 +244,10 @@ def _local(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str, 
     for path in _fitting(pattern, robots):
         try:
             state = os.stat(path)  # noqa: PTH116
-        except OSError:
-            continue  # gone between listing and looking
+        except OSError:  # gone between listing and looking
+            if os.path.islink(path):  # noqa: PTH114 - or on a disk that is not there
+                yield path, 0, 0
+            continue
         if stat.S_ISREG(state.st_mode):  # a pipe or a folder is no log
             yield path, state.st_size, state.st_mtime_ns
 

@@ -158,7 +158,9 @@ def run(
             f"its baseline: {one.log.path} has the same bytes as {other.log.path} of "
             f"{other.log.robot}",
         )
-        for robot, one, other in said_of_baselines(recordings.baseline_by_robot)
+        for robot, one, other in said_of_baselines(
+            recordings.baseline_by_robot, recordings.by_robot
+        )
     ]
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
@@ -242,7 +244,9 @@ class _Past:
 
 
 def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:
-    own = without_strangers(recordings.by_robot, recordings.beside, past.recorded)
+    own = without_strangers(
+        recordings.by_robot, recordings.baseline_by_robot, recordings.beside, past.recorded
+    )
     return replace(recordings, by_robot=own)
 
 

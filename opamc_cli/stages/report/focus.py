@@ -11,6 +11,9 @@ from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInp
 
 SEVERITY = ("insufficient-data", "healthy", "changed", "fault")
 
+LEAST_AXES = 2
+"""Joints that a figure needs which compares them; one joint's numbers stand in the table."""
+
 
 @dataclass(frozen=True)
 class Focus:

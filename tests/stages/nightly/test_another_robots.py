@@ -116,15 +116,49 @@ def test_a_baseline_that_names_several_robots_is_said_once(cell, logs, opamc):
     assert f"r1 its baseline: its recordings name several robots {several}" in first.out
 
 
-def test_a_baseline_that_another_robot_has_as_well_is_said_once(cell, logs, opamc):
+def lay_apart(cell, logs):
+    """Lay the baselines of both robots apart, and have the cell's file name them."""
     for robot in ("r1", "r3"):
         for index in range(3):
             place = cell.parent / "normal" / robot / f"{index}.parquet"
             place.parent.mkdir(parents=True, exist_ok=True)
             run_of(logs, robot, index).rename(place)
-    shutil.copy(cell.parent / "normal/r1/0.parquet", cell.parent / "normal/r3/0.parquet")
     text = cell.read_text().replace("{nights: 3}", '{runs: "normal/{robot}/*.parquet"}')
     cell.write_text(text)
+    return text
+
+
+@pytest.mark.parametrize("asked", [(), ("--robot", "r3")])
+def test_a_night_that_is_a_copy_of_another_robots_baseline_is_not_judged(cell, logs, opamc, asked):
+    lay_apart(cell, logs)
+    late = run_of(logs, "r3", 4)
+    late.rename(logs / "kept")
+    opamc("nightly", cell)
+    late.parent.mkdir(exist_ok=True)
+    shutil.copy(cell.parent / "normal/r1/0.parquet", late)
+    ended = opamc("nightly", cell, *asked, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    assert f"{late}: has the same bytes as" in ended.out
+    assert "normal/r1/0.parquet of r1; remove it where it was not recorded" in ended.out
+    assert states(cell, "r3")[-1] == "failed"
+    (logs / "kept").replace(late)
+    assert opamc("nightly", cell).code == ExitCode.DONE
+
+
+def test_a_baseline_that_is_a_copy_of_another_robots_night_is_said_once(cell, logs, opamc):
+    lay_apart(cell, logs)
+    opamc("nightly", cell)
+    shutil.copy(run_of(logs, "r1", 4), cell.parent / "normal/r3/0.parquet")
+    first, second = (opamc("nightly", cell, "--quiet") for _ in range(2))
+    copied = f"has the same bytes as {run_of(logs, 'r1', 4)} of r1"
+    assert f"r3 its baseline: {cell.parent / 'normal/r3/0.parquet'} {copied}" in first.out
+    assert states(cell, "r1")[-1] == "done"
+    assert second.out == ""
+
+
+def test_a_baseline_that_another_robot_has_as_well_is_said_once(cell, logs, opamc):
+    text = lay_apart(cell, logs)
+    shutil.copy(cell.parent / "normal/r1/0.parquet", cell.parent / "normal/r3/0.parquet")
     first, second = (opamc("nightly", cell, "--quiet") for _ in range(2))
     assert "normal/r1/0.parquet of r1" in first.out
     assert "normal/r3/0.parquet of r3" in first.out

@@ -317,6 +317,19 @@ def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch
     assert (ended.code, ended.out) == (ExitCode.DONE, "")
 
 
+def test_a_link_to_a_disk_that_is_not_there_is_said_and_read_when_it_is(cell, logs, opamc):
+    file = logs / "r1" / night(4) / "cycle.parquet"
+    disk = cell.parent / "disk.parquet"
+    file.symlink_to(file.rename(disk))
+    disk.rename(cell.parent / "aside")
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert f"r1 {night(4)}: {file}: cannot be read (No such file or directory)" in first.out
+    assert (first.code, second.code, second.out) == (ExitCode.PARTIAL, ExitCode.PARTIAL, "")
+    (cell.parent / "aside").rename(disk)
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, ended.out) == (ExitCode.DONE, "")
+
+
 def test_a_file_that_the_system_refuses_to_read_is_not_remembered(tmp_path):
     sha256, facts = read_facts(LogFile(str(tmp_path), "r1", None, 0, 0), tmp_path)
     assert sha256 == ""

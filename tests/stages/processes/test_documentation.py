@@ -26,6 +26,15 @@ def test_a_process_of_ours_does_without():
     assert printed(FORGO + LOAD) == ["False", numbers]
 
 
+def test_numpy_s_tools_for_makers_of_libraries_are_loaded_by_who_asks_for_them():
+    asked = "import sys\nprint('numpy.f2py' in sys.modules, 'numpy.testing' in sys.modules)\n"
+    loaded = "import scipy.special\n"
+    assert printed(loaded + asked) == ["True", "True\n"]
+    assert printed(FORGO + loaded + asked) == ["False", "False\n"]
+    used = "import numpy\nprint(numpy.f2py.__name__, numpy.testing.__name__)\n"
+    assert printed(FORGO + loaded + used) == ["numpy.f2py", "numpy.testing\n"]
+
+
 def test_what_is_loaded_already_is_left_alone():
     assert printed("import scipy.special\n" + FORGO + LOAD) == printed(LOAD)
 

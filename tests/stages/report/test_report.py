@@ -299,3 +299,15 @@ def test_figures_without_healthy_joints_show_one_that_is_not(folder: Path) -> No
     (folder / "verdict.json").write_text(json.dumps(verdict))
     made = report.run(folder, figures_of_healthy=False)
     assert "envelopes" in _Page(made.path.read_text()).figures()
+
+
+def test_one_joint_has_no_figures_that_compare_joints(folder: Path) -> None:
+    verdict = json.loads((folder / "verdict.json").read_text())
+    for entry in verdict["axes"]:
+        entry["state"] = "fault" if entry["axis"] == 3 else "healthy"
+    (folder / "verdict.json").write_text(json.dumps(verdict))
+    comparing = {"feature-space", "latent-axis"}
+    assert comparing <= _Page(report.run(folder).path.read_text()).figures()
+    alone = report.run(folder, figures_of_healthy=False)
+    assert not comparing & _Page(alone.path.read_text()).figures()
+    assert sum("this is one: the table has its" in line for line in alone.omitted) == 2

@@ -134,6 +134,8 @@ def find_recordings(
     for log in fixed:
         if log.robot in result.by_robot:
             result.baseline_by_robot[log.robot].append(reader.read(log))
+        else:
+            result.beside.setdefault(log.robot, []).extend(reader.known(log))
     reader.finish()
     for one in reader.gone({log.path for log in (*logs, *fixed)}):
         robot, path = one.log.robot, one.log.path

@@ -1,7 +1,7 @@
 """Recordings that lie under one robot and are another's: by their bytes, or by what they say."""
 
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from hashlib import sha256
 
@@ -13,7 +13,10 @@ ByRobot = Mapping[str, Sequence[Recording]]
 
 
 def without_strangers(
-    by_robot: ByRobot, beside: ByRobot, recorded: Mapping[str, Mapping[str, NightRow]]
+    by_robot: ByRobot,
+    fixed: ByRobot,
+    beside: ByRobot,
+    recorded: Mapping[str, Mapping[str, NightRow]],
 ) -> dict[str, list[Recording]]:
     """Have recordings that may be another robot's stand for nothing.
 
@@ -25,12 +28,14 @@ def without_strangers(
     ----------
     by_robot
         Recordings of the robots that are looked at.
+    fixed
+        Those that `baseline.runs` names.
     beside
         What is known of the cell's other robots.
     recorded
         What became of the robots' nights.
     """
-    every = [one for known in (by_robot, beside) for own in known.values() for one in own]
+    every = [one for known in (by_robot, fixed, beside) for own in known.values() for one in own]
     held = _held_by_several(every)
     owners = {content: _owner(copies, recorded) for content, copies in held.items()}
     robots = {*by_robot, *beside}
@@ -45,16 +50,17 @@ def without_strangers(
     return {robot: [judgeable(one) for one in own] for robot, own in by_robot.items()}
 
 
-def said_of_baselines(fixed: ByRobot) -> list[tuple[str, Recording, Recording]]:
-    """Return which robots' recordings that `baseline.runs` names are copies of another one's."""
-    held = _held_by_several(one for own in fixed.values() for one in own)
-    # one file may be named for several robots: that is no copy
-    return [
-        (one.log.robot, one, other)
-        for copies in held.values()
-        for one in copies
-        if (other := _of_another(one, copies)).log.path != one.log.path
-    ]
+def said_of_baselines(fixed: ByRobot, own: ByRobot) -> list[tuple[str, Recording, Recording]]:
+    """Return which recordings that `baseline.runs` names are copies of another robot's.
+
+    Of its baseline's, or of those that are its own.
+    """
+    named = [one for baseline in fixed.values() for one in baseline]
+    if not named:
+        return []
+    held = _held_by_several([*named, *(one for nights in own.values() for one in nights)])
+    copies = [(one, held[one.sha256]) for one in named if one.sha256 in held]
+    return [(one.log.robot, one, _of_another(one, others)) for one, others in copies]
 
 
 def several_named(baseline: Sequence[Recording]) -> Iterator[str]:
@@ -65,17 +71,28 @@ def several_named(baseline: Sequence[Recording]) -> Iterator[str]:
         yield f"its recordings name several robots ({found}); it is of one"
 
 
-def _held_by_several(every: Iterable[Recording]) -> dict[str, list[Recording]]:
+def _held_by_several(every: Sequence[Recording]) -> dict[str, list[Recording]]:
     """Return recordings of which several robots have the same bytes, by their hash."""
     by_hash: dict[str, list[Recording]] = {}
     for one in every:
         if not one.facts.error:
             by_hash.setdefault(one.sha256, []).append(one)
+    several = {
+        content: list(_of_one_robot(alike)) for content, alike in by_hash.items() if len(alike) > 1
+    }
     return {
         content: copies
-        for content, copies in by_hash.items()
-        if len(copies) > 1 and len({one.log.robot for one in copies}) > 1
+        for content, copies in several.items()
+        if len({one.log.robot for one in copies}) > 1
     }
+
+
+def _of_one_robot(alike: Sequence[Recording]) -> Iterator[Recording]:
+    """Leave out files that are named as the baseline of several robots: those are no copies."""
+    robots: dict[str, set[str]] = {}
+    for one in alike:
+        robots.setdefault(one.log.path, set()).add(one.log.robot)
+    return (one for one in alike if len(robots[one.log.path]) == 1)
 
 
 def _owner(

@@ -8,7 +8,7 @@ import numpy as np
 
 from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
 from opamc_cli.stages.report.figures.palette import colour, state_role, state_sign
-from opamc_cli.stages.report.focus import Focus, pooled_features
+from opamc_cli.stages.report.focus import LEAST_AXES, Focus, pooled_features
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 MARKERS = {"healthy": "o", "changed": "^", "fault": "X", "insufficient-data": "s"}
@@ -31,6 +31,9 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     }
     if not features:
         msg = "features.parquet has no axis with Δμ, Δσ² and KS over all motions"
+        raise NothingToDrawError(msg)
+    if len(features) < LEAST_AXES:
+        msg = "it compares joints, and this is one: the table has its Δμ, Δσ² and KS"
         raise NothingToDrawError(msg)
     with style():
         drawing = canvas(1.0 + ROW_IN * len(features))

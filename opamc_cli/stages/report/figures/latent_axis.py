@@ -4,7 +4,7 @@ import math
 
 from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
 from opamc_cli.stages.report.figures.palette import colour, state_role, state_sign
-from opamc_cli.stages.report.focus import Focus, pooled_features
+from opamc_cli.stages.report.focus import LEAST_AXES, Focus, pooled_features
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 
 
@@ -23,6 +23,9 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
                 values[axis] = float(index)
     if not values:
         msg = "neither a discriminant was applied nor does verdict.json hold a health index"
+        raise NothingToDrawError(msg)
+    if not trained and len(values) < LEAST_AXES:
+        msg = "it compares joints, and this is one: the table has its health index"
         raise NothingToDrawError(msg)
     with style():
         drawing = canvas(0.95 + 0.27 * len(values), 6.4)

@@ -67,6 +67,9 @@ def _place(fig: Canvas) -> None:
         tall = y[1] - y[0]
         panel.set_position((x[0] / width, 1 - y[1] / height, (x[1] - x[0]) / width, tall / height))
         panel.set_title(panel.get_title("left"), loc="left", y=1 + _lines(_factors(panel)) / tall)
+        # else matplotlib measures every tick's label to find the place of the axis's name
+        panel.xaxis.set_label_coords(0.5, -_ticks_below(panel) / tall)
+        panel.yaxis.set_label_coords(-_ticks_beside(panel) / (x[1] - x[0]), 0.5)
 
 
 def _widen(margins: list[float], place: int, needed: float) -> None:
@@ -74,9 +77,13 @@ def _widen(margins: list[float], place: int, needed: float) -> None:
 
 
 def _beside(panel: Axes) -> float:
-    labels = _tick_labels(panel.yaxis, "left")
     name = _lines(1) if panel.get_ylabel() else 0.0
-    return EDGE_PT + name + (TICK_PT + _width(labels) if labels else 0.0)
+    return EDGE_PT + name + _ticks_beside(panel)
+
+
+def _ticks_beside(panel: Axes) -> float:
+    labels = _tick_labels(panel.yaxis, "left")
+    return TICK_PT + _width(labels) if labels else 0.0
 
 
 def _after(panel: Axes) -> float:
@@ -94,9 +101,12 @@ def _factors(panel: Axes) -> int:
 
 
 def _below(panel: Axes) -> float:
-    labels = _tick_labels(panel.xaxis, "bottom")
     name = bool(panel.get_xlabel())
-    return EDGE_PT + _lines(name + bool(labels)) + (TICK_PT if labels else 0.0)
+    return EDGE_PT + _lines(name) + _ticks_below(panel)
+
+
+def _ticks_below(panel: Axes) -> float:
+    return _lines(1) + TICK_PT if _tick_labels(panel.xaxis, "bottom") else 0.0
 
 
 def _tick_labels(axis: Axis, side: str) -> Sequence[str]:
