@@ -203,7 +203,7 @@ def _opened(
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
-        unknown = found.certain or bool(steps) or bool(refused) or not predicts
+        unknown = found.certain or bool(steps) or not predicts
         verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None

@@ -177,19 +177,6 @@ def test_names_hold_where_a_function_of_time_does_not(monkeypatch):
     assert why_not["unnamed_time"] == "does not hold on the sealed data"
 
 
-def test_what_is_found_and_does_not_hold_is_not_called_nothing(monkeypatch):
-    swaying = Term(unnamed_library()["unnamed_time"], {"degree": 8.0})
-    monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: extended(chain, swaying))
-    recording = joint_of("cyclic", None)
-    time = np.arange(recording.current_a.size) / recording.current_a.size
-    # What sways while nothing is sealed does so the other way round afterwards, no worse than that.
-    sway = 0.1 * np.sin(9 * time) * np.where(time < 0.7, 1.0, -1.0)
-    loop = close(replace(recording, current_a=recording.current_a + sway))
-    assert loop.predicts
-    assert not loop.ceiling.certain
-    assert (loop.steps, loop.verdict) == ((), "not-in-library")
-
-
 EXACT = {
     "offset": {"spring", "asymmetric_friction"},
     "spring": set(),
