@@ -83,8 +83,7 @@ class Chain:
         pairs, grid = self._valued, self.fit.dataset.fine
         way, speed = np.unique(grid.track.direction[grid.fit]), np.abs(grid.track.velocity)
         usual = float(np.median(speed[grid.fit])) if way.size else 0.0
-        # At one speed dry and viscous friction are one, and what never turns round cannot tell an
-        # offset from either: no part alone has a sign.
+        # At one speed dry and viscous friction are one, and of one way an offset is both.
         share = {"coulomb": 1.0, "viscous": usual, "offset": float(way.sum()) * (way.size == 1)}
         dry = sum(share.get(term.effect.name, 0.0) * float(values[0]) for term, values in pairs)
         return [
@@ -195,7 +194,8 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
 
 def price_of(term: Term, width: int) -> float:
     """Price of a term: the effect, its `width` coefficients and its searched parameters, alike."""
-    # Of what turns, a cosine and its sine are one: a size, at whatever phase.
-    width = (width + 1) // 2 if term.effect.fast else width
+    # Of a line a cosine and its sine are one: a size, at whatever phase.
+    if term.effect.fast and term.effect.domain != "acceleration":
+        width = (width + 1) // 2
     charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
     return PRICE * (1 + charged + term.effect.searched(term.parameters))

@@ -42,6 +42,7 @@ def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False, 
     return SimpleNamespace(
         name=name,
         fast=fast,
+        domain="motor-angle",
         several=False,
         at_a_place=False,
         unnamed=unnamed,
