@@ -56,15 +56,11 @@ def cut(track: Track, pieces: Pieces) -> Track:
     spans: Pieces = []
     for start, stop in pieces:
         inside[start:stop] = True
-        span = _with_surroundings(track, start, stop)
+        first, last = next(bound for bound in track.bounds if bound[0] <= start < bound[1])
+        lead, tail = int(LEAD_S * track.rate_hz), int(TAIL_S * track.rate_hz)
+        span = max(start - lead, first), min(stop + tail, last)
         if spans and span[0] <= spans[-1][1]:
             spans[-1] = (spans[-1][0], max(span[1], spans[-1][1]))
         else:
             spans.append(span)
     return excerpt(track, inside, tuple(spans))
-
-
-def _with_surroundings(track: Track, start: int, stop: int) -> tuple[int, int]:
-    first, last = next(bound for bound in track.bounds if bound[0] <= start < bound[1])
-    lead = int(LEAD_S * track.rate_hz)
-    return max(start - lead, first), min(stop + int(TAIL_S * track.rate_hz), last)

@@ -8,7 +8,7 @@ import numpy as np
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
 from opamc_cli.joint.least_squares import SINGULAR_BELOW
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 
 Products = dict[Hashable, Floats]
@@ -66,10 +66,10 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     return batches
 
 
-def judged(term: Term, gain: float, width: int) -> Candidate:
+def judged(term: Term, gain: float, width: int, track: Track) -> Candidate:
     """Turn a share of the held-out mean square error into a candidate's score."""
     left = max(1.0 - gain, LEAST_LEFT)
-    return Candidate(term, gain, float(np.log(left)) + price_of(term, width))
+    return Candidate(term, gain, float(np.log(left)) + price_of(term, width, track))
 
 
 def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
@@ -85,7 +85,7 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
         index = np.asarray(keep)
         own = batch.own[:, :, index[:, None], index]
         gain = float(beside.gains_of(term, cross[..., index], own, batch.moment[..., index])[0])
-        found.append(judged(term, gain, index.size))
+        found.append(judged(term, gain, index.size, dataset.fine.track))
     return min(found, key=lambda one: one.score)
 
 
@@ -131,7 +131,7 @@ class Beside:
     def candidates(self, batches: Sequence[Batch]) -> list[Candidate]:
         """Judge guesses, many at once: the chain's own regressors are read once for all."""
         return [
-            judged(term, float(gain), batch.width)
+            judged(term, float(gain), batch.width, self.dataset.fine.track)
             for batch in batches
             for term, gain in zip(batch.terms, self.gains(batch), strict=True)
         ]

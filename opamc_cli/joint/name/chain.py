@@ -5,6 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
+from opamc_cli.joint.explain.unnamed import DEGREES
 from opamc_cli.joint.fit.model import MOST_ROUNDS, Fit, Term, fit_terms
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.significance import paired
@@ -55,7 +56,8 @@ class Chain:
     def price(self) -> float:
         """Logarithm of the mean square error by which the added terms have to pay."""
         added = self._valued[len(self.fit.terms) - self.added :]
-        return sum(price_of(term, values.size) for term, values in added)
+        track = self.fit.dataset.fine.track
+        return sum(price_of(term, values.size, track) for term, values in added)
 
     @property
     def score(self) -> float:
@@ -192,10 +194,12 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
     return drop / max(float(before.sum()), 1e-300), drop / max(error, 1e-300)
 
 
-def price_of(term: Term, width: int) -> float:
+def price_of(term: Term, width: int, track: Track) -> float:
     """Price of a term: the effect, its `width` coefficients and its searched parameters, alike."""
-    # Of a line a cosine and its sine are one: a size, at whatever phase.
-    if term.effect.fast and term.effect.domain != "acceleration":
+    # Of a line a cosine and its sine are one: a size, at whatever phase. What turns no more often
+    # on the way than a smooth function bends is no line, nor is another joint.
+    lines = term.effect.fast and term.effect.domain != "acceleration"
+    if lines and 2 * line_of(term, track) > DEGREES[-1]:
         width = (width + 1) // 2
     charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
     return PRICE * (1 + charged + term.effect.searched(term.parameters))

@@ -115,7 +115,8 @@ def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
         width = longer.fit.coefficients[-1].size
         error = np.log(longer.mean_square / slow_chain.mean_square)
         scores[form.key] = error + PRICE * (1 + width + form.effect.searched(form.parameters))
-        assert price_of(form, width) == pytest.approx(scores[form.key] - error)
+        price = price_of(form, width, dataset.fine.track)
+        assert price == pytest.approx(scores[form.key] - error)
     assert len(scores) > 1
     assert found.score == pytest.approx(min(scores.values()), abs=1e-4)
     assert scores[found.term.key] == min(scores.values())

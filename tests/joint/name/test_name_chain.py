@@ -43,7 +43,8 @@ def effect(name, plausible=True, unnamed=False, searched=0, follows_load=False, 
         name=name,
         fast=fast,
         domain="motor-angle",
-        several=False,
+        several=fast,
+        first_steps=lambda track, parameters: {"order": 0.5},
         at_a_place=False,
         unnamed=unnamed,
         follows_load=follows_load,
@@ -83,8 +84,15 @@ def test_a_price_is_for_the_effect_its_coefficients_and_what_was_searched(
     unnamed, fast, width, searched, units
 ):
     one = effect("one", True, unnamed, searched, fast=fast)
-    term = SimpleNamespace(effect=one, parameters={})
-    assert price_of(term, width) == pytest.approx(CHARGE * units)
+    term = SimpleNamespace(effect=one, parameters={"order": 9.0} if fast else {})
+    assert price_of(term, width, None) == pytest.approx(CHARGE * units)
+
+
+@pytest.mark.parametrize(("turns", "units"), [(8.0, 6), (9.0, 4)])
+def test_what_turns_no_more_often_than_a_smooth_function_bends_is_no_line(turns, units):
+    """Three ripples of 3 to 8 turns on the way were a drag that the library did not hold."""
+    term = SimpleNamespace(effect=effect("one", searched=1, fast=True), parameters={"order": turns})
+    assert price_of(term, 4, None) == pytest.approx(CHARGE * units)
 
 
 def test_only_what_was_added_is_paid_for():
