@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.explain.unnamed import DEGREES
 from opamc_cli.joint.fit.model import MOST_ROUNDS, Fit, Term, fit_terms
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.significance import paired
@@ -196,10 +195,11 @@ def _gain(before: Floats, after: Floats) -> tuple[float, float]:
 
 def price_of(term: Term, width: int, track: Track) -> float:
     """Price of a term: the effect, its `width` coefficients and its searched parameters, alike."""
-    # Of a line a cosine and its sine are one: a size, at whatever phase. What turns no more often
-    # on the way than a smooth function bends is no line, nor is another joint.
+    # Of a line a cosine and its sine are one: a size, at whatever phase. No line is what turns so
+    # seldom on the way that a smooth function holds it for no more than the most that is charged,
+    # nor another joint.
     lines = term.effect.fast and term.effect.domain != "acceleration"
-    if lines and 2 * line_of(term, track) > DEGREES[-1]:
+    if lines and not (term.effect.several and 2 * line_of(term, track) <= MOST_CHARGED):
         width = (width + 1) // 2
     charged = width if term.effect.unnamed else min(width, MOST_CHARGED)
     return PRICE * (1 + charged + term.effect.searched(term.parameters))
