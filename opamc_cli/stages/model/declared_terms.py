@@ -19,7 +19,8 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
     Raises
     ------
     ConfigError
-        If a parameter is unknown, or one that the data would decide is missing beside others.
+        If a parameter is unknown, an exponent is not above 0, or a parameter that the data would
+        decide is missing beside others.
     """
     given = declared.parameters
     searched = effect.limits(track)
@@ -34,6 +35,12 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
             hint = f"did you mean {close[0]!r}?" if close else f"known: {', '.join(known)}"
             msg = f"Effect {effect.name!r} in the model has no parameter {name!r}; {hint}"
             raise ConfigError(msg)
+    if given.get("exponent", 1.0) <= 0:
+        msg = (
+            f"Effect {effect.name!r} in the model has exponent {given['exponent']:g}; it has to be "
+            "above 0"
+        )
+        raise ConfigError(msg)
     for name in searched:
         if name not in given:
             msg = (
