@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 
 class LoadFriction(Effect):
@@ -30,17 +30,21 @@ class LoadFriction(Effect):
         return super().untestable(track)
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """All of the inertia beyond the gear, half of it, or none; the load, or its square."""
-        shares = [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
-        return [*shares, *(share | {"exponent": 2.0} for share in shares)]
+        """All of the inertia beyond the gear, half of it, or none."""
+        return [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
+    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
+        """The square of the load in its place."""
+        return [(parameters | {"exponent": 2.0}, (0,))]
+
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Direction times a power of the fitted load current that passes the gear."""
-        load = track.load_a
+        size = np.abs(track.load_a[rows])
         beyond = 1 - parameters.get("inertia_share", 1.0)
         if beyond:
-            load = load - beyond * track.load_inertia * track.acceleration
-        return stack(track.direction * np.abs(load) ** parameters.get("exponent", 1.0))
+            size = np.abs(track.load_a[rows] - beyond * track.load_inertia * track.acceleration[rows])
+        exponent = parameters.get("exponent", 1.0)
+        return stack(track.direction[rows] * (size if exponent == 1.0 else size**exponent))
 
     def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:
         """Return a share of the load, or one per unit of it."""

@@ -1,6 +1,6 @@
 """Follow several chains of effects side by side, and keep the one that is worth its price."""
 
-from collections.abc import Collection, Hashable
+from collections.abc import Collection, Hashable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -99,11 +99,14 @@ class Trial(Tried):
 def guessed(effect: Effect, dataset: Dataset) -> list[Term]:
     """Every guess of a slow effect, and the smaller forms of each."""
     track = dataset.coarse.track
-    terms = []
-    for parameters in effect.guesses(track, np.zeros(track.size)):
-        terms.append(Term(effect, parameters))
-        terms += [Term(effect, form, keep) for form, keep in effect.variants(parameters)]
-    return terms
+    terms = [Term(effect, parameters) for parameters in effect.guesses(track, np.zeros(track.size))]
+    return [form for term in terms for form in (term, *_variants(term))]
+
+
+def _variants(term: Term) -> list[Term]:
+    """Smaller forms of an effect."""
+    forms = term.effect.variants(term.parameters)
+    return [Term(term.effect, parameters, keep) for parameters, keep in forms]
 
 
 def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]:
@@ -179,10 +182,17 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         if not signatures.isdisjoint(tried):
             continue
         tried |= signatures
-        children = [extended(chain, term) for term in forms]
-        child = min(children, key=lambda one: (not one.plausible_beside(chain), one.score))
+        child = _best_with(chain, forms)
+        if forms[0].effect.follows_load:
+            child = _best_with(chain, _variants(child.terms[-1]), child)
         found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found
+
+
+def _best_with(chain: Chain, forms: Sequence[Term], *others: Chain) -> Chain:
+    """Extend a chain by each of some forms, and choose among these chains and some others."""
+    children = (*others, *(extended(chain, term) for term in forms))
+    return min(children, key=lambda one: (not one.plausible_beside(chain), one.score))
 
 
 def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
@@ -201,19 +211,20 @@ def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
 
 
 def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
-    """Forms of each effect that follows the load: always tried, fitted together with the load.
+    """Guesses of each effect that follows the load: always tried, fitted together with the load.
 
     Beside the load that was fitted without it, a friction that has moved the load's zero shows
     as little.
     """
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms}
+    track = dataset.coarse.track
     return [
-        guessed(effect, dataset)
+        [Term(effect, parameters) for parameters in effect.guesses(track, np.zeros(track.size))]
         for effect in pool.library.values()
         if effect.follows_load
         and effect.name not in present
-        and not effect.untestable(dataset.coarse.track)
+        and not effect.untestable(track)
     ]
 
 
