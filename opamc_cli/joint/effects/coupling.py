@@ -5,74 +5,113 @@ import numpy as np
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 
-FORMS = (
+ONE = (
     (0,),  # a far or light link
     (0, 1, 2),  # one whose reach changes
-    (3, 4),  # a slow one on an axis that is parallel,
-    (5, 6),  # on one that is opposed,
-    (3, 4, 5, 6),  # or on any
-    (0, 1, 2, 7, 8, 9, 10, 11, 12),  # an arm that lies level
+    (0, 1, 2, 3, 4),  # the outer link of an elbow,
+    (0, 5, 6),  # or the inner one
+    (7, 8),  # a link that lifts, of a joint that stands upright
+    (9, 10),  # a slow link on an axis that is parallel,
+    (11, 12),  # on one that is opposed,
+    (9, 10, 11, 12),  # or on any
 )
-"""Columns of the smaller forms."""
+TWO = (
+    *((place, place + 1) for place in (0, 2, 4, 6)),  # a slow third link
+    *(tuple(range(place, place + 4)) for place in (8, 12)),  # both lift, of an upright joint
+)
+"""With `ONE`: columns of the smaller forms, with one other joint and with two."""
 
 
 class Coupling(Effect):
-    """Torques of an arm's other link.
+    """Torques of an arm's other links.
 
-    Of a planar elbow the shoulder bears ``(a + b cos q2) q2''``, ``2 b cos q2 q1''``,
-    ``-b sin q2 (2 q1' q2' + q2'^2)`` and ``g cos(q1 + q2)`` (Spong, Hutchinson, Vidyasagar, Robot
-    Modeling and Control, 2006, section 7.3). Zeros of the angles are unknown and axes may be
-    opposed: every wave is a sine and a cosine, and the difference stands beside the sum.
+    Of a planar elbow the shoulder bears ``(a + b cos q2) q2'' - b sin q2 q2'^2``, twice the rate
+    of change of ``b cos q2 q1'``, and ``g cos(q1 + q2)``; the elbow ``(a + b cos q2) q1'' + b sin
+    q2 q1'^2`` (Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, 2006, section 7.3). A
+    third link adds ``cos(q1 + q2 + q3)``; about an upright axis the links' inertia is a sum of
+    squares and products of ``cos q2`` and ``cos(q2 + q3)``. Zeros of the angles are unknown and
+    axes may be opposed: every wave is a sine and a cosine, and the difference stands beside the
+    sum.
     """
 
     name = "coupling"
     domain = "acceleration"
     origin = "load"
-    searches = ("axis",)
+    searches = ("axis", "beside")
     meaning = "torque from the motion of another joint: the arm's own dynamics, no fault"
     needs = ("position", "others")
     from_motion = True
-    # A joint's vibration reaches the next one, and averages would not show it.
+    # Program of a second are too short for averages, and a joint's vibration reaches the next one.
     fast = True
     several = True
+    carries_load = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Each of the joints that move beside."""
+        """Each of the joints that move beside, and each two of them."""
         if track.others is None:
             return []
         travels = np.ptp(track.others[:, : len(track.other_axes)], axis=0)
         least = SLOWEST_SHARE * np.ptp(track.position_rad)
         moving = zip(track.other_axes, travels > least, strict=True)
-        return [{"axis": float(axis)} for axis, moves in moving if moves]
+        axes = [float(axis) for axis, moves in moving if moves]
+        pairs = [{"axis": a, "beside": b} for a in axes for b in axes if a < b]
+        return [*({"axis": axis} for axis in axes), *pairs]
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Reaction, gravity, and what the angle between the links makes of both motions."""
-        if track.others is None or parameters["axis"] not in track.other_axes:
-            logged = ", ".join(str(axis) for axis in track.other_axes) or "none"
-            msg = (
-                f"effect 'coupling' asks for the position of axis {parameters['axis']:g}, and "
-                f"those that are logged beside a motion are {logged}; take the effect out"
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
+        """Regressors of one other joint, or of two, at some samples."""
+        q, dq, ddq = (one[rows] for one in (track.position_rad, track.velocity, track.acceleration))
+        a, da, dda = _motion(track, parameters["axis"], rows)
+        if "beside" not in parameters:
+            return stack(
+                dda,
+                *_carried(a, da, da, dda),
+                *_carried(a, da, dq, ddq),
+                np.cos(q) * dda + np.sin(q) * da**2,
+                np.sin(q) * dda - np.cos(q) * da**2,
+                *_carried(2 * a, 2 * da, dq, ddq),
+                *_waves(q + a),
+                *_waves(q - a),
             )
-            raise ConfigError(msg)
-        place = track.other_axes.index(int(parameters["axis"]))
-        angle, speed, acceleration = track.others.T[place :: len(track.other_axes)]
-        waves = np.cos(angle), np.sin(angle)
-        sums = track.position_rad + angle, track.position_rad - angle
-        return stack(
-            acceleration,
-            *(acceleration * wave for wave in waves),
-            *(wave(both) for both in sums for wave in (np.cos, np.sin)),
-            *(track.acceleration * wave for wave in waves),
-            *(speed**2 * wave for wave in waves),
-            *(track.velocity * speed * wave for wave in waves),
-        )
+        b, db, _ = _motion(track, parameters["beside"], rows)
+        weights = [_waves(q + way * a + side * b) for way in (1, -1) for side in (1, -1)]
+        lifted = [
+            _carried(2 * a + times * b, 2 * da + times * db, dq, ddq) for times in (1, 2, -1, -2)
+        ]
+        return stack(*(column for pair in (*weights, *lifted) for column in pair))
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
-        """Say which joint."""
-        return self.meaning.replace("another joint", f"axis {parameters['axis']:g}")
+        """Say which joints."""
+        axes = " and ".join(f"{axis:g}" for axis in parameters.values())
+        several = "axes " if "beside" in parameters else "axis "
+        return self.meaning.replace("another joint", several + axes)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """Forms of links that are far, light, slow or level."""
-        return [(parameters, keep) for keep in FORMS]
+        """Forms of links that are far, light, slow or upright."""
+        return [(parameters, keep) for keep in (TWO if "beside" in parameters else ONE)]
+
+
+def _motion(track: Track, axis: float, rows: Ints) -> Floats:
+    """Position, speed and acceleration of another joint at some samples, shape (3, rows)."""
+    if track.others is None or axis not in track.other_axes:
+        logged = ", ".join(str(axis) for axis in track.other_axes) or "none"
+        msg = (
+            f"effect 'coupling' asks for the position of axis {axis:g}, and those that are logged "
+            f"beside a motion are {logged}; take the effect out"
+        )
+        raise ConfigError(msg)
+    place = track.other_axes.index(int(axis))
+    return np.asarray(track.others[rows, place :: len(track.other_axes)].T)
+
+
+def _waves(angle: Floats) -> tuple[Floats, Floats]:
+    return np.cos(angle), np.sin(angle)
+
+
+def _carried(
+    angle: Floats, rate: Floats, speed: Floats, acceleration: Floats
+) -> tuple[Floats, Floats]:
+    """Rates of change of a speed times the cosine of an angle, and times its sine."""
+    cos, sin = _waves(angle)
+    return cos * acceleration - sin * rate * speed, sin * acceleration + cos * rate * speed

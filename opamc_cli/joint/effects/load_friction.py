@@ -34,17 +34,16 @@ class LoadFriction(Effect):
         return [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """The square of the load in its place."""
+        """Give the square of the load in its place."""
         return [(parameters | {"exponent": 2.0}, (0,))]
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Direction times a power of the fitted load current that passes the gear."""
-        size = np.abs(track.load_a[rows])
+        load = track.load_a[rows]
         beyond = 1 - parameters.get("inertia_share", 1.0)
         if beyond:
-            size = np.abs(track.load_a[rows] - beyond * track.load_inertia * track.acceleration[rows])
-        exponent = parameters.get("exponent", 1.0)
-        return stack(track.direction[rows] * (size if exponent == 1.0 else size**exponent))
+            load = load - beyond * track.load_inertia * track.acceleration[rows]
+        return stack(track.direction[rows] * np.abs(load) ** parameters.get("exponent", 1.0))
 
     def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:
         """Return a share of the load, or one per unit of it."""

@@ -74,10 +74,10 @@ class Grid:
     moving average takes into a coarse one, in this order; or of all samples; int array."""
 
     def spread(self, part: Floats) -> Floats:
-        """Put a term's current, of all samples or of those `near`, on the grid; (n,)."""
-        if part.size == self.track.size:
+        """Put what a term has at all samples, or at those `near`, on the grid; (n,) or (n, k)."""
+        if len(part) == self.track.size:
             return part
-        whole = np.zeros(self.track.size)
+        whole = np.zeros((self.track.size, *part.shape[1:]))
         whole[self.near] = part
         return whole
 
@@ -347,7 +347,8 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     rows = parts.rows[::every]
     blocks = [dataset.columns(term, fine=True) for term in terms]
     known = list(zip(roles, blocks, fitted.coefficients, strict=True))
-    carriers = np.concatenate([block for role, block, _ in known if role[0]], axis=1)
+    spread = dataset.fine.spread
+    carriers = np.concatenate([spread(block) for role, block, _ in known if role[0]], axis=1)
     columns = np.concatenate([parts.taken(b)[::every] for role, b, _ in known if any(role)], axis=1)
     own = np.concatenate([values for role, _, values in known if any(role)])
     carries, follows = (

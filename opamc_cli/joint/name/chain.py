@@ -170,7 +170,7 @@ def signature_of(terms: tuple[Term, ...], track: Track) -> Signature:
     def told(term: Term) -> tuple[object, ...]:
         line = next(iter(term.parameters), None) if term.effect.several else None
         rest = sorted((k, f"{v:.2g}") for k, v in term.parameters.items() if k != line)
-        return term.effect.name, line_of(term, track), *rest
+        return term.effect.name, line_of(term, track), term.keep, *rest
 
     return frozenset(map(told, terms))
 
