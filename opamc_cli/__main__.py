@@ -85,6 +85,8 @@ def _prepare_environment() -> None:
     else:
         os.environ.pop("SOURCE_DATE_EPOCH", None)
     os.environ["MPLBACKEND"] = "agg"  # figures are written, never shown
+    # else the metadata of everything that is installed are read, for plug-ins that none of ours has
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "1")
     _have_caches()
     look_for_garbage_seldom()
 

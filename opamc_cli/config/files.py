@@ -110,8 +110,7 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
         return model.model_validate(values)
     except ValidationError as error:
         first = min(error.errors(), key=_helps_little)
-        # pydantic names the choices of "a word or a section", which is no part of the key
-        place = [_part(p) for p in first["loc"] if not str(p).startswith(("dict[", "literal["))]
+        place = [_part(part) for part in _keys_of(first["loc"])]
         key = ".".join(place)
         if first["type"] == "extra_forbidden":
             known = _known_keys(model, first["loc"][:-1])
@@ -127,17 +126,46 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
         elif first["type"] == "missing":
             msg = f"{source}: {key} is missing; add it"
         else:
-            wanted = _lower_first(first["msg"])
+            wanted = TAKES.get(first["type"]) or _lower_first(first["msg"])
             if "valid tuple" in wanted:
                 wanted = f"it takes a list, such as {key}={_example(model, first['loc'])}"
             msg = f"{source}: {key} is {shown(first['input'])}; {wanted}"
         raise ConfigError(msg) from error
 
 
-def _helps_little(found: Mapping[str, Any]) -> tuple[bool, bool]:
+TAKES = {
+    "float_type": "it takes a number",
+    "float_parsing": "it takes a number",
+    "int_type": "it takes a whole number",
+    "int_parsing": "it takes a whole number",
+    "int_from_float": "it takes a whole number",
+    "finite_number": "it takes a number",
+    "string_type": "it takes a word",
+    "dict_type": "it takes keys and their values",
+    "model_type": "it takes keys and their values",
+}
+"""What is said of values of another kind, in place of pydantic's own words."""
+
+
+def _keys_of(place: tuple[int | str, ...]) -> Iterator[int | str]:
+    """Yield the keys of a value's place.
+
+    Pydantic names the choices of "a word or a section" as well, which are no part of it; those of
+    a list's entries by their kind.
+    """
+    entry = False
+    for part in place:
+        choice = entry and isinstance(part, str) and (part == "str" or part[:1].isupper())
+        if not choice and not str(part).startswith(("dict[", "literal[")):
+            yield part
+        entry = isinstance(part, int)
+
+
+def _helps_little(found: Mapping[str, Any]) -> tuple[bool, bool, int]:
     """Sort key: a misspelt key is also a missing one, and a section is no word."""
-    word_wanted = found["type"] == "literal_error" and not isinstance(found["input"], str)
-    return found["type"] != "extra_forbidden", word_wanted
+    wants_word = found["type"] in ("literal_error", "string_type")
+    no_word = wants_word and not isinstance(found["input"], str)
+    return found["type"] != "extra_forbidden", no_word, -len(found["loc"]) if no_word else 0
 
 
 def refuse_other_kind(source: str, values: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -174,6 +202,7 @@ def _example(model: type[BaseModel], place: tuple[int | str, ...]) -> str:
     for part in place:
         field = getattr(current, "model_fields", {}).get(part)
         if field is None:
+            default = None
             break
         current, default = field.annotation, field.default
     items = default if isinstance(default, tuple) and default else ("…",)

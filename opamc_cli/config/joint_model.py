@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import yaml
-from pydantic import Field
+from pydantic import Field, FiniteFloat
 
 from opamc_cli.config.files import read_values, validate
 from opamc_cli.config.models import JointConfig, Section
@@ -16,10 +16,10 @@ class DeclaredEffect(Section):
     """An effect with non-linear parameters, such as a ripple of a known order."""
 
     effect: str = Field(description="Name in the library.")
-    parameters: dict[str, float] = Field(
+    parameters: dict[str, FiniteFloat] = Field(
         default_factory=dict, description="Non-linear parameters; found from the data if absent."
     )
-    coefficients: tuple[float, ...] | None = Field(
+    coefficients: tuple[FiniteFloat, ...] | None = Field(
         None,
         description="Of a closed model, one per regressor; `opamc model evaluate` applies them, "
         "all else estimates them anew.",

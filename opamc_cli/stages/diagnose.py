@@ -201,7 +201,8 @@ def _diagnose(
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
-    page = report.run(out, title=config.report.title, figures_of_healthy=figures_of_healthy)
+    title = config.report.title
+    page = report.run(out, title=title, figures_of_healthy=figures_of_healthy, kept=kept)
     return DiagnoseOutcome(
         verdict=written.verdict,
         verdict_path=written.path,

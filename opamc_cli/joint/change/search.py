@@ -202,11 +202,11 @@ def _next(
     best: dict[str, tuple[float, Shift]] = {}
     for shift in shifts(compared, population, chosen, candidates):
         name = shift.terms[-1].effect.name
-        part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
-        p_value = min(shift.p_value / part, 1.0)
-        seen = shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power
-        if name not in best and seen:
-            best[name] = (p_value, shift)
+        if name in best:
+            continue
+        if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
+            part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
+            best[name] = (min(shift.p_value / part, 1.0), shift)
     if not best:
         return None
     if not chosen and "viscous" in best and grease.warmer_c is not None and grease.plausible:

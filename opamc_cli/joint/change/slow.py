@@ -7,6 +7,7 @@ its coefficients there lies outside what the baseline's units show for the same 
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -40,6 +41,11 @@ class Population:
     between: float
     """Variance, in shares of the slow current's power, by which sessions differ beyond what units
     of one session can show."""
+
+    @cached_property
+    def precision(self) -> Floats:
+        """Inverse of the covariance, in units of the residual's variance; (k, k)."""
+        return np.asarray(self.variance * np.linalg.pinv(self.covariance, hermitian=True))
 
 
 @dataclass(frozen=True)
@@ -105,8 +111,8 @@ def estimates(sums: Sums, population: Population) -> tuple[Floats, Floats]:
     own = population.mean.size
     cross, products = sums.gram[:, :own, own:], sums.gram[:, own:, own:]
     moment = sums.moment - sums.gram[:, :, :own] @ population.mean
-    precision = population.variance * np.linalg.pinv(population.covariance, hermitian=True)
-    held = np.swapaxes(cross, 1, 2) @ np.linalg.inv(sums.gram[:, :own, :own] + precision)
+    declared = sums.gram[:, :own, :own] + population.precision
+    held = np.swapaxes(cross, 1, 2) @ np.linalg.inv(declared)
     # A bump leaves 1e-310 in a unit that never comes near its place; the inverse would be infinite.
     information = np.where(abs(products) > 1e-200, products - held @ cross, 0) / population.variance
     asked = moment[:, own:] - (held @ moment[:, :own, None])[..., 0]

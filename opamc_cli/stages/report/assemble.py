@@ -3,11 +3,12 @@
 import functools
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures.loading import undocumented
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
@@ -52,6 +53,7 @@ def run(
     baseline: Sequence[Path] = (),
     target: Sequence[Path] = (),
     figures_of_healthy: bool = True,
+    kept: KeptResults | None = None,
 ) -> ReportOutcome:
     """Write report.html of an output folder.
 
@@ -65,6 +67,8 @@ def run(
         Where the runs are now, if not where the tables remember them.
     figures_of_healthy
         Whether joints that are healthy have their part in the figures.
+    kept
+        Where drawings of the baseline alone may lie.
 
     Raises
     ------
@@ -72,6 +76,7 @@ def run(
         If scores or features are missing, or any file is damaged.
     """
     inputs = read_inputs(out, {"baseline": _folders(baseline), "target": _folders(target)})
+    inputs = replace(inputs, kept=kept)
     page, omitted = render(inputs, title, figures_of_healthy)
     path = out / files.REPORT
     write_text(path, page)

@@ -31,6 +31,33 @@ def test_a_thinned_trace_keeps_its_extremes(values: list[float], most: int) -> N
         assert np.nanmax(kept_y) == np.nanmax(y)
 
 
+def slowly_thinned(x, y, max_points):
+    """Thin a trace stretch by stretch."""
+    if x.size <= max_points:
+        return x, y
+    size = -(-x.size // (max_points // 2))
+    keep = []
+    for start in range(0, x.size, size):
+        part = y[start : start + size]
+        found = {0}
+        if np.isfinite(part).any():
+            found = {int(np.nanargmin(part)), int(np.nanargmax(part))}
+        keep += sorted(start + place for place in found)
+    return x[keep], y[keep]
+
+
+@given(
+    st.lists(st.sampled_from([-1.0, 0.0, 0.0, 2.0, math.nan, math.inf, -math.inf]), max_size=90),
+    st.integers(2, 40),
+    st.sampled_from(["f4", "f8"]),
+)
+def test_a_trace_is_thinned_as_stretch_by_stretch(values: list[float], most: int, kind) -> None:
+    y = np.array(values, dtype=kind)
+    x = np.arange(y.size, dtype=float)
+    for one, other in zip(extremes(x, y, most), slowly_thinned(x, y, most), strict=True):
+        np.testing.assert_array_equal(one, other, strict=True)
+
+
 def test_null_numbers_become_nan() -> None:
     table = pa.table({"n": pa.array([1, None]), "x": pa.array([None, None])})
     columns = to_columns(table)

@@ -1,7 +1,10 @@
 """S(t) over one cycle of the baseline with its segments (thesis Figure 3-3)."""
 
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
@@ -11,6 +14,7 @@ from opamc_cli.signal.motion.motion_signal import MotionBand, motion_frames
 from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, temporal_fine_structure
 from opamc_cli.signal.transform.wavelet import Morse
+from opamc_cli.stages.chain.kept import remembered
 from opamc_cli.stages.chain.segments.carrier import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
 from opamc_cli.stages.report.figures.figure import (
     MAX_TRACE_POINTS,
@@ -25,6 +29,7 @@ from opamc_cli.stages.report.focus import Focus
 from opamc_cli.stages.report.results.columns import Columns, extremes, n_rows, select
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
 from opamc_cli.storage.runs import Run
+from opamc_cli.storage.sources import RunSource
 
 MARGIN_S = 1.0
 """Shown before and after the cycle."""
@@ -33,9 +38,29 @@ MAX_WINDOWS = 6
 """Of a recording that never stands still."""
 
 
+@dataclass(frozen=True)
+class _Cycle:
+    """All that the drawing depends on: the baseline alone, so that one serves many a night."""
+
+    run: RunSource
+    axis: int
+    spans: Sequence[tuple[int, int]]
+    """Samples of each segment, half-open."""
+    numbers: Sequence[int]
+    """With `spans`: of which motion each is."""
+    windows: bool
+    """Of a recording that never stands still."""
+    reported: bool
+    quantity: str
+    config: SegmentConfig
+    drawn_by: str
+    """Version of matplotlib."""
+
+
 def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     """Draw the current and what the segments were found by, segments shaded."""
-    motions = inputs.roles["baseline"].motions
+    baseline = inputs.roles["baseline"]
+    motions = baseline.motions
     if motions is None:
         msg = "baseline/motions.parquet and segments.parquet are absent"
         raise NothingToDrawError(msg)
@@ -43,34 +68,49 @@ def figure(inputs: ReportInputs, focus: Focus) -> Figure:
     if not n_rows(rows):
         msg = f"the baseline has no segment on axis {focus.axis}"
         raise NothingToDrawError(msg)
-    name = str(rows["run"][0])
-    with inputs.roles["baseline"].open_run(name) as run:
+    cycle = _Cycle(
+        run=baseline.source_of(str(rows["run"][0])),
+        axis=focus.axis,
+        spans=tuple(zip(rows["start"].tolist(), rows["stop"].tolist(), strict=True)),
+        numbers=tuple(map(int, rows.get("motion", range(n_rows(rows))))),
+        windows=bool(rows["kind"][0] == "window"),
+        reported=bool(rows["signal"][0] == "reported"),
+        quantity=inputs.quantity,
+        config=_segment_config(inputs),
+        drawn_by=mpl.__version__,
+    )
+    return Figure(**remembered(_drawn, inputs.kept)(cycle))
+
+
+def _drawn(cycle: _Cycle) -> dict[str, Any]:
+    """Draw a cycle; the fields of a figure."""
+    with cycle.run.open() as run, style():
         margin = round(MARGIN_S * run.sampling_rate_hz)
-        start = max(0, int(rows["start"].min()) - margin)
-        stop = min(run.n_samples, int(rows["stop"].max()) + margin)
-        reported = rows["signal"][0] == "reported"
-        draw = _draw_reported if reported else _draw_phases
-        with style():
-            drawing = canvas(3.9)
-            panels = drawing.subplots(2, 1, sharex=True)
-            caption = draw(panels, inputs, run, focus.axis, start, stop)
-            for panel in panels:
-                _shade(panel, rows, run.sampling_rate_hz)
-                panel.margins(x=0.0)
-            _number(panels[0], rows, run.sampling_rate_hz)
-            panels[1].set_xlabel(f"time in run {short(name)} (s)")
-            return finish(
+        start = max(0, min(first for first, _ in cycle.spans) - margin)
+        stop = min(run.n_samples, max(last for _, last in cycle.spans) + margin)
+        drawing = canvas(3.9)
+        panels = drawing.subplots(2, 1, sharex=True)
+        draw = _draw_reported if cycle.reported else _draw_phases
+        caption = draw(panels, cycle, run, start, stop)
+        for panel in panels:
+            _shade(panel, cycle, run.sampling_rate_hz)
+            panel.margins(x=0.0)
+        _number(panels[0], cycle, run.sampling_rate_hz)
+        panels[1].set_xlabel(f"time in run {short(run.name)} (s)")
+        return asdict(
+            finish(
                 drawing,
                 "motion-signal",
-                f"Motion signal of axis {focus.axis}",
-                f"{caption} Shaded: {_what_is_shaded(rows)}, with the number of their motion.",
-                f"Current and motion signal of axis {focus.axis} over one cycle of run {name} "
-                f"with {n_rows(rows)} segments.",
+                f"Motion signal of axis {cycle.axis}",
+                f"{caption} Shaded: {_what_is_shaded(cycle)}, with the number of their motion.",
+                f"Current and motion signal of axis {cycle.axis} over one cycle of run {run.name} "
+                f"with {len(cycle.spans)} segments.",
             )
+        )
 
 
-def _what_is_shaded(rows: Columns) -> str:
-    if rows["kind"][0] == "window":
+def _what_is_shaded(cycle: _Cycle) -> str:
+    if cycle.windows:
         return "the windows into which a recording is cut that never stands still"
     return "the segments of one cycle"
 
@@ -91,11 +131,9 @@ def _one_cycle(rows: Columns) -> Columns:
     return select(rows, rows["run"] == rows["run"][0])
 
 
-def _draw_phases(
-    panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
-) -> str:
-    config = _segment_config(inputs)
-    phases = run.channels(axis).phases
+def _draw_phases(panels: Any, cycle: _Cycle, run: Run, start: int, stop: int) -> str:
+    config = cycle.config
+    phases = run.channels(cycle.axis).phases
     names = phases if len(phases) == 3 else phases[:1]
     read = run.read(names, start, stop)
     current = read[names[0]]
@@ -113,7 +151,7 @@ def _draw_phases(
     tfs = temporal_fine_structure(vector, min(config.noise_floor * noise_level(vector), loudest_a))
     frames = motion_frames(tfs, band, rate, step, config.engine)
     _trace(panels[0], current, start / rate, 1.0 / rate, "muted")
-    panels[0].set_ylabel(inputs.quantity)
+    panels[0].set_ylabel(cycle.quantity)
     _trace(panels[1], frames.strength, start / rate, step / rate, "baseline")
     for threshold in (config.threshold_on, config.threshold_off):
         panels[1].axhline(threshold, color=colour("muted"), linewidth=0.7, dashes=(4, 3))
@@ -133,18 +171,19 @@ def _segment_config(inputs: ReportInputs) -> SegmentConfig:
     return SegmentConfig(**known)
 
 
-def _draw_reported(
-    panels: Any, inputs: ReportInputs, run: Run, axis: int, start: int, stop: int
-) -> str:
-    channels = run.channels(axis)
+def _draw_reported(panels: Any, cycle: _Cycle, run: Run, start: int, stop: int) -> str:
+    channels = run.channels(cycle.axis)
     rate = run.sampling_rate_hz
     motion = channels.velocity or channels.position
     if channels.current is None or motion is None:
-        msg = f"run {run.name} has neither phase currents nor position or velocity of axis {axis}"
+        msg = (
+            f"run {run.name} has neither phase currents nor position or velocity of axis "
+            f"{cycle.axis}"
+        )
         raise NothingToDrawError(msg)
     read = run.read([channels.current, motion], start, stop)
     _trace(panels[0], read[channels.current], start / rate, 1.0 / rate, "muted")
-    panels[0].set_ylabel(inputs.quantity)
+    panels[0].set_ylabel(cycle.quantity)
     _trace(panels[1], read[motion], start / rate, 1.0 / rate, "baseline")
     panels[1].set_ylabel("speed (rad/s)" if channels.velocity else "angle (rad)")
     return "Above: reported current. Below: the joint's motion, by which the segments were found."
@@ -157,16 +196,14 @@ def _trace(
     panel.plot(x, y, color=colour(role), linewidth=0.8)
 
 
-def _shade(panel: Axes, rows: Columns, rate: float) -> None:
-    for index in range(n_rows(rows)):
-        span = (rows["start"][index] / rate, rows["stop"][index] / rate)
-        panel.axvspan(*span, color=colour("baseline"), alpha=0.13, linewidth=0)
+def _shade(panel: Axes, cycle: _Cycle, rate: float) -> None:
+    for start, stop in cycle.spans:
+        panel.axvspan(start / rate, stop / rate, color=colour("baseline"), alpha=0.13, linewidth=0)
 
 
-def _number(panel: Axes, rows: Columns, rate: float) -> None:
+def _number(panel: Axes, cycle: _Cycle, rate: float) -> None:
     low, high = panel.get_ylim()
     panel.set_ylim(low, high + 0.15 * (high - low))
-    for index in range(n_rows(rows)):
-        middle = 0.5 * (rows["start"][index] + rows["stop"][index]) / rate
-        number = int(rows["motion"][index]) if "motion" in rows else index
+    for (start, stop), number in zip(cycle.spans, cycle.numbers, strict=True):
+        middle = 0.5 * (start + stop) / rate
         panel.text(middle, high + 0.02 * (high - low), str(number), ha="center", fontweight="bold")

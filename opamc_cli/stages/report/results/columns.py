@@ -42,12 +42,12 @@ def extremes(
     if x.size <= max_points:
         return x, y
     size = -(-x.size // (max_points // 2))
-    keep: list[int] = []
-    for start in range(0, x.size, size):
-        part = y[start : start + size]
-        if not np.isfinite(part).any():
-            keep.append(start)
-            continue
-        low, high = int(np.nanargmin(part)), int(np.nanargmax(part))
-        keep += sorted({start + low, start + high})
+    stretches = np.full((-(-x.size // size), size), np.nan, dtype=y.dtype)
+    stretches.ravel()[: y.size] = y
+    unknown = np.isnan(stretches)
+    low = np.argmin(np.where(unknown, np.inf, stretches), axis=1)
+    high = np.argmax(np.where(unknown, -np.inf, stretches), axis=1)
+    nothing = ~np.isfinite(stretches).any(axis=1)
+    low[nothing] = high[nothing] = 0
+    keep = np.unique(np.arange(0, x.size, size)[:, None] + np.stack([low, high], axis=1))
     return x[keep], y[keep]

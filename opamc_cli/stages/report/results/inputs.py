@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.errors import InputError
+from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.report.results.columns import Columns, n_rows, select, to_columns
 from opamc_cli.storage.files.json_documents import read_json
 from opamc_cli.storage.files.parquet import read_schema
@@ -53,8 +54,8 @@ class RoleTables:
         """Return the place of every run in time order."""
         return {source.name: rank for rank, source in enumerate(self.sources)}
 
-    def open_run(self, name: str) -> Run:
-        """Open a run whose samples a figure needs.
+    def source_of(self, name: str) -> RunSource:
+        """Return the run whose samples a figure needs.
 
         Raises
         ------
@@ -66,9 +67,13 @@ class RoleTables:
                 if not source.path.exists():
                     msg = f"the samples of run {name} are not there; name its folder"
                     raise NothingToDrawError(msg)
-                return source.open()
+                return source
         msg = f"no table says where run {name} is"
         raise NothingToDrawError(msg)
+
+    def open_run(self, name: str) -> Run:
+        """Open the run of `source_of`."""
+        return self.source_of(name).open()
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ class ReportInputs:
     """With `loop`, `residuals`: what `opamc model close` left, or None."""
     files: tuple[SourceFile, ...] = field(default=())
     """Every file that was read."""
+    kept: KeptResults | None = None
+    """Where drawings of the baseline alone may lie."""
 
     @property
     def axes(self) -> list[int]:
