@@ -9,13 +9,11 @@ from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 ONE = (
     (0,),  # a far or light link
-    (0, 1, 2),  # one whose reach changes
     (0, 1, 2, 3, 4),  # the outer link of an elbow,
     (0, 5, 6),  # or the inner one
     (7, 8),  # a link that lifts, of a joint that stands upright
     (9, 10),  # a slow link on an axis that is parallel,
-    (11, 12),  # on one that is opposed,
-    (9, 10, 11, 12),  # or on any
+    (11, 12),  # or opposed
 )
 TWO = (
     *((place, place + 1) for place in (0, 2, 4, 6)),  # a slow third link
@@ -43,7 +41,7 @@ class Coupling(Effect):
     meaning = "torque from the motion of another joint: the arm's own dynamics, no fault"
     needs = ("position", "others")
     from_motion = True
-    # Program of a second are too short for averages, and a joint's vibration reaches the next one.
+    # Programs of a second are too short for averages, and a joint's vibration reaches the next one.
     fast = True
     several = True
     carries_load = True

@@ -50,19 +50,51 @@ def shoulder(first, second):
     )
 
 
+def elbow(first, second):
+    """Torque on the elbow of the same arm."""
+    (q1, v1, a1), (q2, _, a2) = first, second
+    turned = 0.4 * (np.cos(q2) * a1 + np.sin(q2) * v1**2)
+    return 0.3 * (a1 + a2) + turned + 1.1 * np.cos(q1 + q2)
+
+
+def upright(first, second, third):
+    """Torque about an arm's vertical axis: its momentum's rate of change."""
+    inertia = 0.5 + (0.8 * np.cos(second[0]) + 0.6 * np.cos(second[0] + third[0] + 0.4)) ** 2
+    return np.gradient(inertia * first[1], 1 / RATE)
+
+
+def third_link(first, second, third):
+    """Torque on a shoulder whose elbow is balanced, and whose third link is not."""
+    return 0.5 * first[2] + 2.0 * np.cos(first[0]) + 1.5 * np.sin(first[0] + second[0] + third[0])
+
+
 def recording(current, place, others):
     return Recording("run", RATE, current, position_rad=place, others_rad=others)
 
 
-def test_the_textbook_s_elbow_is_held_by_the_columns():
-    first, second = waves(1), waves(2)
-    track = build_track([recording(first[0], first[0], {3: second[0]})], Joint())
+FIRST, SECOND, THIRD = waves(1), waves(2), waves(3)
+ELBOW = {"axis": 3.0}
+PAIR = [{"axis": 2.0}, {"axis": 3.0}, {"axis": 2.0, "beside": 3.0}]
+
+
+@pytest.mark.parametrize(
+    ("torque", "own", "others", "asked"),
+    [
+        (shoulder(FIRST, SECOND), FIRST, {3: SECOND}, [ELBOW]),
+        (elbow(FIRST, SECOND), SECOND, {3: FIRST}, [ELBOW]),
+        (third_link(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR[2:]),
+        (upright(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR),
+    ],
+    ids=["shoulder", "elbow", "third link", "upright"],
+)
+def test_an_arm_s_torques_are_held_by_the_columns(torque, own, others, asked):
+    places = {axis: motion[0] for axis, motion in others.items()}
+    track = build_track([recording(torque, own[0], places)], Joint())
     inner = slice(50, -50)
-    columns = built_in_library()["coupling"].columns(track, {"axis": 3.0})[inner]
-    own = np.stack([track.acceleration, np.sin(first[0]), np.cos(first[0])], axis=1)[inner]
-    design = np.concatenate([own, columns], axis=1)
-    torque = shoulder(first, second)[inner]
-    rest = torque - design @ np.linalg.lstsq(design, torque, rcond=None)[0]
+    columns = [built_in_library()["coupling"].columns(track, one)[inner] for one in asked]
+    declared = np.stack([track.acceleration, np.sin(own[0]), np.cos(own[0])], axis=1)[inner]
+    design = np.concatenate([declared, *columns], axis=1)
+    rest = torque[inner] - design @ np.linalg.lstsq(design, torque[inner], rcond=None)[0]
     assert np.std(rest) < 1e-3 * np.std(torque)
 
 
@@ -80,6 +112,30 @@ def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
     assert "motion of axis 2:" in step.interpretation
     assert step.term.effect.origin != "joint"
     assert loop.rmse_after_a < 1.1 * 0.05 < 0.2 * loop.rmse_before_a
+
+
+@pytest.mark.parametrize("torque", [third_link, upright])
+def test_two_joints_that_load_this_one_are_named_and_another_is_not(torque):
+    noise = 0.05 * np.random.default_rng(4).normal(size=FIRST[0].size)
+    current = torque(FIRST, SECOND, THIRD) + 0.3 * np.sign(FIRST[1]) + noise
+    laid = recording(current, FIRST[0], {2: SECOND[0], 3: THIRD[0], 6: waves(8)[0]})
+    loop = close_loop(fit_declared([laid], base=DECLARED), built_in_library())
+    assert {step.term.effect.name for step in loop.steps} == {"coupling"}
+    parameters = [step.term.parameters for step in loop.steps]
+    assert {"axis": 2.0, "beside": 3.0} in parameters
+    assert all(set(one.values()) <= {2.0, 3.0} for one in parameters)
+    assert any("motion of axes 2 and 3:" in step.interpretation for step in loop.steps)
+    assert loop.rmse_after_a < 1.1 * 0.05 < 0.2 * loop.rmse_before_a
+
+
+def test_friction_that_grows_with_what_another_joint_asks_is_found():
+    noise = 0.02 * np.random.default_rng(4).normal(size=FIRST[0].size)
+    load = shoulder(FIRST, SECOND)
+    current = load + np.sign(FIRST[1]) * (0.3 + 0.1 * np.abs(load)) + noise
+    laid = recording(current, FIRST[0], {2: SECOND[0]})
+    loop = close_loop(fit_declared([laid], base=DECLARED), built_in_library())
+    assert {step.term.effect.name for step in loop.steps} == {"coupling", "load_friction"}
+    assert loop.rmse_after_a < 1.1 * 0.02
 
 
 def test_a_joint_that_moves_beside_and_asks_nothing_is_not_named():

@@ -219,13 +219,14 @@ def test_at_one_speed_dry_friction_is_judged_together_with_viscous(per_speed, pl
 
 
 def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
-    def term(name, **parameters):
-        return SimpleNamespace(effect=effect(name), parameters=parameters)
+    def term(name, keep=None, **parameters):
+        return SimpleNamespace(effect=effect(name), parameters=parameters, keep=keep)
 
     one = signature_of((term("a", x=1.234, y=2.0), term("b")), None)
     assert one == signature_of((term("b"), term("a", y=2.0, x=1.22)), None)
     assert one != signature_of((term("b"), term("a", y=2.0, x=1.26)), None)
     assert one != signature_of((term("a", x=1.234, y=2.0),), None)
+    assert one != signature_of((term("a", x=1.234, y=2.0), term("b", keep=(0,))), None)
 
 
 def test_lines_are_the_same_where_the_travel_cannot_tell_them_apart(chain):
