@@ -20,6 +20,7 @@ class TimeDelay(Effect):
     of_its_recordings = True
     origin = "measurement"
     searches = ("delay_s",)
+    forms = ("filtered",)
     meaning = "current and motion are logged with a delay: check the logger's clocks"
     as_smoothing = True
     needs = ("position", "logged")

@@ -222,9 +222,7 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
     return [
         [Term(effect, parameters) for parameters in effect.guesses(track, np.zeros(track.size))]
         for effect in pool.library.values()
-        if effect.follows_load
-        and effect.name not in present
-        and not effect.untestable(track)
+        if effect.follows_load and effect.name not in present and not effect.untestable(track)
     ]
 
 

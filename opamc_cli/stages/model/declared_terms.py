@@ -28,7 +28,11 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
         return None
     guesses = effect.guesses(track, np.zeros(track.size))
     defaults = {**(guesses[0] if guesses else {}), **dict.fromkeys(effect.forms, 0.0)}
-    known = sorted({*searched, *defaults, *effect.searches})
+    # What a closed model says of a smaller form goes with the columns that it keeps.
+    smaller = [] if declared.columns is None else effect.variants(defaults)
+    known = sorted(
+        {*searched, *defaults, *effect.searches, *(k for form, _ in smaller for k in form)}
+    )
     for name in given:
         if name not in known:
             close = difflib.get_close_matches(name, known, n=1, cutoff=0.5)

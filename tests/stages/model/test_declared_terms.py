@@ -2,11 +2,14 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from opamc_cli.config.joint_model import DeclaredEffect, load_joint_model
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.joint.motion.kinematics import Recording, build_track
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.model.declared_terms import declared_term
 
 
@@ -39,3 +42,24 @@ def test_what_is_no_number_is_refused_by_its_key(entry, sentence, tmp_path):
     assert f"effects.1.{sentence}" in str(refused.value)
     assert str(refused.value).startswith(f"{file}: ")
     assert refused.value.exit_code == 2
+
+
+@pytest.mark.parametrize("name", built_in_library())
+def test_every_form_that_a_closed_model_may_hold_is_read_again(name):
+    """A warm-up of dry friction alone, or a payload's weight, was written and then refused."""
+    t = np.arange(4000) / 100.0
+    place, beside = np.sin(t), {2: np.cos(0.7 * t), 3: np.sin(1.3 * t)}
+    laid = Recording(
+        "run", 100.0, np.cos(t), position_rad=place, temperature_c=20 + t, others_rad=beside
+    )
+    track = build_track([laid], Joint(100.0, 4))
+    effect = built_in_library()[name]
+    for guess in effect.guesses(track, np.sin(30 * place)):
+        for form, keep in [(guess, None), *effect.variants(guess)]:
+            columns = None if effect.flags_choose_columns else keep
+            declared = DeclaredEffect(effect=name, parameters=form, columns=columns)
+            term = declared_term(effect, declared, track)
+            if term is None:
+                assert not form
+                continue
+            assert (term.parameters.items() >= form.items(), term.keep) == (True, columns)
