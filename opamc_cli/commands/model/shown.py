@@ -45,14 +45,18 @@ def _headline(result: Mapping[str, Any]) -> str:
         f"{value:.4g}" if (value := result.get(side, {}).get("rmse_a")) is not None else "?"
         for side in ("before", "after")
     )
-    words, curves = [], []
+    words, curves, axes = [], [], _axes_beside(steps)
     for step in steps:
         effect, meaning = step.get("effect", "unnamed"), step.get("interpretation", "")
         if effect.startswith("unnamed"):
             curves.append(meaning.split(";")[0])
         else:
             name = effect + (", approximately" if step.get("approximate") else "")
-            words.append(f"{meaning.split(':')[0].split(' (')[0]} ({name})")
+            what = meaning.split(":")[0].split(" (")[0]
+            if effect == "coupling" and len(axes) > 1:
+                what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
+            words.append(f"{what} ({name})")
+    words = list(dict.fromkeys(words))
     error = f"error {before} → {after} {unit}"
     fails = f"; {result['fails']}" if result.get("fails") else ""
     share = result.get("explained_share")
@@ -78,6 +82,13 @@ def _headline(result: Mapping[str, Any]) -> str:
     domain = result.get("domain")
     what = "; ".join(curves) or "something" + (f" in the {domain} domain" if domain else "")
     return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}{fails}"
+
+
+def _axes_beside(steps: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Name the joints whose motion loads this one, of all the steps that tell of one or two."""
+    given = [step.get("parameters", {}) for step in steps if step.get("effect") == "coupling"]
+    axes = {one[key] for one in given for key in ("axis", "beside") if key in one}
+    return [f"{axis:g}" for axis in sorted(axes)]
 
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:

@@ -96,6 +96,17 @@ def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
     assert "None" not in headline(entry)
 
 
+def test_joints_that_load_another_are_told_once() -> None:
+    pairs = [{"axis": 3.0, "beside": 4.0}, {"axis": 2.0}, {"axis": 2.0, "beside": 3.0}]
+    said = "torque from the motion of axis 3: no fault"
+    steps = [{"effect": "coupling", "interpretation": said, "parameters": one} for one in pairs]
+    entry = {"axis": 1, "before": {"rmse_a": 0.3}, "after": {"rmse_a": 0.2}, "steps": steps}
+    told = headline(entry)
+    assert told.startswith("Axis 1 lacks torque from the motion of axes 2, 3 and 4 (coupling): ")
+    alone = headline(entry | {"steps": [steps[1] | {"interpretation": said.replace("3", "2")}]})
+    assert alone.startswith("Axis 1 lacks torque from the motion of axis 2 (coupling): error")
+
+
 def test_an_error_far_above_the_noise_is_not_called_complete() -> None:
     entry = {
         "axis": 2, "unit": "A", "before": {"rmse_a": 0.69}, "after": {"rmse_a": 0.69},
