@@ -39,6 +39,7 @@ class MainsHum(Effect):
     origin = "measurement"
     searches = ("frequency_hz",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"
+    needs = ()
     from_motion = True
     fast = True
     several = True

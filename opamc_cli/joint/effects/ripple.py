@@ -49,7 +49,6 @@ class Ripple(Effect):
     per = ("",)
     searches = ("order",)
     meaning = "torque ripple"
-    needs = ("position",)
     fast = True
     several = True
     flags_choose_columns = True
