@@ -17,8 +17,7 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     Of products of regressors, (k, k), and these times the signal, (k,); directions below 1e-7 of
     the largest get no coefficient.
     """
-    solution: Floats = (inverse(gram) @ moment[..., None])[..., 0]
-    return solution
+    return (inverse(gram) @ moment[..., None])[..., 0]
 
 
 def inverse(gram: Floats) -> Floats:

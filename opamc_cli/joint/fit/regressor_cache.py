@@ -45,20 +45,13 @@ class RegressorCache:
                 for other in every[: i + 1]
                 if (id(other), id(block), fine) not in self._products
             ]
-            if not missing:
-                continue
             others = [self.rows(other, parts, fine) for other in missing]
             products = parts.products_of(others, self.rows(block, parts, fine))
             for other, product in zip(missing, products, strict=True):
                 self._products[id(other), id(block), fine] = product
                 self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
-        whole = np.concatenate(
-            [
-                np.concatenate([self._products[id(a), id(b), fine] for b in every], axis=2)
-                for a in every
-            ],
-            axis=1,
-        )
+        keys = [[(id(left), id(right), fine) for right in every] for left in every]
+        whole = np.block([[self._products[key] for key in row] for row in keys])
         ridge = np.zeros(whole.shape[1] - 1)
         return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts, ridge)
 

@@ -63,5 +63,4 @@ def without_sensor_errors(
     )
     found = solve(columns.T @ columns, columns.T @ flux)
     offset, imbalance = complex(found[0], found[1]), complex(found[2], found[3])
-    clean: NDArray[np.complex128] = vector - offset - imbalance * np.conj(vector)
-    return clean
+    return vector - offset - imbalance * np.conj(vector)
