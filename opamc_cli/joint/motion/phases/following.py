@@ -141,13 +141,9 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     clear = strong & (per_radian * angle_noise <= limit)
     window = int(rate_hz / bandwidth) | 1
     path = np.where(strong, measured, angle)
-    blur = np.stack(
-        [
-            derivatives(path, rate_hz, min(size, (path.size - 1) | 1), 2) - acceleration
-            for size in (int(rate_hz / bandwidth / 2) | 1, int(2 * rate_hz / bandwidth) | 1)
-        ],
-        axis=1,
-    )
+    sizes = [int(times * rate_hz / bandwidth) | 1 for times in (0.5, 2)]
+    sizes = [min(size, (path.size - 1) | 1) for size in sizes]
+    blur = np.stack([derivatives(path, rate_hz, size, 2) - acceleration for size in sizes], axis=1)
     kernel = smoothing_kernel(rate_hz, bandwidth)
     return PhaseAngle(angle, velocity, acceleration, strong, clear, window, kernel, blur)
 
