@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.least_squares import inverse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -130,15 +130,20 @@ class Track:
             0.0 if self.temperature_c is None else float(np.mean(self.temperature_c[self.moving]))
         )
 
-    @cached_property
+    @property
     def load_inertia(self) -> float:
         """Current of the fitted load that follows the acceleration, in A by rad/s²."""
+        rows, weights = self.inertia_weights
+        return float(weights @ self.load_a[rows])
+
+    @cached_property
+    def inertia_weights(self) -> tuple[Ints, Floats]:
+        """Samples of a load, and weights whose sum over them is what follows the acceleration."""
         rows = np.flatnonzero(self.moving)
         rows = rows[:: max(rows.size // ENOUGH_ROWS, 1)]
         place = self.position_rad[rows]
-        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, place**0)
-        columns = np.stack(shapes, axis=0).T
-        return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
+        shapes = np.stack((self.acceleration[rows], np.sin(place), np.cos(place), place, place**0))
+        return rows, inverse(shapes @ shapes.T)[0] @ shapes
 
     @cached_property
     def static_columns(self) -> Floats:
@@ -179,9 +184,12 @@ class Track:
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":
         """Return the same track with the fitted load and model currents, given at its full rate."""
-        full = self.full and replace(self.full, load_a=load_a, model_a=model_a)
+        full = self.full and self.full.with_model(load_a, model_a, ())
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
-        return replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
+        new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
+        # What follows from the motion alone stays, and is asked for at every step of a fit.
+        new.__dict__.update(speed_scale=self.speed_scale, inertia_weights=self.inertia_weights)
+        return new
 
 
 @dataclass(frozen=True)
