@@ -87,17 +87,16 @@ class Response(Effect):
         """Try three, six and twelve filters."""
         return [{"filters": count} for count in (3.0, 6.0, 12.0)]
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Low-passes and band-passes of second order, from 1.5 to 60 Hz."""
         full = track.full or track
-        highest = min(60.0, full.rate_hz / 3)
-        parts = [
-            answers(
-                [full.acceleration], 2 * np.pi * hz, RESPONSE_DAMPING, full.rate_hz, full.bounds
-            )
-            for hz in geometric(1.5, highest, int(parameters["filters"]))
-        ]
-        return stack(*(track.own_means(one) for part in parts for one in part))
+        signal, rate_hz, bounds = [full.acceleration], full.rate_hz, full.bounds
+        asked = rows if full is track else None
+        highest, count = min(60.0, rate_hz / 3), int(parameters["filters"])
+        filters = [2 * np.pi * hz for hz in geometric(1.5, highest, count)]
+        parts = [answers(signal, w, RESPONSE_DAMPING, rate_hz, bounds, asked) for w in filters]
+        columns = np.concatenate(parts).T
+        return columns if full is track else track.own_means(columns)[rows]
 
 
 class Shift(Effect):
