@@ -88,8 +88,9 @@ class Parts:
 
     def elsewhere(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over all units but each one."""
-        units = self.by_unit(values)
-        return np.asarray(units.sum(axis=0) - units)
+        others = (np.arange(self.units)[:, None] != self.unit).astype(float)
+        sums = others @ values.reshape(len(values), -1)
+        return np.asarray(sums.reshape(self.units, *values.shape[1:]))
 
     def products(self, left: Floats, right: Floats) -> Floats:
         """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
