@@ -1,5 +1,7 @@
 """Least squares of scaled sums of products, for regressors of any size and any likeness."""
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
@@ -17,8 +19,7 @@ def solve(gram: Floats, moment: Floats) -> Floats:
     Of products of regressors, (k, k), and these times the signal, (k,); directions below 1e-7 of
     the largest get no coefficient.
     """
-    solution: Floats = (inverse(gram) @ moment[..., None])[..., 0]
-    return solution
+    return (inverse(gram) @ moment[..., None])[..., 0]
 
 
 def inverse(gram: Floats) -> Floats:
@@ -27,12 +28,22 @@ def inverse(gram: Floats) -> Floats:
         return gram
     scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
     both = scale[..., :, None] * scale[..., None, :]
-    values, vectors = eigenvectors(gram / both)
-    sizes = np.abs(values)
-    large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
-    factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
-    found: Floats = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2) / both
-    return found
+    scaled = gram / both
+    try:
+        found = np.linalg.inv(scaled)
+    except np.linalg.LinAlgError:
+        found = np.full_like(scaled, np.nan)
+    # Norms of a matrix and its inverse bound how far its eigenvalues lie apart.
+    with np.errstate(over="ignore"):
+        norms = [np.linalg.norm(one, axis=(-2, -1)) for one in (scaled, found)]
+    near = ~(math.prod(norms) * SINGULAR_BELOW < 1)
+    if near.any():
+        values, vectors = eigenvectors(scaled[near])
+        sizes = np.abs(values)
+        large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
+        factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
+        found[near] = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2)
+    return np.asarray(found / both)
 
 
 def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:

@@ -242,10 +242,9 @@ def _rejected(tried: list[tuple[int, Tried]], added: set[str]) -> list[Tried]:
     found: dict[str, Tried] = {}
     for _, trial in tried:
         name = trial.term.effect.name
-        if name in added or (name in found and trial.gain <= found[name].gain):
-            continue
-        why = trial.why_not or "another effect explains the residual better"
-        found[name] = replace(trial, why_not=why)
+        if name not in added and (name not in found or trial.gain > found[name].gain):
+            why = trial.why_not or "another effect explains the residual better"
+            found[name] = replace(trial, why_not=why)
     return sorted(found.values(), key=lambda one: -one.gain)
 
 

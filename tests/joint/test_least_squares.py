@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from opamc_cli.joint import least_squares
 from opamc_cli.joint.least_squares import eigenvectors, inverse, solve
 
 
@@ -64,3 +65,19 @@ def test_a_matrix_that_divide_and_conquer_gives_up_on_is_solved_all_the_same(mon
     values, vectors = eigenvectors(plain + plain.T)
     np.testing.assert_allclose(vectors * values @ vectors.T, plain + plain.T, atol=1e-12)
     np.testing.assert_allclose(solve(gram, moment), expected, rtol=1e-6)
+
+
+def test_eigenvalues_are_asked_for_only_where_one_may_be_small(monkeypatch):
+    columns, _ = random_columns()
+    gram = np.swapaxes(columns, -1, -2) @ columns
+    gram[1, :, 2], gram[1, 2] = gram[1, :, 3].copy(), gram[1, 3].copy()
+    asked = []
+    own = least_squares.eigenvectors
+    monkeypatch.setattr(
+        least_squares, "eigenvectors", lambda some: asked.append(some.shape) or own(some)
+    )
+    found = inverse(gram)
+    assert asked == [(1, 6, 6)]
+    monkeypatch.setattr(np.linalg, "inv", lambda some: np.full_like(some, np.nan))
+    np.testing.assert_allclose(found, inverse(gram), rtol=1e-9, atol=1e-9 * abs(found).min())
+    assert asked[1] == (3, 6, 6)

@@ -24,8 +24,7 @@ def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Fl
     t_values: Floats = (after.mean(axis=0) - before.mean(axis=0)) / np.sqrt(
         np.maximum(variance, 1e-300) * (1 / n + 1 / m) + 2 * between
     )
-    p_values: Floats = stdtr(weight, -t_values)
-    return t_values, p_values
+    return t_values, stdtr(weight, -t_values)
 
 
 def moderated_covariance(sample: Floats, prior: Floats) -> Floats:

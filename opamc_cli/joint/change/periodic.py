@@ -44,13 +44,8 @@ def _picked_up(
     timed: Compared, residual: Floats, strongest: Line, between: float
 ) -> Reading | None:
     """Mains hum of a phase, which turns against the field in the torque current."""
-    sides = [
-        side
-        for turning, signals in standing_views(timed.track, residual)
-        if turning
-        for side in signals
-    ]
-    if not sides:
+    sides = dict(standing_views(timed.track, residual)).get(True)
+    if sides is None:
         return None
     one, other = (order_spectra(timed, side) for side in sides)
     spectra = replace(one, before=one.before + other.before, after=one.after + other.after)

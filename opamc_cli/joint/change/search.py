@@ -114,18 +114,16 @@ class Grease:
 
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
         """Name it."""
-        parameters: Parameters = {}
+        parameters: Parameters = {} if self.warmer_c is None else {"warmer_c": self.warmer_c}
         meaning = (
             "colder or warmer grease: friction that grows with the speed has changed (no "
             "temperature was logged: compare at equal temperature, and look at the grease if it "
             "remains)"
         )
         if self.warmer_c is not None:
-            parameters = {"warmer_c": self.warmer_c}
             word = f"{'warmer' if self.warmer_c > 0 else 'colder'} grease"
-            meaning = (
-                f"{word} (by {abs(self.warmer_c):.0f} °C; it is stiffer when cold), not a fault"
-            )
+            degrees = f"by {abs(self.warmer_c):.0f} °C"
+            meaning = f"{word} ({degrees}; it is stiffer when cold), not a fault"
         return SlowCause(
             effect="thermal_viscous",
             parameters=parameters,

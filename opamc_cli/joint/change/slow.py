@@ -179,8 +179,7 @@ def shift_current(compared: Compared, shift: Shift | None, fine: bool = True) ->
         return None
     columns = [compared.dataset.columns(term, fine) for term in shift.terms]
     acting = np.append(compared.after, False)[compared.dataset.grid_of(fine).track.group]
-    current: Floats = acting * (np.concatenate(columns, axis=1) @ shift.coefficients)
-    return current
+    return acting * (np.concatenate(columns, axis=1) @ shift.coefficients)
 
 
 def shift_power(compared: Compared, shift: Shift) -> float:

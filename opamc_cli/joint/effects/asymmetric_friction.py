@@ -13,7 +13,6 @@ class AsymmetricFriction(Effect):
     domain = "velocity"
     per = ("", "rad/s")
     meaning = "friction differs between directions: check bearing preload and seal lips"
-    needs = ("position",)
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

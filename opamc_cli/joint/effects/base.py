@@ -32,7 +32,8 @@ class Effect:
     """Where it comes from: the "joint" itself, where more of it is a fault; or from outside of its
     mechanics: "environment" (temperature), "load" (tool, work piece), "measurement" (sensors,
     drive, logger)."""
-    needs: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ("position",)
+    """Channels, by name, without which nothing shows it."""
     fast: bool = False
     """True where the regressors change too fast for a decimated grid."""
     several: bool = False

@@ -11,7 +11,6 @@ class Coulomb(Effect):
     domain = "velocity"
     per = ("",)
     meaning = "dry friction of bearings and seals: check the preload"
-    needs = ("position",)
     resists = True
     from_motion = True
 

@@ -32,9 +32,6 @@ class DeadTime(Effect):
         angle = track.electrical_rad
         side = np.sign(track.model_a)
         if parameters["six_step"]:
-            torque = np.zeros(track.size)
-            for phase in range(3):
-                phase_angle = np.cos(angle - 2 * np.pi * phase / 3)
-                torque += 2 / 3 * np.sign(phase_angle) * phase_angle
-            return stack(side * (torque - 4 / np.pi))
+            waves = [np.cos(angle - 2 * np.pi * phase / 3) for phase in range(3)]
+            return stack(side * (2 / 3 * np.abs(waves).sum(axis=0) - 4 / np.pi))
         return stack(side * np.cos(6 * angle), side * np.sin(6 * angle))

@@ -4,7 +4,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
-from opamc_cli.joint.motion.track import Floats, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Track
 
 
 class Elasticity(Effect):
@@ -44,8 +44,7 @@ class Elasticity(Effect):
         w = 2 * np.pi * parameters["resonance_hz"]
         acceleration = full.acceleration
         load, rate = answers([acceleration], w, parameters["damping"], full.rate_hz, full.bounds)
-        factor = round(full.rate_hz / track.rate_hz)
-        return stack(*(block_mean(one, full.bounds, factor) for one in (load - acceleration, rate)))
+        return stack(track.own_means(load - acceleration), track.own_means(rate))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""

@@ -23,7 +23,6 @@ class Gravity(Effect):
     origin = "load"
     searches = ("joint_rad_per_rad",)
     meaning = "weight of the links; not a fault in itself"
-    needs = ("position",)
     carries_load = True
     from_motion = True
 

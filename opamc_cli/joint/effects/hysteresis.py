@@ -20,7 +20,6 @@ class Hysteresis(Effect):
     per = ("",)
     searches = ("length_rad",)
     meaning = "torque lags behind after reversals: check gear preload and backlash"
-    needs = ("position",)
     resists = True
     from_motion = True
 

@@ -12,7 +12,6 @@ class Inertia(Effect):
     per = ("rad/s²",)
     origin = "load"
     meaning = "mass that is accelerated; not a fault in itself"
-    needs = ("position",)
     from_motion = True
     carries_load = True
 

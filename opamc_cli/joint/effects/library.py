@@ -65,11 +65,10 @@ class UnknownEffectError(ConfigError):
     def __init__(self, name: str, message: str) -> None:
         super().__init__(name, message)  # both, so that it can be sent to another process
         self.name = name
-        self._message = message
 
     def __str__(self) -> str:
         """Return the sentence."""
-        return self._message
+        return str(self.args[1])
 
 
 def built_in_library(without: tuple[str, ...] = ()) -> Library:

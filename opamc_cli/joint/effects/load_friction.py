@@ -17,7 +17,6 @@ class LoadFriction(Effect):
     name = "load_friction"
     domain = "load"
     meaning = "meshing losses grow with load: check the gear's lubrication and wear"
-    needs = ("position",)
     resists = True
     searches = ("inertia_share", "exponent")
     follows_load = True

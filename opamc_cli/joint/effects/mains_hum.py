@@ -39,6 +39,7 @@ class MainsHum(Effect):
     origin = "measurement"
     searches = ("frequency_hz",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"
+    needs = ()
     from_motion = True
     fast = True
     several = True
@@ -80,13 +81,8 @@ class MainsHum(Effect):
         if not track.own_clocks_s:
             return stack(*waves)
         started_s = track.time_s - track.run_time_s
-        return stack(
-            *(
-                np.where(np.abs(started_s - start_s) < SAME_START_S, wave, 0.0)
-                for start_s in track.own_clocks_s
-                for wave in waves
-            )
-        )
+        own = [np.abs(started_s - start_s) < SAME_START_S for start_s in track.own_clocks_s]
+        return stack(*(np.where(inside, wave, 0.0) for inside in own for wave in waves))
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Name the line, and say where it may be folded."""

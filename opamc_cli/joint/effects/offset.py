@@ -14,6 +14,7 @@ class Offset(Effect):
     per = ("",)
     origin = "measurement"
     meaning = "zero error of the current reading, or a constant force: check the sensor's zero"
+    needs = ()
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

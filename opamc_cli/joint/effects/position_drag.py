@@ -14,7 +14,6 @@ class PositionDrag(Effect):
     per = ("",)
     searches = ("place_rad", "width_rad", "flatness")
     meaning = "other friction at one place of the travel: inspect bearing, seal and cables there"
-    needs = ("position",)
     resists = True
     at_a_place = True
     from_motion = True

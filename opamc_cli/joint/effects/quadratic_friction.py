@@ -13,7 +13,6 @@ class QuadraticFriction(Effect):
     domain = "velocity"
     per = ("rad²/s²",)
     meaning = "churning losses: too much grease"
-    needs = ("position",)
     resists = True
     from_motion = True
 

@@ -41,7 +41,6 @@ class Ripple(Effect):
     highest frequency that the ripple reaches (`top_hz`), each direction with coefficients of its
     own. Beside that, a damaged mesh follows the sign of the load, and one that turns unevenly the
     current itself.
-
     """
 
     name = "ripple"
@@ -49,7 +48,6 @@ class Ripple(Effect):
     per = ("",)
     searches = ("order",)
     meaning = "torque ripple"
-    needs = ("position",)
     fast = True
     several = True
     flags_choose_columns = True

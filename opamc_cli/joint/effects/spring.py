@@ -13,7 +13,6 @@ class Spring(Effect):
     domain = "joint-angle"
     per = ("rad", "")
     meaning = "a force grows with the angle: check balancing spring and cable package"
-    needs = ("position",)
     from_motion = True
     carries_load = True
 

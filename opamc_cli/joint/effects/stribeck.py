@@ -19,7 +19,6 @@ class Stribeck(Effect):
     per = ("",)
     searches = ("stribeck_speed",)
     meaning = "mixed lubrication at low speed: check the grease film"
-    needs = ("position",)
     resists = True
     from_motion = True
 

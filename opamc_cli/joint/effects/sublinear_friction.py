@@ -14,7 +14,6 @@ class SublinearFriction(Effect):
     per = ("",)
     searches = ("exponent",)
     meaning = "shear-thinning or starved lubricant: check the grease grade"
-    needs = ("position",)
     resists = True
     from_motion = True
     least_exponent = 0.1  # below, and there, it is dry friction

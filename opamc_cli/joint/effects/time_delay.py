@@ -5,7 +5,7 @@ from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Floats, Ints, Track, block_mean
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -52,13 +52,13 @@ class TimeDelay(Effect):
         if not columns.shape[1] or rows is None:
             return np.zeros((track.size, 1))
         full = track.full or track
-        factor = round(full.rate_hz / track.rate_hz)
         samples = parameters["delay_s"] * full.rate_hz
         if parameters.get("filtered"):
             pole = np.exp(-1.0 / max(samples, 1e-3))
             late = [lagging(columns[start:stop], pole) for start, stop in full.bounds]
-            shifted = block_mean(np.concatenate(late), full.bounds, factor)
+            shifted = track.own_means(np.concatenate(late))
         else:
+            factor = round(full.rate_hz / track.rate_hz)
             shifted = late_means(track.static_sums, full.bounds, samples, factor)
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])

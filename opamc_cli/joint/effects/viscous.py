@@ -11,7 +11,6 @@ class Viscous(Effect):
     domain = "velocity"
     per = ("rad/s",)
     meaning = "lubricant friction: check grease amount and grade"
-    needs = ("position",)
     resists = True
     from_motion = True
 

@@ -91,20 +91,14 @@ def _judged_alike(other: Track, track: Track) -> Track:
 def declared_fit(dataset: Dataset, declared: Declared) -> Fit:
     """Fit a model, terms in its order; parameters that are not given are searched first."""
     terms: dict[int, Term] = {}
-    open_places = []
+    track = dataset.coarse.track
     for place, (effect, term) in enumerate(declared):
-        if term is not None:
-            terms[place] = term
-            continue
-        track = dataset.coarse.track
         fixed = not effect.limits(track) and not effect.several
         guesses = effect.guesses(track, np.zeros(track.size)) if fixed else []
-        if len(guesses) == 1:
-            terms[place] = Term(effect, guesses[0])
-        else:
-            open_places.append(place)
+        if term is not None or len(guesses) == 1:
+            terms[place] = term or Term(effect, guesses[0])
     fitted = fit_terms(dataset, tuple(terms[place] for place in sorted(terms)))
-    for place in open_places:
+    for place in sorted(set(range(len(declared))) - set(terms)):
         effect = declared[place][0]
         chain = chain_of(fitted, 0)
         found = candidates(chain, Pool.of(dataset, {effect.name: effect}), every=True)

@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.least_squares import solve
-from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, block_mean
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""
@@ -49,9 +49,8 @@ class Smooth(Effect):
         self.name = f"unnamed_{name}"
         self.domain = domain
         self.needs = needs
-        self.meaning = (
-            f"a function of {name.replace('_', ' ')}; no effect of the library has its form"
-        )
+        told = name.replace("_", " ")
+        self.meaning = f"a function of {told}; no effect of the library has its form"
         self.from_motion = not follows_model
         self.changes_in_time = domain in ("time", "temperature") or name.startswith("time")
         self._covariate = covariate
@@ -65,8 +64,12 @@ class Smooth(Effect):
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Cosines of the stretched covariate times each that they modify."""
         place = np.pi * stretched(self._covariate(track), track.moving, rows)
-        waves = cosines(place, int(parameters["degree"]))[self._first :]
-        return stack(*(part[rows] * wave for part in self._modified(track) for wave in waves))
+        # Of the place's multiples by Chebyshev's recurrence.
+        waves = [np.ones_like(place), np.cos(place)]
+        while len(waves) <= parameters["degree"]:
+            waves.append(2 * waves[1] * waves[-1] - waves[-2])
+        parts = [part[rows] for part in self._modified(track)]
+        return stack(*(part * wave for part in parts for wave in waves[self._first :]))
 
 
 class Response(Effect):
@@ -84,18 +87,16 @@ class Response(Effect):
         """Try three, six and twelve filters."""
         return [{"filters": count} for count in (3.0, 6.0, 12.0)]
 
-    def columns(self, track: Track, parameters: Parameters) -> Floats:
+    def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Low-passes and band-passes of second order, from 1.5 to 60 Hz."""
         full = track.full or track
-        factor = round(full.rate_hz / track.rate_hz)
-        highest = min(60.0, full.rate_hz / 3)
-        parts = [
-            answers(
-                [full.acceleration], 2 * np.pi * hz, RESPONSE_DAMPING, full.rate_hz, full.bounds
-            )
-            for hz in geometric(1.5, highest, int(parameters["filters"]))
-        ]
-        return stack(*(block_mean(one, full.bounds, factor) for part in parts for one in part))
+        signal, rate_hz, bounds = [full.acceleration], full.rate_hz, full.bounds
+        asked = rows if full is track else None
+        highest, count = min(60.0, rate_hz / 3), int(parameters["filters"])
+        filters = [2 * np.pi * hz for hz in geometric(1.5, highest, count)]
+        parts = [answers(signal, w, RESPONSE_DAMPING, rate_hz, bounds, asked) for w in filters]
+        columns = np.concatenate(parts).T
+        return columns if full is track else track.own_means(columns)[rows]
 
 
 class Shift(Effect):
@@ -124,14 +125,6 @@ class Shift(Effect):
         part = columns[rows]
         first = np.gradient(columns @ solve(part.T @ part, part.T @ track.current_a[rows]))
         return stack(first, np.gradient(first))
-
-
-def cosines(angle: Floats, degree: int) -> list[Floats]:
-    """Cosines of the multiples of an angle from 0 to some degree, by Chebyshev's recurrence."""
-    waves = [np.ones_like(angle), np.cos(angle)]
-    while len(waves) <= degree:
-        waves.append(2 * waves[1] * waves[-1] - waves[-2])
-    return waves
 
 
 def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) -> Floats:

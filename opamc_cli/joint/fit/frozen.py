@@ -31,17 +31,14 @@ class Applied:
     """Samples at which it means something: the joint moves, and the smoothing of the motion takes
     nothing from its acceleration; bool array of shape (n,)."""
 
-    def rmse(self, among: Bools | None = None) -> float:
+    def rmse(self, among: Bools | bool = True) -> float:
         """Root mean square residual on the judged samples, or on those that are `among` them."""
-        return rmse_of(self.residual_a[self._rows(among)])
+        return rmse_of(self.residual_a[self.judged & among])
 
-    def r2(self, among: Bools | None = None) -> float:
+    def r2(self, among: Bools | bool = True) -> float:
         """Share of the current's variance that the model explains; negative if it adds to it."""
-        rows = self._rows(among)
+        rows = self.judged & among
         return r2_of(self.track.current_a[rows], self.residual_a[rows])
-
-    def _rows(self, among: Bools | None) -> Bools:
-        return self.judged if among is None else self.judged & among
 
 
 def why_not_applied(term: Term, track: Track) -> str | None:

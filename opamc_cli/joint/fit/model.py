@@ -251,14 +251,15 @@ class Fit:
     def drift_free_error(self) -> Floats:
         """Held-out error of each part, where every part has an offset of its own."""
         grid = self.dataset.fine
-        sums = self.dataset.sums(self.terms, True, np.ones((grid.track.size, 1)))
+        ones = self.dataset.cache.columns("ones", lambda: np.ones((grid.track.size, 1)))
+        sums = self.dataset.sums(self.terms, True, ones)
         return sums.without_drift(grid.parts.stretches(grid.track.direction)).held_out()
 
     @cached_property
     def unsmoothed_error(self) -> Floats:
         """Held-out error of each part, with the difference to other windows beside the terms."""
         blur = self.dataset.fine.track.blur
-        beside = () if blur is None else (blur,)
+        beside = [] if blur is None else [self.dataset.cache.columns("blur", lambda: blur)]
         return self.dataset.sums(self.terms, True, *beside).held_out()
 
     def forget(self) -> None:
@@ -337,59 +338,57 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     To fit anew beside the last load alone may stay where it is: a gravity and an offset that have
     taken up the friction which grows with the load leave that load's zero in the wrong place.
     """
-    dataset, terms = fitted.dataset, fitted.terms
-    track, parts = dataset.fine.track, dataset.fine.parts
+    dataset, track, parts = fitted.dataset, fitted.dataset.fine.track, fitted.dataset.fine.parts
+    # All else, of which a drive's answers to ripples have hundreds of columns, stays as it is.
+    moves = [one.effect.carries_load or one.effect.follows_load for one in fitted.terms]
+    order = np.argsort(np.logical_not(moves), kind="stable")
+    terms, known = ([some[i] for i in order] for some in (fitted.terms, fitted.coefficients))
     roles = [(term.effect.carries_load, term.effect.follows_load) for term in terms]
     # What carried the load may have been taken out again.
     if not all(map(any, zip(*roles, strict=True))):
         return dataset
     every = max(parts.rows.size // LOAD_SAMPLES, 1)
     rows = parts.rows[::every]
+    count, widths = sum(moves), [values.size for values in known]
     blocks = [dataset.columns(term, fine=True) for term in terms]
-    known = list(zip(roles, blocks, fitted.coefficients, strict=True))
-    spread = dataset.fine.spread
-    carriers = np.concatenate([spread(block) for role, block, _ in known if role[0]], axis=1)
-    columns = np.concatenate([parts.taken(b)[::every] for role, b, _ in known if any(role)], axis=1)
-    own = np.concatenate([values for role, _, values in known if any(role)])
-    carries, follows = (
-        np.repeat(some, [values.size for role, _, values in known if any(role)])
-        for some in zip(*filter(any, roles), strict=True)
-    )
-    # All else, of which a drive's answers to ripples have hundreds of columns, stays as it is.
-    fixed = [block for role, block, _ in known if not any(role)]
-    kept = dataset.sums((), True, *fixed).gram.sum(axis=0) / every
-    others = np.concatenate([columns[:, :0], *(parts.taken(b)[::every] for b in fixed)], axis=1)
-    held = [values for role, _, values in known if not any(role)]
+    some = [dataset.cache.rows(block, parts, True, every) for block in blocks]
+    columns, others = np.concatenate(some[:count], axis=1), some[count:]
+    kept = dataset.sums((), True, *blocks[count:]).gram.sum(axis=0) / every
+    carries, follows = np.repeat(roles[:count], widths[:count], axis=0).T
+    carrying = [block for (carries_it, _), block in zip(roles, blocks, strict=True) if carries_it]
+    carriers = np.concatenate([dataset.fine.spread(block) for block in carrying], axis=1)
+    largest = np.maximum(np.abs(carriers).max(axis=0), 1e-300)
 
     def following(load: Floats) -> Floats:
-        moved = replace(track, load_a=load)
+        moved = track.with_model(load, track.model_a, ())
         return np.concatenate([t.columns(moved, rows) for t in terms if t.effect.follows_load], 1)
 
-    values = start = np.concatenate([own, *held])
+    values = start = np.concatenate(known)
     best, least, step = track.load_a, np.inf, 0.0 * values
     for _ in range(MOST_ROUNDS):
-        own = values[: own.size]
+        own, *held = np.split(values, np.cumsum(widths)[count - 1 : -1])
         load = carriers @ own[carries]
         columns[:, follows] = following(load)
-        rest = track.current_a[rows] - columns @ own - others @ values[own.size :]
+        rest = track.current_a[rows] - columns @ own - sum(map(np.matmul, others, held))
         error = float(rest @ rest)
         settled = abs(least - error) <= SETTLED * least < np.inf
         if error < least:
             best, least, start = load, error, values
             jacobian = columns.copy()
-            tiny = TINY * np.abs(load).max() / np.maximum(np.abs(carriers).max(axis=0), 1e-300)
+            tiny = TINY * np.abs(load).max() / largest
             for place, size, carrier in zip(np.flatnonzero(carries), tiny, carriers.T, strict=True):
                 aside = (following(load + size * carrier) - columns[:, follows]) @ own[follows]
                 jacobian[:, place] += aside / max(size, 1e-300)
-            inside, across = jacobian.T @ jacobian, others.T @ jacobian
-            gram = np.block([[inside, across.T], [across, kept]])
-            step = 2 * solve(gram, np.concatenate([jacobian.T @ rest, others.T @ rest]))
+            asked = np.concatenate([jacobian, rest[:, None]], axis=1)
+            found = np.concatenate([block.T @ asked for block in (jacobian, *others)])
+            beside = np.concatenate([found[own.size :, :-1].T, kept])
+            step = 2 * solve(np.block([found[:, :-1], beside]), found[:, -1])
         if settled:
             break
         # A step that was too long is halved.
         step = step / 2
         values = start + step
-    return dataset.with_model(best, track.model_a, static_terms(terms))
+    return dataset.with_model(best, track.model_a, static_terms(fitted.terms))
 
 
 def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:

@@ -88,8 +88,9 @@ class Parts:
 
     def elsewhere(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over all units but each one."""
-        units = self.by_unit(values)
-        return np.asarray(units.sum(axis=0) - units)
+        others = (np.arange(self.units)[:, None] != self.unit).astype(float)
+        sums = others @ values.reshape(len(values), -1)
+        return np.asarray(sums.reshape(self.units, *values.shape[1:]))
 
     def products(self, left: Floats, right: Floats) -> Floats:
         """Sum ``left.T @ right`` over each part, shape (p, k, m); both hold the parts' rows."""
@@ -114,18 +115,14 @@ def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
     groups = [rows for rows in groups if rows.size]
     cuts = -(-FEWEST_UNITS // max(len(groups), 1))
     units = [piece for rows in groups for piece in np.array_split(rows, cuts) if piece.size]
-    rows: list[Ints] = []
-    unit: list[int] = []
-    judged: list[bool] = []
-    for number, members in enumerate(units):
-        for piece in np.array_split(members, PARTS_PER_UNIT):
-            for kind in (True, False):
-                chosen = piece[clear[piece] == kind]
-                if chosen.size:
-                    rows.append(chosen)
-                    unit.append(number)
-                    judged.append(kind)
-    slices = ranges(piece.size for piece in rows)
+    pieces = [
+        (piece[clear[piece] == kind], number, kind)
+        for number, members in enumerate(units)
+        for piece in np.array_split(members, PARTS_PER_UNIT)
+        for kind in (True, False)
+    ]
+    rows, unit, judged = zip(*(piece for piece in pieces if piece[0].size), strict=True)
+    slices = ranges(map(len, rows))
     return Parts(np.concatenate(rows), slices, np.array(unit), np.array(judged), clear.size)
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 
 from opamc_cli.joint.fit.parts import Parts, Sums
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Floats, ranges
 
 MOST_BYTES = 200e6
 """Regressors that are kept, with their rows in parts; a dataset has 1 GB for everything."""
@@ -22,7 +22,7 @@ class RegressorCache:
         self._columns: dict[Hashable, Floats] = {}
         # The load and the model, (n,) each, that sets of terms which follow them were fitted with.
         self.settled: dict[Hashable, tuple[Floats, Floats]] = {}
-        self._taken: dict[tuple[int, bool], tuple[Floats, Floats]] = {}
+        self._taken: dict[tuple[int, bool, int], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
 
@@ -45,36 +45,39 @@ class RegressorCache:
                 for other in every[: i + 1]
                 if (id(other), id(block), fine) not in self._products
             ]
-            if not missing:
-                continue
             others = [self.rows(other, parts, fine) for other in missing]
             products = parts.products_of(others, self.rows(block, parts, fine))
             for other, product in zip(missing, products, strict=True):
                 self._products[id(other), id(block), fine] = product
                 self._products[id(block), id(other), fine] = np.swapaxes(product, 1, 2)
-        whole = np.concatenate(
-            [
-                np.concatenate([self._products[id(a), id(b), fine] for b in every], axis=2)
-                for a in every
-            ],
-            axis=1,
-        )
+        spans = ranges(block.shape[1] for block in every)
+        whole = np.empty((len(parts.slices), spans[-1][1], spans[-1][1]))
+        for block, (start, stop) in zip(every, spans, strict=True):
+            for other, (first, last) in zip(every, spans, strict=True):
+                whole[:, first:last, start:stop] = self._products[id(other), id(block), fine]
         ridge = np.zeros(whole.shape[1] - 1)
         return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts, ridge)
 
-    def rows(self, block: Floats, parts: Parts, fine: bool) -> Floats:
-        """Return the parts' rows of a regressor array."""
-        key = (id(block), fine)
+    def rows(self, block: Floats, parts: Parts, fine: bool, every: int = 1) -> Floats:
+        """Return the parts' rows of a regressor array, or one in `every` of them."""
+        key = (id(block), fine, every)
         if key not in self._taken:
+            rows = parts.taken(block)
+            rows = rows if every == 1 else np.asfortranarray(rows[::every])
             # The block itself is kept beside its rows, so that its identity stays its own.
-            self._taken[key] = (block, parts.taken(block))
+            self._taken[key] = (block, rows)
         return self._taken[key][1]
 
     def _bounded(self) -> None:
-        """Forget everything where it takes too much memory: products are known by their blocks."""
-        pairs = self._taken.values()
-        every = (*self._columns.values(), *(one for pair in pairs for one in pair))
+        """Forget what follows the model, which nothing meets again; all where it is too much."""
+        kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
+        # Products are known by their blocks.
+        self._taken = {key: pair for key, pair in self._taken.items() if key[0] in kept}
+        pairs = [key for key in self._products if kept.issuperset(key[:2])]
+        self._products = {key: self._products[key] for key in pairs}
+        fitted = (one for pair in (*self._taken.values(), *self.settled.values()) for one in pair)
         # Rows may be a view of the block, and both of what was computed.
+        every = (*self._columns.values(), *fitted)
         owners = (block if block.base is None else block.base for block in every)
         if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()

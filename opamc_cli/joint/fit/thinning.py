@@ -42,11 +42,8 @@ def thinned(
     for group in picks:
         rows = np.flatnonzero(member & (track.group == group))
         half = int(budget / 2)
-        if whole or rows.size <= 2 * half:
-            pieces.append((int(rows[0]), int(rows[-1]) + 1))
-        else:
-            pieces.append((int(rows[0]), int(rows[half - 1]) + 1))
-            pieces.append((int(rows[-half]), int(rows[-1]) + 1))
+        taken = [rows] if whole or rows.size <= 2 * half else [rows[:half], rows[-half:]]
+        pieces += [(int(some[0]), int(some[-1]) + 1) for some in taken]
     return pieces
 
 

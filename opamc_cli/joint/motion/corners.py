@@ -50,9 +50,7 @@ def clear_of_corners(
     lengths = stops - starts
     vibrates = 2 * lengths[lengths > LONGEST_CORNER * kernel.size].sum() > lengths.sum()
     few = np.count_nonzero(moving & ~lacking) < FEWEST_CLEAR * np.count_nonzero(moving)
-    if vibrates or few:
-        return clear
-    return ~lacking
+    return clear if vibrates or few else ~lacking
 
 
 def widened(rows: Bools, reach: int) -> Bools:

@@ -390,13 +390,12 @@ def _one(
 def _logged_motion(recording: Recording, smoothing: Smoothing | None) -> tuple[Motion, Bools]:
     """Motion of a logged position or, without one, of a logged speed, and where that is known."""
     position, speed = recording.position_rad, recording.velocity_rad_s
+    if position is None:
+        assert speed is not None
+        return motion_from_velocity(filled(speed), recording.rate_hz), np.isfinite(speed)
     whole = None if speed is None else filled(speed)
-    if position is not None:
-        motion = motion_from_position(filled(position), whole, recording.rate_hz, smoothing)
-        return motion, np.isfinite(position)
-    assert speed is not None
-    assert whole is not None
-    return motion_from_velocity(whole, recording.rate_hz), np.isfinite(speed)
+    motion = motion_from_position(filled(position), whole, recording.rate_hz, smoothing)
+    return motion, np.isfinite(position)
 
 
 def _scaled(phase_angle: PhaseAngle, scale: float) -> Motion:

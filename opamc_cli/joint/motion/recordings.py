@@ -21,8 +21,11 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     lengths = [cycle_length(track.velocity[start:stop]) for start, stop in track.bounds]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
-    channels = track.channels | ({"revisits"} if _revisits(track) else set())
-    track = replace(track, channels=channels)
+    # Places are passed at different times where the path is three times the travel, or more.
+    runs = [track.position_rad[start:stop] for start, stop in track.bounds]
+    path = sum(float(np.abs(np.diff(run)).sum()) for run in runs)
+    if path >= SHORTEST_PATH * float(np.ptp(track.position_rad)):
+        track = replace(track, channels=track.channels | {"revisits"})
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
 
@@ -38,20 +41,10 @@ def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:
     for pick in picks:
         start, stop = track.bounds[pick]
         first = max(int(np.argmax(track.moving[start:stop])) - 1, 0)
-        span = (
-            slice(first, first + ENOUGH_SAMPLES) if stop - start > ENOUGH_SAMPLES else slice(None)
-        )
+        long = stop - start > ENOUGH_SAMPLES
+        span = slice(first, first + ENOUGH_SAMPLES) if long else slice(None)
         found.append(recordings[pick].cut(span))
     return found
-
-
-def _revisits(track: Track) -> bool:
-    """Tell whether places are passed at different times: three times the travel, or more."""
-    inside = np.ones(track.size - 1, dtype=bool)
-    for start, _ in track.bounds[1:]:
-        inside[start - 1] = False
-    path = float(np.abs(np.diff(track.position_rad))[inside].sum())
-    return path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
 
 
 def is_moving(track: Track) -> bool:

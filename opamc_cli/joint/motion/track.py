@@ -1,7 +1,7 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
 from collections.abc import Hashable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
 from typing import Any, Protocol
@@ -10,37 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from opamc_cli.joint.least_squares import solve
+from opamc_cli.joint.least_squares import inverse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 
-SAMPLED = (
-    "time_s",
-    "run_time_s",
-    "current_a",
-    "position_rad",
-    "velocity",
-    "acceleration",
-    "machine_angle_rad",
-    "direction",
-    "moving",
-    "clear",
-    "group",
-    "load_a",
-    "model_a",
-    "temperature_c",
-    "electrical_rad",
-    "open_samples",
-    "blur",
-    "others",
-)
-"""Attributes of a track that have a value per sample, or are None."""
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
-"""Those of which a block has something else than the mean, or nothing."""
-
+"""What has a value per sample, but in a block something else than their mean, or nothing."""
 
 ENOUGH_ROWS = 4000
 """By which the load's shapes are told apart: built-in effects' loads are sums of them."""
@@ -152,15 +130,20 @@ class Track:
             0.0 if self.temperature_c is None else float(np.mean(self.temperature_c[self.moving]))
         )
 
-    @cached_property
+    @property
     def load_inertia(self) -> float:
         """Current of the fitted load that follows the acceleration, in A by rad/s²."""
+        rows, weights = self.inertia_weights
+        return float(weights @ self.load_a[rows])
+
+    @cached_property
+    def inertia_weights(self) -> tuple[Ints, Floats]:
+        """Samples of a load, and weights whose sum over them is what follows the acceleration."""
         rows = np.flatnonzero(self.moving)
         rows = rows[:: max(rows.size // ENOUGH_ROWS, 1)]
         place = self.position_rad[rows]
-        shapes = (self.acceleration[rows], np.sin(place), np.cos(place), place, place**0)
-        columns = np.stack(shapes, axis=0).T
-        return float(solve(columns.T @ columns, columns.T @ self.load_a[rows])[0])
+        shapes = np.stack((self.acceleration[rows], np.sin(place), np.cos(place), place, place**0))
+        return rows, inverse(shapes @ shapes.T)[0] @ shapes
 
     @cached_property
     def static_columns(self) -> Floats:
@@ -182,8 +165,12 @@ class Track:
     @cached_property
     def static_means(self) -> Floats:
         """Regressors of the static terms on this track's own samples, shape (n, k)."""
+        return self.own_means(self.static_columns)
+
+    def own_means(self, values: Floats) -> Floats:
+        """Average what is given at the full rate, (n,) or (n, k), over this track's own samples."""
         full = self.full or self
-        return block_mean(self.static_columns, full.bounds, round(full.rate_hz / self.rate_hz))
+        return block_mean(values, full.bounds, round(full.rate_hz / self.rate_hz))
 
     def forget(self) -> None:
         """Drop what follows from the static terms; it is computed again where it is asked for.
@@ -197,17 +184,12 @@ class Track:
         self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
     ) -> "Track":
         """Return the same track with the fitted load and model currents, given at its full rate."""
-        if self.full is None:
-            return replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms)
-        bounds = self.full.bounds
-        factor = round(self.full.rate_hz / self.rate_hz)
-        return replace(
-            self,
-            load_a=block_mean(load_a, bounds, factor),
-            model_a=block_mean(model_a, bounds, factor),
-            static_terms=static_terms,
-            full=replace(self.full, load_a=load_a, model_a=model_a),
-        )
+        full = self.full and self.full.with_model(load_a, model_a, ())
+        load_a, model_a = self.own_means(load_a), self.own_means(model_a)
+        new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
+        # What follows from the motion alone stays, and is asked for at every step of a fit.
+        new.__dict__.update(speed_scale=self.speed_scale, inertia_weights=self.inertia_weights)
+        return new
 
 
 @dataclass(frozen=True)
@@ -252,8 +234,13 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
         blocks = (stop - start) // factor
         part = values[start : start + blocks * factor].T
         parts.append(part.reshape((*part.shape[:-1], blocks, factor)) @ ones)
-    means: Floats = np.concatenate(parts, axis=-1).T / factor
-    return means
+    return np.concatenate(parts, axis=-1).T / factor
+
+
+def sampled(track: Track) -> dict[str, Any]:
+    """Return what a track has per sample, by name: every array but the kernel."""
+    every = {one.name: getattr(track, one.name) for one in fields(track) if one.name != "kernel"}
+    return {name: values for name, values in every.items() if isinstance(values, np.ndarray)}
 
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
@@ -270,23 +257,20 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     Samples that are not `inside`, bool (n,), lose their group.
     """
     rows = np.concatenate([np.arange(start, stop) for start, stop in spans])
-    group = np.where(inside, track.group, -1)
-    track = replace(track, group=group)
-    sampled = {name: getattr(track, name) for name in SAMPLED}
-    taken = {name: values[rows] for name, values in sampled.items() if values is not None}
+    track = replace(track, group=np.where(inside, track.group, -1))
+    taken = {name: values[rows] for name, values in sampled(track).items()}
     return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
 
 
 def joined(pieces: Sequence[Track]) -> Track:
     """Lay tracks of one joint at one rate one after another; what one of them lacks, none has."""
-    sampled: dict[str, Any] = {}
-    for name in SAMPLED:
-        values = [getattr(piece, name) for piece in pieces]
-        known = all(value is not None for value in values)
-        sampled[name] = np.concatenate(values) if known else None
+    parts = [sampled(piece) for piece in pieces]
+    whole: dict[str, Any] = dict.fromkeys(parts[0])
+    for name in set.intersection(*map(set, parts)):
+        whole[name] = np.concatenate([part[name] for part in parts])
     return replace(
         pieces[0],
-        **sampled,
+        **whole,
         bounds=ranges(piece.size for piece in pieces),
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
@@ -320,10 +304,8 @@ def coarsen(track: Track, factor: int) -> Track:
     clear = mean(track.clear.astype(float)) > 1 - 1e-9
     whole = group == np.round(group)
     moving = (mean(track.moving.astype(float)) > 1 - 1e-9) & whole
-    sampled = {name: getattr(full, name) for name in SAMPLED if name not in NOT_AVERAGED}
-    means: dict[str, Any] = {
-        name: mean(values) for name, values in sampled.items() if values is not None
-    }
+    means: dict[str, Any] = sampled(full)
+    means = {name: mean(one) for name, one in means.items() if name not in NOT_AVERAGED}
     return replace(
         track,
         rate_hz=track.rate_hz / factor,

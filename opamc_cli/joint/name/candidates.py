@@ -41,11 +41,6 @@ class Batch:
     beside: Products = field(default_factory=dict, repr=False, compare=False)
     """Products with other terms, of those that were asked for."""
 
-    @property
-    def width(self) -> int:
-        """Regressors of each guess."""
-        return int(self.own.shape[-1])
-
 
 def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batch]:
     """Compute the regressors of guesses and their products, by width."""
@@ -78,7 +73,7 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     (batch,) = batches_of(dataset, [full], fine=True)
     cross = beside.products(batch.columns)[:, None]
     found = []
-    forms = [(full, tuple(range(batch.width)))]
+    forms = [(full, tuple(range(batch.own.shape[-1])))]
     for form, keep in effect.variants(full.parameters):
         forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
     for term, keep in forms:
@@ -98,14 +93,14 @@ class Beside:
         self.parts: Parts = dataset.parts[0 if self.fine else 1]
         self.counted = self.parts.judged if self.fine else np.ones_like(self.parts.judged)
         self.fast_part: Floats | None = None
-        terms = chain.fit.terms
-        self.terms = terms if self.fine else [term for term in terms if not term.effect.fast]
-        if not self.fine:
+        if self.fine:
+            self.terms = chain.fit.terms
+            blocks = [dataset.columns(term, True) for term in self.terms]
+            self.sums = dataset.sums(self.terms, True, blocks=blocks)
+        else:
+            self.terms = tuple(term for term in chain.fit.terms if not term.effect.fast)
             self.sums, blocks, fast = chain.fit.coarse_sums
             self.fast_part = fast[self.parts.rows]
-        else:
-            blocks = [dataset.columns(term, True) for term in terms]
-            self.sums = dataset.sums(terms, True, blocks=blocks)
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses
 
@@ -131,14 +126,14 @@ class Beside:
     def candidates(self, batches: Sequence[Batch]) -> list[Candidate]:
         """Judge guesses, many at once: the chain's own regressors are read once for all."""
         return [
-            judged(term, float(gain), batch.width, self.dataset.fine.track)
+            judged(term, float(gain), batch.own.shape[-1], self.dataset.fine.track)
             for batch in batches
             for term, gain in zip(batch.terms, self.gains(batch), strict=True)
         ]
 
     def gains(self, batch: Batch) -> Floats:
         """Share of the held-out mean square that each guess takes beside the chain; shape (K,)."""
-        count, width = len(batch.terms), batch.width
+        count, width = batch.own.shape[1:3]
         cross = self.products(batch.columns, batch.beside)
         cross = cross.reshape(*cross.shape[:2], count, width).transpose(0, 2, 1, 3)
         moment = batch.moment

@@ -9,7 +9,6 @@ from opamc_cli.joint.motion.track import Floats
 
 LEAST_T = 2.0
 """A difference over its standard error, over parts of the open data, that is none below it."""
-
 DECOYS = 5
 
 

@@ -15,6 +15,7 @@ from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.track import coarsen
 
 
 @settings(max_examples=60, deadline=None)
@@ -101,6 +102,10 @@ def test_a_response_is_low_and_band_passes_of_the_acceleration(track):
         )
     ]
     np.testing.assert_allclose(columns, np.stack(expected, axis=1), atol=1e-12)
+    for grid in (track, coarsen(track, 3)):
+        rows = np.arange(1, grid.size, 5)
+        some = effect.columns_at(grid, {"filters": 3.0}, rows)
+        np.testing.assert_array_equal(some, effect.columns(grid, {"filters": 3.0})[rows])
     # A slower recording has no room for 60 Hz.
     slow = replace(track, rate_hz=90.0)
     highest = answers([slow.acceleration], 2 * np.pi * 30.0, 0.3, 90.0, slow.bounds)

@@ -1,5 +1,7 @@
 """Products that are kept, against products that are computed, whatever was forgotten between."""
 
+import weakref
+
 import numpy as np
 import pytest
 from test_parts import random_parts
@@ -85,3 +87,29 @@ def test_what_is_asked_for_is_not_forgotten_and_mistaken_for_what_comes_after(mo
     others = [drawn() for _ in range(100)]
     again = [other for other in others if id(other) in places]
     check(cache.sums([*again, kept], current, parts, True), [*again, kept], current, parts)
+
+
+def test_what_follows_the_model_is_forgotten_and_the_rest_stays():
+    rng = np.random.default_rng(5)
+    parts = random_parts(rng, 8)
+    size = parts.rows.max() + 1
+    current, cache, computed = rng.normal(size=size), RegressorCache(), []
+
+    def drawn():
+        computed.append(1)
+        return rng.normal(size=(size, 2))
+
+    follows = drawn()
+    gone = weakref.ref(follows)
+    for beside in ([follows], []):
+        cache.sums([cache.columns("stays", drawn), *beside], current, parts, True)
+    del follows, beside
+    assert gone() is None
+    assert len(computed) == 2
+
+
+def test_one_in_some_rows_is_that_of_the_parts_rows():
+    parts = random_parts(np.random.default_rng(6), 8)
+    block = np.random.default_rng(7).normal(size=(parts.rows.max() + 1, 3))
+    some = RegressorCache().rows(block, parts, True, 4)
+    assert some.tolist() == block[parts.rows[::4]].tolist()

@@ -117,3 +117,15 @@ def test_the_static_terms_are_summed_from_zero_in_each_recording():
     np.testing.assert_array_equal(coarse.full.model_a, 2 * track.velocity)
     coarse.forget()
     assert not {"static_columns", "static_sums", "static_means"} & set(vars(coarse))
+
+
+def test_a_loads_inertia_is_told_beside_weight_and_springs_and_what_tells_it_stays():
+    track = track_of()
+    track = replace(track, acceleration=np.random.default_rng(8).normal(size=track.size))
+    weight = np.sin(track.position_rad) - 0.3 * track.position_rad + 0.2
+    for inertia in (0.0, 1.5):
+        load = inertia * track.acceleration + weight
+        loaded = track.with_model(load, load, ())
+        assert loaded.load_inertia == pytest.approx(inertia, abs=1e-6)
+        assert loaded.inertia_weights is track.inertia_weights
+        assert loaded.speed_scale == track.speed_scale

@@ -121,9 +121,11 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
         strong, measured = averaged_angle(found.vector, angle, noise, found.floor, rate_hz)
         angle, _ = bridged(measured, strong, rough, sure, found.spread, rate_hz, bandwidth)
     measured = measured - np.pi * np.round((measured - angle) / np.pi)
-    angle, velocity, acceleration = smoothed_angle(
-        measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0
-    )
+
+    def smoothed() -> tuple[Floats, Floats, Floats]:
+        return smoothed_angle(measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0)
+
+    angle, velocity, acceleration = smoothed()
     angle_noise = noise / np.maximum(length, 1e-300)
     typical = float(np.median(angle_noise[strong])) if strong.any() else 0.0
     for _ in range(BANDWIDTH_ROUNDS):
@@ -133,21 +135,15 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
         if narrower > 0.9 * bandwidth:
             break
         bandwidth = narrower
-        angle, velocity, acceleration = smoothed_angle(
-            measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0
-        )
+        angle, velocity, acceleration = smoothed()
     limit = NOISIEST_SHARE * float(np.std(acceleration[strong])) if strong.any() else 0.0
     per_radian = acceleration_noise(1.0, rate_hz, bandwidth)
     clear = strong & (per_radian * angle_noise <= limit)
     window = int(rate_hz / bandwidth) | 1
     path = np.where(strong, measured, angle)
-    blur = np.stack(
-        [
-            derivatives(path, rate_hz, min(size, (path.size - 1) | 1), 2) - acceleration
-            for size in (int(rate_hz / bandwidth / 2) | 1, int(2 * rate_hz / bandwidth) | 1)
-        ],
-        axis=1,
-    )
+    sizes = [int(times * rate_hz / bandwidth) | 1 for times in (0.5, 2)]
+    sizes = [min(size, (path.size - 1) | 1) for size in sizes]
+    blur = np.stack([derivatives(path, rate_hz, size, 2) - acceleration for size in sizes], axis=1)
     kernel = smoothing_kernel(rate_hz, bandwidth)
     return PhaseAngle(angle, velocity, acceleration, strong, clear, window, kernel, blur)
 

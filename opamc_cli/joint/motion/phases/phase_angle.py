@@ -58,7 +58,11 @@ class PhaseAngle:
             return self.angle_rad, 0.0
         rows = rows[:: max(rows.size // ALIGNMENT_SAMPLES, 1)]
         angle, position, speed = self.angle_rad[rows], position_rad[rows], velocity_rad_s[rows]
-        slope = _rough_slope(self.velocity_rad_s[rows], speed)
+        # By the speeds, at which half turns do not count.
+        fast = np.abs(speed) > FAST * float(np.quantile(np.abs(speed), 0.95))
+        fast &= speed != 0
+        ratios = self.velocity_rad_s[rows][fast] / speed[fast]
+        slope = float(np.median(ratios)) if fast.any() else 1.0
         if ratio is not None:
             slope = float(np.copysign(ratio, slope))
         else:
@@ -70,15 +74,7 @@ class PhaseAngle:
         offset = complex(np.mean(np.exp(2j * (angle - path[rows]))))
         if abs(offset) < ALIGNED:
             return self.angle_rad, 0.0
-        electrical: Floats = path + 0.5 * float(np.angle(offset))
-        return electrical, lag_s
-
-
-def _rough_slope(electrical_rad_s: Floats, speed: Floats) -> float:
-    """Electrical radians per joint radian by the speeds, at which half turns do not count."""
-    fast = np.abs(speed) > FAST * float(np.quantile(np.abs(speed), 0.95))
-    fast &= speed != 0
-    return float(np.median(electrical_rad_s[fast] / speed[fast])) if fast.any() else 1.0
+        return path + 0.5 * float(np.angle(offset)), lag_s
 
 
 def _slope(angle: Floats, position: Floats, speed: Floats, rough: float) -> float:

@@ -51,17 +51,9 @@ def without_sensor_errors(
         return vector
     rotated = vector[fast] * np.exp(-1j * angle_rad[fast])
     torque, flux, angle = rotated.real, rotated.imag, angle_rad[fast]
-    columns = np.stack(
-        [
-            -np.sin(angle),
-            np.cos(angle),
-            -torque * np.sin(2 * angle),
-            torque * np.cos(2 * angle),
-            np.ones(angle.size),
-        ],
-        axis=1,
-    )
+    once, twice = np.exp(1j * angle), torque * np.exp(2j * angle)
+    parts = (-once.imag, once.real, -twice.imag, twice.real, np.ones(angle.size))
+    columns = np.stack(parts, axis=1)
     found = solve(columns.T @ columns, columns.T @ flux)
     offset, imbalance = complex(found[0], found[1]), complex(found[2], found[3])
-    clean: NDArray[np.complex128] = vector - offset - imbalance * np.conj(vector)
-    return clean
+    return vector - offset - imbalance * np.conj(vector)
