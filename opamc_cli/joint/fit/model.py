@@ -6,6 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
+from opamc_cli.errors import ConfigError
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.fit.parts import Parts, Sums, parts_of, whole_parts
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
@@ -39,12 +40,24 @@ class Term:
     keep: tuple[int, ...] | None = None
 
     def columns(self, track: Track, rows: Ints | None = None) -> Floats:
-        """Regressors on the track's grid, shape (n, m), or at some of its samples, (rows, m)."""
+        """Regressors on the track's grid, shape (n, m), or at some of its samples, (rows, m).
+
+        Raises
+        ------
+        ConfigError
+            If it is to keep a column that the effect has not.
+        """
         effect, given = self.effect, self.parameters
         found = (
             effect.columns(track, given) if rows is None else effect.columns_at(track, given, rows)
         )
-        return found if self.keep is None else found[:, self.keep]
+        if self.keep is None:
+            return found
+        count = found.shape[1]
+        if max(self.keep, default=0) >= count:
+            msg = f"effect {effect.name!r} has no column {max(self.keep)}; its {count} count from 0"
+            raise ConfigError(msg)
+        return found[:, self.keep]
 
     @cached_property
     def key(self) -> tuple[object, ...]:

@@ -63,3 +63,13 @@ def test_every_form_that_a_closed_model_may_hold_is_read_again(name):
                 assert not form
                 continue
             assert (term.parameters.items() >= form.items(), term.keep) == (True, columns)
+
+
+def test_a_column_that_an_effect_has_not_is_refused():
+    """It ended as a bug."""
+    laid = Recording("run", 100.0, np.zeros(400), position_rad=np.sin(np.arange(400) / 40))
+    declared = DeclaredEffect(effect="gravity", columns=(0, 7))
+    track = build_track([laid], Joint())
+    term = declared_term(built_in_library()["gravity"], declared, track)
+    with pytest.raises(ConfigError, match="'gravity' has no column 7; its 2 count from 0"):
+        term.columns(track)
