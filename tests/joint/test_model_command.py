@@ -305,8 +305,11 @@ def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path,
     for run, lacking in (("run", []), ("still", ["coupling"])):
         assert opamc(
             "model", "evaluate", tmp_path / f"{run}.parquet", "--axis", 1,
-            "--model", tmp_path / "out" / "model.yaml", "--out", tmp_path / run,
+            "--model", tmp_path / "out" / "model.yaml", "--out", tmp_path / run, "--quiet",
         ) == 0  # fmt: skip
+        assert ("axis 1: not applied coupling: no other joint" in capsys.readouterr().err) == (
+            bool(lacking)
+        )
         said = json.loads((tmp_path / run / "evaluation.json").read_text())["axes"][0]
         assert [one["effect"] for one in said["not_applied"]] == lacking
         assert (said["rmse_a"] < 0.05) == (not lacking)

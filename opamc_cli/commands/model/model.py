@@ -182,6 +182,9 @@ def _on_axes(
         *(line for result in outcome.results for line in shown(result)),
         *(str(path) for path in outcome.written),
     )
+    for result in outcome.results if output.quiet else ():
+        for one in result.get("not_applied", ()):
+            output.failure(f"axis {result['axis']}: not applied {one['effect']}: {one['why']}")
     _end(outcome, output)
 
 
