@@ -26,9 +26,11 @@ def inverse(gram: Floats) -> Floats:
     """Pseudo-inverses of scaled, stacked matrices of products, shape (..., k, k)."""
     if gram.shape[-1] == 0:
         return gram
-    scale = np.sqrt(np.maximum(np.diagonal(gram, axis1=-2, axis2=-1), 1e-200))
+    sizes = np.diagonal(gram, axis1=-2, axis2=-1)
+    # What nothing excites has no coefficient, not even the rounding of an eigenvector.
+    scale = np.sqrt(np.where(sizes > 0, sizes, np.inf))
     both = scale[..., :, None] * scale[..., None, :]
-    scaled = gram / both
+    scaled = gram / both + np.eye(gram.shape[-1]) * (sizes <= 0)[..., None]
     try:
         found = np.linalg.inv(scaled)
     except np.linalg.LinAlgError:
@@ -39,8 +41,8 @@ def inverse(gram: Floats) -> Floats:
     near = ~(math.prod(norms) * SINGULAR_BELOW < 1)
     if near.any():
         values, vectors = eigenvectors(scaled[near])
-        sizes = np.abs(values)
-        large = sizes > SINGULAR_BELOW * sizes.max(axis=-1, keepdims=True)
+        spread = np.abs(values)
+        large = spread > SINGULAR_BELOW * spread.max(axis=-1, keepdims=True)
         factors = np.divide(1.0, values, out=np.zeros_like(values), where=large)
         found[near] = (vectors * factors[..., None, :]) @ np.swapaxes(vectors, -1, -2)
     return np.asarray(found / both)

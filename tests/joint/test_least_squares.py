@@ -39,6 +39,19 @@ def test_a_column_of_zeros_gets_nothing_and_breaks_nothing():
     assert solve(np.zeros((1, 1)), np.zeros(1)) == pytest.approx([0.0])
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_what_nothing_excites_has_no_coefficient_beside_columns_that_are_alike(seed):
+    rng = np.random.default_rng(seed)
+    columns = rng.normal(size=(50, 6))
+    columns[:, 3], columns[:, 4] = 0.0, columns[:, 1]
+    gram, moment = columns.T @ columns, columns.T @ rng.normal(size=50)
+    assert solve(gram, moment)[3] == 0.0
+    assert not inverse(gram)[3].any()
+    rest = np.delete(np.arange(6), 3)
+    expected = solve(gram[np.ix_(rest, rest)], moment[rest])
+    np.testing.assert_allclose(solve(gram, moment)[rest], expected, rtol=1e-9)
+
+
 def test_inverse_is_the_inverse_and_of_a_singular_matrix_the_pseudo_inverse():
     columns, _ = random_columns()
     gram = np.swapaxes(columns, -1, -2) @ columns
@@ -68,9 +81,12 @@ def test_a_matrix_that_divide_and_conquer_gives_up_on_is_solved_all_the_same(mon
 
 
 def test_eigenvalues_are_asked_for_only_where_one_may_be_small(monkeypatch):
-    columns, _ = random_columns()
+    columns, signal = random_columns()
+    size = np.linalg.norm(columns[1, :, 3])
+    columns[1, :, 2] = columns[1, :, 3] + 1e-6 * size * signal[1]
+    # A column that nothing excites is no reason.
+    columns[0, :, 4] = 0.0
     gram = np.swapaxes(columns, -1, -2) @ columns
-    gram[1, :, 2], gram[1, 2] = gram[1, :, 3].copy(), gram[1, 3].copy()
     asked = []
     own = least_squares.eigenvectors
     monkeypatch.setattr(
@@ -79,5 +95,8 @@ def test_eigenvalues_are_asked_for_only_where_one_may_be_small(monkeypatch):
     found = inverse(gram)
     assert asked == [(1, 6, 6)]
     monkeypatch.setattr(np.linalg, "inv", lambda some: np.full_like(some, np.nan))
-    np.testing.assert_allclose(found, inverse(gram), rtol=1e-9, atol=1e-9 * abs(found).min())
+    every = inverse(gram)
+    sizes = np.sqrt(np.einsum("gii->gi", gram))
+    found, every = (one * sizes[:, None, :] * sizes[:, :, None] for one in (found, every))
+    np.testing.assert_allclose(found, every, rtol=1e-9, atol=1e-9)
     assert asked[1] == (3, 6, 6)
