@@ -1,12 +1,19 @@
 """Close the loop: explain, name, and open the sealed data once."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturated, unnamed_library
+from opamc_cli.joint.explain.saturated import (
+    LINKS,
+    Ceiling,
+    ceiling,
+    saturated,
+    unnamed_library,
+    with_links,
+)
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.smoothing import measurement_noise
@@ -109,6 +116,9 @@ def close_loop(
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
     explained = saturated(start, unnamed)
+    saturations = [explained.fit]
+    if not LINKS.untestable(before.dataset.fine.track):
+        saturations.append(saturated(start, with_links(unnamed)).fit)
     pool = Pool.of(before.dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
@@ -122,7 +132,7 @@ def close_loop(
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    return _opened(before, only_named.fit, final.fit, explained.fit, steps, tried, library)
+    return _opened(before, only_named.fit, final.fit, saturations, steps, tried, library)
 
 
 def _with_true_names(
@@ -176,12 +186,14 @@ def _opened(
     before: Fit,
     named: Fit,
     after: Fit,
-    explained: Fit,
+    saturations: Sequence[Fit],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
-    found = ceiling(before, explained)
+    # What either explains can be explained.
+    ceilings = [(ceiling(before, fit), fit) for fit in saturations]
+    found, explained = max(ceilings, key=lambda pair: pair[0].share)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
     refused: list[Tried] = []
     if rmse_after > rmse_before:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.explain.saturated import saturated, unnamed_library
+from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
@@ -69,7 +69,7 @@ def _best_of(
     def unexplained(track: Track) -> float:
         fit = declared_fit(dataset_of(track, grouping, ENOUGH), model)
         pool = Pool.of(fit.dataset, unnamed_library())
-        return saturated(chain_of(fit, 0), pool, FUNCTIONS).mean_square
+        return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS).mean_square
 
     first, error, best = track, held_out(track), None
     for smoothing in ways:

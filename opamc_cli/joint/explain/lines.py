@@ -1,8 +1,9 @@
-"""Lines over an angle or over time, whatever they come from."""
+"""Lines over an angle or over time, and other joints' motion, whatever they come from."""
 
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters
+from opamc_cli.joint.effects.coupling import Coupling
 from opamc_cli.joint.effects.mains_hum import MainsHum
 from opamc_cli.joint.effects.ripple import Ripple
 from opamc_cli.joint.motion.track import Floats, Track
@@ -50,3 +51,12 @@ class Tone(MainsHum):
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to what the rate can show."""
         return {"frequency_hz": (0.5 * LOWEST_HZ, 0.49 * track.rate_hz)}
+
+
+class Links(Coupling):
+    """What an arm's other joints ask: no function of one covariate, but of a known form."""
+
+    unnamed = True
+    name = "unnamed_links"
+    meaning = "a function of other joints' motion"
+    interpretation = Effect.interpretation

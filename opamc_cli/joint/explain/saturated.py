@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.explain.lines import AngleLine, Tone
+from opamc_cli.joint.explain.lines import AngleLine, Links, Tone
 from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import PRICE, Chain
 from opamc_cli.joint.name.search import MOST_STEPS, Pool, beam
 
+LINKS = Links()
 SEALED_PARTS = 12
 
 
@@ -39,6 +40,11 @@ def unnamed_library() -> dict[str, Effect]:
 def saturated(start: Chain, pool: Pool, steps: int = MOST_STEPS) -> Chain:
     """Explain what the declared model leaves by a pool of unnamed functions, largest first."""
     return beam(start, replace(pool, least_share=PRICE), width=1, steps=steps)
+
+
+def with_links(pool: Pool) -> Pool:
+    """Put what an arm's other joints ask beside functions of the joint's own motion."""
+    return replace(pool, library={**pool.library, LINKS.name: LINKS})
 
 
 def ceiling(before: Fit, explained: Fit) -> Ceiling:

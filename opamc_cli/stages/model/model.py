@@ -10,7 +10,7 @@ import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.config.yaml.values import yaml_of
-from opamc_cli.joint.explain.saturated import saturated, unnamed_library
+from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.intervals import certainty
 from opamc_cli.joint.loop import close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
@@ -106,7 +106,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
     laid = lay(model, runs, axis)
     base = laid.fit
     start = chain_of(base, 0)
-    explained = saturated(start, Pool.of(base.dataset, unnamed_library()))
+    explained = saturated(start, with_links(Pool.of(base.dataset, unnamed_library())))
     tried = trials(start, Pool.of(base.dataset, laid.library))
     entry = {
         "axis": axis,

@@ -112,6 +112,10 @@ def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
     assert "motion of axis 2:" in step.interpretation
     assert step.term.effect.origin != "joint"
     assert loop.rmse_after_a < 1.1 * 0.05 < 0.2 * loop.rmse_before_a
+    # Functions of this joint's own motion alone explain next to nothing of it.
+    assert loop.ceiling.certain
+    assert loop.ceiling.share == pytest.approx(1 - (0.05 / loop.rmse_before_a) ** 2, abs=0.01)
+    assert loop.verdict == "closed"
 
 
 @pytest.mark.parametrize("torque", [third_link, upright])
@@ -174,5 +178,7 @@ def test_what_another_joint_asks_is_not_called_closed_where_no_effect_holds_it()
     first, second = waves(1), waves(2)
     noise = 0.05 * np.random.default_rng(4).normal(size=first[0].size)
     laid = recording(shoulder(first, second) + noise, first[0], {2: second[0]})
-    lacking = built_in_library(("coupling",))
-    assert close_loop(fit_declared([laid], base=DECLARED), lacking).verdict != "closed"
+    loop = close_loop(fit_declared([laid], base=DECLARED), built_in_library(("coupling",)))
+    assert loop.verdict in ("partial", "not-in-library")
+    assert loop.ceiling.certain
+    assert loop.rmse_after_a**2 > 2 * loop.floor_a**2
