@@ -231,6 +231,27 @@ def test_gaps_are_said(folder, capsys):
     assert said in json.loads((folder / "out" / "loop.json").read_text())["axes"][0]["notes"][0]
 
 
+def test_a_current_of_the_opposite_sign_is_said_and_closed_alike(folder, capsys):
+    assert close(folder, "--axis", "1") == 0
+    (straight,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
+    assert straight["notes"] == []
+    table = pq.read_table(folder / "run.parquet")
+    negative = pa.array(-table.column("axis1_current").to_numpy())
+    pq.write_table(table.set_column(0, "axis1_current", negative), folder / "run.parquet")
+    capsys.readouterr()
+    assert close(folder, "--axis", "1") == 0
+    assert "its current has the opposite sign of its motion" in capsys.readouterr().err
+    (opposed,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
+    assert {**opposed, "notes": []} == straight
+    closed = folder / "out" / "model.yaml"
+    out = folder / "evaluated"
+    run = folder / "run.parquet"
+    assert opamc("model", "evaluate", run, "--model", closed, "--axis", 1, "--out", out) == 0
+    (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
+    assert entry["r2"] > 0.9
+    assert "opposite sign" in entry["notes"][0]
+
+
 def test_a_channel_that_is_mostly_gaps_is_refused_also_if_quiet(folder, capsys):
     with_gaps(folder, 0.6)
     assert close(folder, "--axis", "1", "--quiet") == 3

@@ -15,6 +15,7 @@ from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.signal.motion.reported import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
@@ -142,6 +143,16 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str,
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
     notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
+    logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
+    pairs = [(x, q) for x, q in logged if x is not None and q is not None]
+    if len(pairs) == len(recordings) and friction_drives(pairs, recordings[0].rate_hz):
+        notes.append(
+            f"{runs[0].path}: friction would drive axis {axis}: its current has the opposite sign "
+            "of its motion, and the negative of it is modelled"
+        )
+        recordings = [
+            replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)
+        ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
     return recordings, units.pop(), notes

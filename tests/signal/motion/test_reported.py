@@ -9,6 +9,7 @@ from opamc_cli.signal.motion.reported import (
     _probe,
     find_joint_motions,
     fluctuation_frequency,
+    friction_drives,
     lacks_sign,
     motor_frequency,
     quiet_velocity,
@@ -269,3 +270,32 @@ def test_an_overshoot_of_resampling_is_no_sign():
     assert lacks_sign(size, v) is True
     size[7] = -0.02 * size.max()
     assert lacks_sign(size, v) is False
+
+
+def rigid_joint(friction, seconds=12.0, seed=0):
+    """Current, angle: gravity, inertia, a constant and friction, none of it small."""
+    t = np.arange(int(seconds * FS_HZ)) / FS_HZ
+    q = 0.8 * np.sin(1.3 * t) + 0.5 * np.sin(2.1 * t + 1)
+    v, a = np.gradient(q) * FS_HZ, np.gradient(np.gradient(q)) * FS_HZ**2
+    noise = 0.1 * np.random.default_rng(seed).normal(size=t.size)
+    return 3 * np.cos(q + 0.4) + 0.7 * a - 0.5 + friction * np.sign(v) + noise, q
+
+
+@pytest.mark.parametrize("friction", [0.3, 2.0])
+def test_friction_drives_where_current_and_motion_have_opposite_signs(friction):
+    current, q = rigid_joint(friction)
+    assert friction_drives([(current, q)], FS_HZ) is False
+    assert friction_drives([(-current, q)], FS_HZ) is True
+    assert friction_drives([(current, -q)], FS_HZ) is True
+    # Two recordings decide together, gaps are left out.
+    current[2000:2300] = np.nan
+    half = q.size // 2
+    pair = [(-current[:half], q[:half]), (-current[half:], q[half:])]
+    assert friction_drives(pair, FS_HZ) is True
+
+
+def test_without_friction_or_a_way_back_nothing_drives():
+    runs = [rigid_joint(0.0, seed=seed) for seed in range(20)]
+    assert not any(friction_drives([(-current, q)], FS_HZ) for current, q in runs)
+    q = np.linspace(0, 2, 3000)
+    assert friction_drives([(-np.ones(q.size), q)], FS_HZ) is False
