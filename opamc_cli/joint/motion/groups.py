@@ -14,6 +14,8 @@ BLOCKS_WITHOUT_CYCLES = 12
 SEALED_BLOCKS = (2, 5, 9)
 """Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
 run three times, every fourth block is the same motion, which nothing open would have shown."""
+FEWEST_RECORDINGS = 4
+"""That are sealed as wholes: of two, the way there and the way back, one would show no friction."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
 
@@ -95,8 +97,8 @@ def group_samples(
             pieces.append((run, start, stop, run_names[run]))
     needed = 0.1 * rate_hz
     pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
-    if len(pieces) < 2:
-        return _blocks(moving, run_names)
+    if len(pieces) < (FEWEST_RECORDINGS if period is None else 2):
+        return _blocks(moving, bounds, run_names)
     for number, (_, start, stop, _) in enumerate(pieces):
         group[start:stop] = number
     kind = "cycles" if period is not None else "recordings"
@@ -113,12 +115,16 @@ def _sealed(runs: list[int]) -> tuple[int, ...]:
     return tuple(np.sort(np.concatenate(last)).tolist())
 
 
-def _blocks(moving: Bools, run_names: tuple[str, ...]) -> Grouping | None:
+def _blocks(
+    moving: Bools, bounds: tuple[tuple[int, int], ...], run_names: tuple[str, ...]
+) -> Grouping | None:
     indices = np.flatnonzero(moving)
     if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None
     group = np.full(moving.size, -1, dtype=np.int64)
+    names = []
     for i, chunk in enumerate(np.array_split(indices, BLOCKS_WITHOUT_CYCLES)):
         group[chunk[0] : chunk[-1] + 1] = i
-    names = tuple(f"{run_names[0]}:block{i}" for i in range(BLOCKS_WITHOUT_CYCLES))
-    return Grouping(group, names, SEALED_BLOCKS, "blocks")
+        run = sum(stop <= chunk[0] for _, stop in bounds)
+        names.append(f"{run_names[run]}:block{i}")
+    return Grouping(group, tuple(names), SEALED_BLOCKS, "blocks")

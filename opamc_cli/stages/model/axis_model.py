@@ -135,7 +135,8 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str,
     if len(rates) > 1:
         msg = (
             f"{runs[0].path}: the runs have different rates "
-            f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate"
+            f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate, or "
+            "ingest them again with one sampling_rate_hz in the map"
         )
         raise InputError(msg)
     for recording, run in zip(recordings, runs, strict=True):
