@@ -18,6 +18,7 @@ ONE = (
 TWO = (
     *((place, place + 1) for place in (0, 2, 4, 6)),  # a slow third link
     *(tuple(range(place, place + 4)) for place in (8, 12)),  # both lift, of an upright joint
+    tuple(range(8)),  # a slow link on axes that are not parallel
 )
 """With `ONE`: columns of the smaller forms, with one other joint and with two."""
 

@@ -14,8 +14,9 @@ BLOCKS_WITHOUT_CYCLES = 12
 SEALED_BLOCKS = (2, 5, 9)
 """Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
 run three times, every fourth block is the same motion, which nothing open would have shown."""
-FEWEST_RECORDINGS = 4
-"""That are sealed as wholes: of two, the way there and the way back, one would show no friction."""
+FEWEST_GROUPS = 4
+"""That are sealed as wholes: of two recordings, the way there and the way back, one would show no
+friction, and of two cycles one is half of what there is."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
 
@@ -39,16 +40,18 @@ class Grouping:
         return tuple(g for g in range(len(self.names)) if g not in self.sealed)
 
 
-def cycle_length(path: Floats) -> int | None:
+def cycle_length(*paths: Floats) -> int | None:
     """Shortest lag, in samples, at which the speed (or position) of a recording repeats itself.
 
     None where it does not. A lag counts if the mean square of ``path[t + lag] - path[t]`` is below
-    2 % of twice the variance, up to 70 % of the recording; of such neighbours the best.
+    2 % of twice the variance, up to 70 % of the recording; of such neighbours the best. Of several
+    joints' paths, (n,) each, all have to repeat themselves at once.
     """
-    n, variance = path.size, float(np.var(path))
-    if n < 16 or variance <= 0:
+    n, variances = paths[0].size, [float(np.var(path)) for path in paths]
+    if n < 16 or min(variances) <= 0:
         return None
-    mismatch = _mismatch(path)[: int(n * LONGEST_SHARE)] / (2 * variance)
+    every = [_mismatch(path) / (2 * of) for path, of in zip(paths, variances, strict=True)]
+    mismatch = np.max(every, axis=0)[: int(n * LONGEST_SHARE)]
     # Everything looks alike at short lags: first leave that neighbourhood.
     away = int(np.argmax(mismatch > 0.5))
     alike = np.flatnonzero(mismatch[away:] < REPEAT_ERROR) + away
@@ -80,10 +83,10 @@ def group_samples(
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
-    little moves to seal anything off. With cycles, the last 27 % of them are sealed (of each
-    recording that holds four or more, else of all); a motion that does not repeat is cut into
-    blocks of equal moving time, of which a quarter is sealed, since the end of a single stroke
-    would be a place that the fit has never seen.
+    little moves to seal anything off. The last 27 % of cycles, or of recordings, are sealed (of
+    each recording that holds four cycles or more, else of all). Fewer than four are cut into blocks
+    of equal moving time, of which a quarter is sealed, since the end of a single stroke would be a
+    place that the fit has never seen.
     """
     group = np.full(moving.size, -1, dtype=np.int64)
     pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
@@ -97,7 +100,7 @@ def group_samples(
             pieces.append((run, start, stop, run_names[run]))
     needed = 0.1 * rate_hz
     pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
-    if len(pieces) < (FEWEST_RECORDINGS if period is None else 2):
+    if len(pieces) < FEWEST_GROUPS:
         return _blocks(moving, bounds, run_names)
     for number, (_, start, stop, _) in enumerate(pieces):
         group[start:stop] = number
@@ -122,9 +125,12 @@ def _blocks(
     if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
         return None
     group = np.full(moving.size, -1, dtype=np.int64)
-    names = []
-    for i, chunk in enumerate(np.array_split(indices, BLOCKS_WITHOUT_CYCLES)):
-        group[chunk[0] : chunk[-1] + 1] = i
-        run = sum(stop <= chunk[0] for _, stop in bounds)
-        names.append(f"{run_names[run]}:block{i}")
+    names: list[str] = []
+    for name, (start, stop) in zip(run_names, bounds, strict=True):
+        own = indices[np.searchsorted(indices, start) : np.searchsorted(indices, stop)]
+        count = round(BLOCKS_WITHOUT_CYCLES * own.size / indices.size)
+        for chunk in np.array_split(own, max(count, 1)):
+            if chunk.size:
+                group[chunk[0] : chunk[-1] + 1] = len(names)
+                names.append(f"{name}:block{len(names)}")
     return Grouping(group, tuple(names), SEALED_BLOCKS, "blocks")

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from opamc_cli.joint.motion.groups import Grouping, cycle_length, group_samples
-from opamc_cli.joint.motion.kinematics import Recording, build_track
-from opamc_cli.joint.motion.track import Joint, Track
+from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE, Recording, build_track
+from opamc_cli.joint.motion.track import Floats, Joint, Track
 
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
@@ -18,7 +18,7 @@ ENOUGH_SAMPLES = 200_000
 def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Grouping | None]:
     """Lay recordings on one grid, in groups; None where too little moves to seal any off."""
     track = build_track(recordings, joint)
-    lengths = [cycle_length(track.velocity[start:stop]) for start, stop in track.bounds]
+    lengths = [cycle_length(*_speeds(track, start, stop)) for start, stop in track.bounds]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
     # Places are passed at different times where the path is three times the travel, or more.
@@ -28,6 +28,15 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
         track = replace(track, channels=track.channels | {"revisits"})
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def _speeds(track: Track, start: int, stop: int) -> list[Floats]:
+    """Speed of a recording's joint, and of an arm's other joints that move beside it."""
+    own = track.velocity[start:stop]
+    if track.others is None:
+        return [own]
+    beside = track.others[start:stop, len(track.other_axes) : 2 * len(track.other_axes)].T
+    return [own, *(other for other in beside if np.std(other) > SLOWEST_SHARE * np.std(own))]
 
 
 def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:

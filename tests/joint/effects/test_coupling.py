@@ -68,6 +68,12 @@ def third_link(first, second, third):
     return 0.5 * first[2] + 2.0 * np.cos(first[0]) + 1.5 * np.sin(first[0] + second[0] + third[0])
 
 
+def across(first, second, third):
+    """Torque on a joint whose link is weighed through two others, all at right angles."""
+    weighed = np.cos(second[0] + 0.4) * np.cos(third[0])
+    return 0.5 * first[2] + 8.0 * np.sin(first[0]) * weighed
+
+
 def recording(current, place, others):
     return Recording("run", RATE, current, position_rad=place, others_rad=others)
 
@@ -84,8 +90,9 @@ PAIR = [{"axis": 2.0}, {"axis": 3.0}, {"axis": 2.0, "beside": 3.0}]
         (elbow(FIRST, SECOND), SECOND, {3: FIRST}, [ELBOW]),
         (third_link(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR[2:]),
         (upright(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR),
+        (across(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR[2:]),
     ],
-    ids=["shoulder", "elbow", "third link", "upright"],
+    ids=["shoulder", "elbow", "third link", "upright", "across"],
 )
 def test_an_arm_s_torques_are_held_by_the_columns(torque, own, others, asked):
     places = {axis: motion[0] for axis, motion in others.items()}
@@ -118,7 +125,7 @@ def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
     assert loop.verdict == "closed"
 
 
-@pytest.mark.parametrize("torque", [third_link, upright])
+@pytest.mark.parametrize("torque", [third_link, upright, across])
 def test_two_joints_that_load_this_one_are_named_and_another_is_not(torque):
     noise = 0.05 * np.random.default_rng(4).normal(size=FIRST[0].size)
     current = torque(FIRST, SECOND, THIRD) + 0.3 * np.sign(FIRST[1]) + noise

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 
 from opamc_cli.joint.motion.groups import cycle_length, group_samples
 
@@ -12,6 +13,15 @@ def test_cycle_is_the_lag_at_which_the_path_repeats():
 def test_a_path_that_never_repeats_has_no_cycle():
     rng = np.random.default_rng(3)
     assert cycle_length(np.convolve(rng.normal(size=9000), np.hanning(101), "same")) is None
+
+
+def test_several_joints_have_to_repeat_at_once():
+    rng = np.random.default_rng(3)
+    one, other = (np.convolve(rng.normal(size=n), np.hanning(51), "same") for n in (500, 750))
+    assert cycle_length(np.tile(one, 9)) == 500
+    assert cycle_length(np.tile(one, 9), np.tile(other, 6)) == 1500
+    assert cycle_length(np.tile(one, 2), np.tile(other, 2)[:1000]) is None
+    assert cycle_length(np.tile(one, 9), np.zeros(4500)) is None
 
 
 def test_sealed_cycles_are_the_last_and_at_least_one():
@@ -37,6 +47,28 @@ def test_recordings_are_groups_where_nothing_repeats_inside_them():
     grouping = group_samples(moving, bounds, None, 100.0, tuple("abcde"))
     assert grouping is not None
     assert [grouping.names[g] for g in grouping.sealed] == ["e"]
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_few_recordings_are_cut_into_blocks_of_which_each_has_open_ones(count):
+    moving = np.ones(count * 1000, dtype=bool)
+    moving[995:1010] = False
+    bounds = tuple((k * 1000, k * 1000 + 1000) for k in range(count))
+    grouping = group_samples(moving, bounds, None, 100.0, tuple("abc"[:count]))
+    assert grouping is not None
+    assert (grouping.kind, grouping.sealed, len(grouping.names)) == ("blocks", (2, 5, 9), 12)
+    runs = [name[0] for name in grouping.names]
+    assert runs == sorted(runs)
+    for k, (start, stop) in enumerate(bounds):
+        inside = np.unique(grouping.group[start:stop][moving[start:stop]])
+        assert {runs[g] for g in inside} == {"abc"[k]}
+        assert set(inside) - set(grouping.sealed)
+
+
+def test_of_three_cycles_or_fewer_none_is_sealed_as_a_whole():
+    moving = np.ones(3000, dtype=bool)
+    kinds = [group_samples(moving, ((0, n),), 750, 100.0, ("run",)).kind for n in (2300, 3000)]
+    assert kinds == ["blocks", "cycles"]
 
 
 def test_too_little_motion_seals_nothing():

@@ -89,3 +89,14 @@ def test_what_lies_between_two_recordings_is_no_path():
     runs = [stroke(rest_s=0.0, seconds=1.5, name=f"run {k}") for k in range(2)]
     track, _ = grouped_track(runs, Joint())
     assert "revisits" not in track.channels
+
+
+def test_a_motion_repeats_where_all_joints_that_move_repeat():
+    time = np.arange(6000) / 200.0
+    place = 1 - np.cos(2 * np.pi * time / 5)
+    noise = 1e-5 * np.random.default_rng(0).normal(size=time.size)
+    beside = {2: 0.5 * np.cos(2 * np.pi * time / 2.5), 3: noise}
+    run = Recording("run", 200.0, current_a=np.sin(time), position_rad=place, others_rad=beside)
+    assert grouped_track([run], Joint())[1].kind == "cycles"
+    never = replace(run, others_rad=beside | {4: np.sin(0.31 * time)})
+    assert grouped_track([never], Joint())[1].kind == "blocks"
