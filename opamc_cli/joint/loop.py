@@ -6,14 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.joint.effects.library import Library
-from opamc_cli.joint.explain.saturated import (
-    LINKS,
-    Ceiling,
-    ceiling,
-    saturated,
-    unnamed_library,
-    with_links,
-)
+from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.smoothing import measurement_noise
@@ -115,10 +108,7 @@ def close_loop(
     """
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
-    explained = saturated(start, unnamed)
-    saturations = [explained.fit]
-    if not LINKS.untestable(before.dataset.fine.track):
-        saturations.append(saturated(start, with_links(unnamed)).fit)
+    explained, *linked = saturations(start, unnamed)
     pool = Pool.of(before.dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
@@ -132,7 +122,8 @@ def close_loop(
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    return _opened(before, only_named.fit, final.fit, saturations, steps, tried, library)
+    every = [chain.fit for chain in (explained, *linked)]
+    return _opened(before, only_named.fit, final.fit, every, steps, tried, library)
 
 
 def _with_true_names(
@@ -186,13 +177,13 @@ def _opened(
     before: Fit,
     named: Fit,
     after: Fit,
-    saturations: Sequence[Fit],
+    saturated: Sequence[Fit],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
     # What either explains can be explained.
-    ceilings = [(ceiling(before, fit), fit) for fit in saturations]
+    ceilings = [(ceiling(before, fit), fit) for fit in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
     refused: list[Tried] = []

@@ -47,6 +47,12 @@ def with_links(pool: Pool) -> Pool:
     return replace(pool, library={**pool.library, LINKS.name: LINKS})
 
 
+def saturations(start: Chain, pool: Pool) -> list[Chain]:
+    """Explain by a pool of unnamed functions, and where others are logged beside links, too."""
+    alone = LINKS.untestable(start.fit.dataset.fine.track)
+    return [saturated(start, some) for some in (pool, *([] if alone else [with_links(pool)]))]
+
+
 def ceiling(before: Fit, explained: Fit) -> Ceiling:
     """Hold the saturated model, fitted to the open data, against the sealed data, once."""
     first, last = sealed_parts(before), sealed_parts(explained)
