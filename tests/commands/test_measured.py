@@ -8,7 +8,8 @@ import pytest
 
 from opamc_cli.__main__ import main
 from opamc_cli.errors import ExitCode
-from opamc_cli.signal.motion.reported import lacks_sign, velocity_from_position
+from opamc_cli.signal.motion.reported import velocity_from_position
+from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.storage.runs import RunInfo, save_run
 
 ROOT = Path(__file__).parents[2]

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from opamc_cli.signal.course import mean_course
-from opamc_cli.signal.motion.reported import fluctuation_frequency, lacks_sign, signed_by_speed
+from opamc_cli.signal.motion.reported import fluctuation_frequency
+from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed
 from opamc_cli.signal.quality import clipped_share
 
 

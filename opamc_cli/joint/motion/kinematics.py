@@ -26,10 +26,6 @@ from opamc_cli.joint.motion.smoothing import (
 )
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
 
-RATIO_BLOCK_S = 0.1
-FEWEST_BLOCKS = 20
-SAME_MOTION = 0.98
-"""Correlation of a logged speed with the rate of change of a logged position."""
 LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""
 SLOWEST_SHARE = 0.02
@@ -179,26 +175,6 @@ def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Mot
         blur=blurred(path, rate_hz, window, derivative),
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
-
-
-def speed_ratio(position_rad: Floats, velocity_rad_s: Floats, rate_hz: float) -> float | None:
-    """How many times the rate of change of a logged position a logged speed is, both (n,).
-
-    1 where the units agree; None where the two do not tell, or have nothing to do with one another.
-    """
-    length = max(int(RATIO_BLOCK_S * rate_hz), 1)
-    edges = np.arange(0, position_rad.size, length)
-    if edges.size < FEWEST_BLOCKS:
-        return None
-    change = np.diff(position_rad[edges]) * rate_hz / length
-    sums = np.concatenate([[0.0], np.cumsum(velocity_rad_s)])
-    speed = np.diff(sums[edges]) / length
-    good = np.isfinite(change) & np.isfinite(speed)
-    power = float(change[good] @ change[good])
-    both = float(change[good] @ speed[good])
-    if power <= 0 or both**2 < SAME_MOTION**2 * power * float(speed[good] @ speed[good]):
-        return None
-    return both / power
 
 
 def direction_of(motion: Motion) -> Floats:

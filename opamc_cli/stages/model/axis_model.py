@@ -15,7 +15,7 @@ from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.signal.motion.reported import friction_drives
+from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording

@@ -9,8 +9,9 @@ import numpy as np
 
 from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
-from opamc_cli.joint.motion.kinematics import Recording, speed_ratio
-from opamc_cli.signal.motion.reported import lacks_sign, signed_by_speed, velocity_from_position
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.signal.motion.reported import velocity_from_position
+from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed, speed_ratio
 from opamc_cli.signal.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started

@@ -13,7 +13,6 @@ from opamc_cli.joint.motion.kinematics import (
     motion_from_velocity,
     moving_samples,
     smoothings,
-    speed_ratio,
 )
 from opamc_cli.joint.motion.track import Joint
 
@@ -84,20 +83,6 @@ def test_a_motion_is_delayed_by_a_fraction_of_a_sample():
     inside = slice(50, -50)
     np.testing.assert_allclose(late.position_rad[inside], np.sin(1.5 * (TIME - 0.002))[inside],
                                atol=1e-4)  # fmt: skip
-
-
-@pytest.mark.parametrize("unit", [1.0, 180 / np.pi])
-def test_a_speed_tells_its_unit_beside_the_position(unit):
-    assert speed_ratio(PLACE, unit * SPEED, RATE) == pytest.approx(unit, rel=0.01)
-    gaps = PLACE.copy()
-    gaps[300:400] = np.nan
-    assert speed_ratio(gaps, unit * SPEED, RATE) == pytest.approx(unit, rel=0.01)
-
-
-def test_no_unit_is_told_where_two_channels_have_nothing_in_common():
-    assert speed_ratio(PLACE, np.random.default_rng(0).normal(size=PLACE.size), RATE) is None
-    assert speed_ratio(np.zeros(2000), SPEED, RATE) is None
-    assert speed_ratio(PLACE[:300], SPEED[:300], RATE) is None
 
 
 def test_the_direction_is_open_where_noise_could_have_made_it():

@@ -9,11 +9,8 @@ from opamc_cli.signal.motion.reported import (
     _probe,
     find_joint_motions,
     fluctuation_frequency,
-    friction_drives,
-    lacks_sign,
     motor_frequency,
     quiet_velocity,
-    signed_by_speed,
     velocity_from_position,
 )
 
@@ -183,35 +180,6 @@ def test_the_window_is_doubled_until_the_noise_is_below_standstill():
     assert quiet_velocity(np.zeros(0), FS_HZ).size == 0
 
 
-def test_a_current_without_its_sign():
-    """It is larger either way than at rest; a load's is larger one way alone."""
-    v = steps((0, 20), (1, 20), (0, 20), (-1, 20))
-    friction, load = np.abs(v) + 0.5, 0.3 * v + 0.5
-    assert lacks_sign(friction, v) is True
-    assert lacks_sign(-friction, v) is True
-    assert lacks_sign(load, v) is False
-    assert lacks_sign(v, v) is False  # both signs
-    assert lacks_sign(np.full(v.size, np.nan), v) is False
-    # too little on its way, and too little at rest, to tell
-    assert lacks_sign(friction[:69], v[:69]) is False
-    assert lacks_sign(friction[:70], v[:70]) is True
-    moving = np.abs(v) > 0
-    for n_rest, found in ((9, None), (10, True)):
-        chosen = moving | (np.cumsum(~moving) <= n_rest)
-        assert lacks_sign(friction[chosen], v[chosen]) is found
-    # less than a third of the largest speed is neither rest nor way
-    slow = np.where(v == 0, 0.29, v)
-    assert lacks_sign(friction, slow) is None
-
-
-def test_a_current_takes_the_sign_of_the_speed_and_fades_at_rest():
-    v = np.array([1.0] * 200 + [-1.0] * 200 + [0.0, 0.01, -0.02, 0.03])
-    found = signed_by_speed(np.full(v.size, -2.0), v)
-    assert found[[0, 399]].tolist() == [2, -2]
-    assert found[-4:] == pytest.approx([0, 1, -2, 2])
-    assert signed_by_speed(np.ones(3), np.zeros(3)).tolist() == [0, 0, 0]
-
-
 @pytest.mark.parametrize("n", [10, 63, 64, 65, 200])
 def test_the_frequency_of_fluctuations_is_that_of_the_first_zero_of_their_autocorrelation(n):
     t = np.arange(n)
@@ -238,64 +206,3 @@ def test_a_long_series_is_probed_in_four_places(monkeypatch):
     places = [*range(10), *range(30, 40), *range(60, 70), *range(90, 100)]
     assert _probe(np.arange(100.0)).tolist() == places
     assert _probe(np.arange(40.0)).tolist() == list(range(40))
-
-
-def held_joint(inertia=0.5):
-    """Speed and current of a joint that its loop holds at rest against its own friction."""
-    ramp, held = np.linspace(0, 1, 50), np.ones(100)
-    one_way = np.concatenate([ramp, held, ramp[::-1]])
-    still = np.zeros(80)
-    v = np.concatenate([still, one_way, still, -one_way, still])
-    friction = np.sign(v)
-    last = np.cumsum(v != 0) > 0
-    friction[last & (v == 0)] = 1.05
-    return v, friction + 0.1 * v + 50 * inertia * np.gradient(v)
-
-
-def test_a_modulus_is_told_where_the_joint_is_held_at_rest_by_its_friction():
-    v, current = held_joint()
-    assert lacks_sign(np.abs(current), v) is True
-    assert lacks_sign(-np.abs(current), v) is True
-    assert lacks_sign(current, v) is False
-    for load in (4.0, -4.0):
-        assert lacks_sign(current + load, v) is False
-    moving = v != 0
-    assert lacks_sign(np.abs(current[moving]), v[moving]) is True
-
-
-def test_an_overshoot_of_resampling_is_no_sign():
-    v, current = held_joint()
-    size = np.abs(current)
-    size[7] = -0.002 * size.max()
-    assert lacks_sign(size, v) is True
-    size[7] = -0.02 * size.max()
-    assert lacks_sign(size, v) is False
-
-
-def rigid_joint(friction, seconds=12.0, seed=0):
-    """Current, angle: gravity, inertia, a constant and friction, none of it small."""
-    t = np.arange(int(seconds * FS_HZ)) / FS_HZ
-    q = 0.8 * np.sin(1.3 * t) + 0.5 * np.sin(2.1 * t + 1)
-    v, a = np.gradient(q) * FS_HZ, np.gradient(np.gradient(q)) * FS_HZ**2
-    noise = 0.1 * np.random.default_rng(seed).normal(size=t.size)
-    return 3 * np.cos(q + 0.4) + 0.7 * a - 0.5 + friction * np.sign(v) + noise, q
-
-
-@pytest.mark.parametrize("friction", [0.3, 2.0])
-def test_friction_drives_where_current_and_motion_have_opposite_signs(friction):
-    current, q = rigid_joint(friction)
-    assert friction_drives([(current, q)], FS_HZ) is False
-    assert friction_drives([(-current, q)], FS_HZ) is True
-    assert friction_drives([(current, -q)], FS_HZ) is True
-    # Two recordings decide together, gaps are left out.
-    current[2000:2300] = np.nan
-    half = q.size // 2
-    pair = [(-current[:half], q[:half]), (-current[half:], q[half:])]
-    assert friction_drives(pair, FS_HZ) is True
-
-
-def test_without_friction_or_a_way_back_nothing_drives():
-    runs = [rigid_joint(0.0, seed=seed) for seed in range(20)]
-    assert not any(friction_drives([(-current, q)], FS_HZ) for current, q in runs)
-    q = np.linspace(0, 2, 3000)
-    assert friction_drives([(-np.ones(q.size), q)], FS_HZ) is False

@@ -8,10 +8,10 @@ from opamc_cli.errors import InputError
 from opamc_cli.signal.motion.reported import (
     JointMotion,
     find_joint_motions,
-    lacks_sign,
     motor_frequency,
     quiet_velocity,
 )
+from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
