@@ -108,13 +108,13 @@ def close_loop(
     """
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
-    explained, *linked = saturations(start, unnamed)
+    saturated = saturations(start, unnamed)
     pool = Pool.of(before.dataset, library, without=without_rules)
     best, named = settled(beam(start, pool), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     final = worth_their_price(beam(best, unnamed, width=1))
     if "unnamed" not in without_rules:  # Or beside the functions that explain most.
-        beside = worth_their_price(extended(explained, *(one.term for one in named)))
+        beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
@@ -122,8 +122,7 @@ def close_loop(
     steps = _steps(start, final, named, shares, seed)
     tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    every = [chain.fit for chain in (explained, *linked)]
-    return _opened(before, only_named.fit, final.fit, every, steps, tried, library)
+    return _opened(before, only_named.fit, final.fit, saturated, steps, tried, library)
 
 
 def _with_true_names(
@@ -177,13 +176,13 @@ def _opened(
     before: Fit,
     named: Fit,
     after: Fit,
-    saturated: Sequence[Fit],
+    saturated: Sequence[Chain],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
     # What either explains can be explained.
-    ceilings = [(ceiling(before, fit), fit) for fit in saturated]
+    ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
     refused: list[Tried] = []

@@ -59,4 +59,3 @@ class Links(Coupling):
     unnamed = True
     name = "unnamed_links"
     meaning = "a function of other joints' motion"
-    interpretation = Effect.interpretation

@@ -50,7 +50,7 @@ def with_links(pool: Pool) -> Pool:
 def saturations(start: Chain, pool: Pool) -> list[Chain]:
     """Explain by a pool of unnamed functions, and where others are logged beside links, too."""
     alone = LINKS.untestable(start.fit.dataset.fine.track)
-    return [saturated(start, some) for some in (pool, *([] if alone else [with_links(pool)]))]
+    return [saturated(start, one) for one in ([pool] if alone else [pool, with_links(pool)])]
 
 
 def ceiling(before: Fit, explained: Fit) -> Ceiling:

@@ -128,8 +128,8 @@ def _blocks(
     names: list[str] = []
     for name, (start, stop) in zip(run_names, bounds, strict=True):
         own = indices[np.searchsorted(indices, start) : np.searchsorted(indices, stop)]
-        count = round(BLOCKS_WITHOUT_CYCLES * own.size / indices.size)
-        for chunk in np.array_split(own, max(count, 1)):
+        count = max(round(BLOCKS_WITHOUT_CYCLES * own.size / indices.size), 1)
+        for chunk in np.array_split(own, count):
             if chunk.size:
                 group[chunk[0] : chunk[-1] + 1] = len(names)
                 names.append(f"{name}:block{len(names)}")

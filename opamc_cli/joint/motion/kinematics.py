@@ -228,12 +228,11 @@ def build_track(
             clock = max(recording.started_s - first, clock)
         times.append(clock + piece.time_s)
         clock += piece.size / rate
-    alone = len(recordings) == 1
-    common = all(recording.started_s is not None for recording in recordings)
+    own = len(recordings) > 1 and any(recording.started_s is None for recording in recordings)
     return replace(
         joined(pieces),
         time_s=np.concatenate(times),
-        own_clocks_s=() if alone or common else tuple(float(values[0]) for values in times),
+        own_clocks_s=tuple(float(values[0]) for values in times) if own else (),
     )
 
 

@@ -32,10 +32,8 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
 
 def _speeds(track: Track, start: int, stop: int) -> list[Floats]:
     """Speed of a recording's joint, and of an arm's other joints that move beside it."""
-    own = track.velocity[start:stop]
-    if track.others is None:
-        return [own]
-    beside = track.others[start:stop, len(track.other_axes) : 2 * len(track.other_axes)].T
+    own, count = track.velocity[start:stop], len(track.other_axes)
+    beside = () if track.others is None else track.others[start:stop, count : 2 * count].T
     return [own, *(other for other in beside if np.std(other) > SLOWEST_SHARE * np.std(own))]
 
 
