@@ -16,7 +16,6 @@ SETTLING_SHARE = 0.02
 """Of the way of a motion: what swings back by less at once after it is its settling, which is there
 in one recording and not in the next."""
 
-MOVING_SHARE = 0.3  # of the largest speed: clearly on its way
 PROBE = 1 << 20
 
 LEAST_WINDOW = 5
