@@ -136,7 +136,7 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str,
         msg = (
             f"{runs[0].path}: the runs have different rates "
             f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate, or "
-            "ingest them again with one sampling_rate_hz in the map"
+            "ingest them again with one resample_hz in the map"
         )
         raise InputError(msg)
     for recording, run in zip(recordings, runs, strict=True):
