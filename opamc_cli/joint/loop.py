@@ -103,14 +103,17 @@ def close_loop(
 ) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
-    The sealed ones are looked at once, at the end. For the ablation the rules
-    of docs/loop.md can be switched off.
+    The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off.
     """
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
     saturated = saturations(start, unnamed)
     pool = Pool.of(before.dataset, library, without=without_rules)
-    best, named = settled(beam(start, pool), pool, unnamed)
+    # An arm's own dynamics are there; beside them nothing else has to hold what they ask.
+    arm = replace(pool, library={n: e for n, e in library.items() if "others" in e.needs})
+    linked = beam(start, arm)
+    chains = [beam(one, pool) for one in ((start,) if linked is start else (start, linked))]
+    best, named = settled(min(chains, key=lambda one: one.score), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     final = worth_their_price(beam(best, unnamed, width=1))
     if "unnamed" not in without_rules:  # Or beside the functions that explain most.

@@ -72,10 +72,8 @@ def comb_energy(compared: Compared, residual: Floats, fundamental: float) -> flo
         knots = np.linspace(float(angle.min()), float(angle.max()), KNOTS)
         weights = np.stack([np.interp(angle, knots, one) for one in np.eye(KNOTS)], axis=1)
         for order in orders:
-            waves = np.exp(1j * order * angle)
-            columns = np.concatenate(
-                [weights * waves.real[:, None], weights * waves.imag[:, None]], axis=1
-            )
+            waves = weights * np.exp(1j * order * angle)[:, None]
+            columns = np.concatenate([waves.real, waves.imag], axis=1)
             gram, moment = columns.T @ columns, columns.T @ residual[rows]
             held[track.group[start]] += moment @ np.linalg.lstsq(gram, moment, rcond=1e-9)[0]
     held /= compared.dataset.fine.parts.counts

@@ -15,8 +15,7 @@ SEALED_BLOCKS = (2, 5, 9)
 """Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
 run three times, every fourth block is the same motion, which nothing open would have shown."""
 FEWEST_GROUPS = 4
-"""That are sealed as wholes: of two recordings, the way there and the way back, one would show no
-friction, and of two cycles one is half of what there is."""
+"""Sealed as wholes: of two, a way there and a way back, one alone would show no friction."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
 
