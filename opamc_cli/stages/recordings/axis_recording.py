@@ -18,7 +18,7 @@ from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs import Array, Run
 from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
 
-UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", np.pi / 180: "deg"}
+UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", 0.5 / np.pi: "rev/s", np.pi / 180: "deg"}
 """Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
 SAME_RATIO = 0.03
 

@@ -23,6 +23,9 @@ LARGEST_A = 60.0
 AGREE_WITHIN = 0.1
 """Relative difference within which a position's steps agree with a speed."""
 
+SAME = 0.03
+"""Within which it is the same: degrees by rpm and radians by rev/s are 5 % apart."""
+
 ANGLE_UNITS = {
     ("rad", "rad/s"): 1.0,
     ("deg", "deg/s"): 1.0,
@@ -30,6 +33,8 @@ ANGLE_UNITS = {
     ("rad", "deg/s"): math.pi / 180,
     ("deg", "rpm"): 6.0,
     ("rad", "rpm"): math.pi / 30,
+    ("deg", "rev/s"): 360.0,
+    ("rad", "rev/s"): 2 * math.pi,
 }
 """Steps of the position per second, over the speed, by units of both."""
 
@@ -70,12 +75,9 @@ def angle_units(
     ratio = _steps_over_speed(positions, speeds)
     if ratio is not None and rate_hz is not None:
         ratio *= rate_hz
-        fitting = [
-            units
-            for units, expected in ANGLE_UNITS.items()
-            if abs(ratio / expected - 1) < AGREE_WITHIN
-        ]
-        for units in sorted(fitting, key=lambda units: units[0] != by_range):
+        off = {units: abs(ratio / expected - 1) for units, expected in ANGLE_UNITS.items()}
+        fitting = [units for units, how_far in off.items() if how_far < AGREE_WITHIN]
+        for units in sorted(fitting, key=lambda units: (off[units] > SAME, units[0] != by_range)):
             why = f"largest {largest:.3g}; its steps agree with the speed"
             return Guess(units[0], why), Guess(units[1], f"largest {fastest:.3g}; as the position")
     speed = "deg/s" if fastest > LARGEST_RAD else "rad/s"

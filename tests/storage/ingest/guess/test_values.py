@@ -84,6 +84,8 @@ def test_a_declared_unit_is_believed_where_it_is_one_of_the_quantity(unit, kind,
         (1.0, 180 / np.pi, ("rad", "deg/s")),
         (180 / np.pi, 30 / np.pi, ("deg", "rpm")),
         (1.0, 30 / np.pi, ("rad", "rpm")),
+        (180 / np.pi, 0.5 / np.pi, ("deg", "rev/s")),
+        (1.0, 0.5 / np.pi, ("rad", "rev/s")),
         # a tenth apart still agrees, more does not
         (1.0, 1.09, ("rad", "rad/s")),
     ],
@@ -92,6 +94,14 @@ def test_units_of_an_angle_are_those_whose_steps_agree_with_the_speed(position, 
     found = angle_units({1: position * ANGLE}, {1: speed * SPEED}, 250.0)
     assert (found[0].unit, found[1].unit) == units
     assert found[0].why.endswith("; its steps agree with the speed")
+
+
+def test_degrees_by_rpm_are_no_radians_by_revolutions_though_both_are_few():
+    few = 0.05 * ANGLE
+    found = angle_units({1: 180 / np.pi * few}, {1: 0.05 * 30 / np.pi * SPEED}, 250.0)
+    assert (found[0].unit, found[1].unit) == ("deg", "rpm")
+    found = angle_units({1: few}, {1: 0.05 * 0.5 / np.pi * SPEED}, 250.0)
+    assert (found[0].unit, found[1].unit) == ("rad", "rev/s")
 
 
 def test_units_by_the_range_alone():
