@@ -3,6 +3,7 @@ import math
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pyarrow as pa
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from opamc_cli.stages.report import wording
+from opamc_cli.stages.report.figures import partial_residuals
 from opamc_cli.stages.report.figures.figure import canvas, style, to_svg
 from opamc_cli.stages.report.figures.palette import PALETTE, colour
 from opamc_cli.stages.report.onset import find_onset
@@ -234,3 +236,14 @@ def _luminance(hexadecimal: str) -> float:
     parts = [int(hexadecimal[i : i + 2], 16) / 255 for i in (1, 3, 5)]
     linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
     return float(np.dot([0.2126, 0.7152, 0.0722], linear))
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 6])
+def test_each_added_effect_has_a_panel_and_nothing_else_has(monkeypatch, count):
+    curve = {"covariate": "speed", "unit": "rad/s"}
+    curve |= {key: [0.0, 1.0, 2.0] for key in ("x", "residual_a", "named_a")}
+    steps = [{"effect": "stribeck", "parameters": {}, "curve": curve}] * count
+    monkeypatch.setattr(partial_residuals, "loop_axis", lambda inputs, axis: {"steps": steps})
+    drawn = partial_residuals.figure(SimpleNamespace(unit="A"), 1)
+    assert drawn.svg.count(">speed (rad/s)<") == count
+    assert drawn.svg.count("<clipPath") == count

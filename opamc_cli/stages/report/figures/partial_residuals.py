@@ -26,7 +26,7 @@ def figure(inputs: ReportInputs, axis: int) -> Figure:
     with style():
         drawing = canvas(2.1 * rows)
         panels = drawing.subplots(rows, min(COLUMNS, len(shown)), squeeze=False).flat
-        for panel, step in zip(panels, shown, strict=False):
+        for step, panel in zip(shown, panels, strict=False):  # which leaves the others
             curve = step["curve"]
             panel.plot(
                 curve["x"],
