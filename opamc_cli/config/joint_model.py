@@ -39,6 +39,14 @@ class ClosedConfig(Section):
         1.0, description="Speed by which regressors are measured."
     )
     temperature_c: float | None = Field(None, description="Likewise a temperature.")
+    opposite_sign: bool | None = Field(
+        None, description="Whether the negative of the logged current was modelled; null: find out."
+    )
+    regressors: tuple[tuple[FiniteFloat, ...], ...] | None = Field(
+        None,
+        description="Upper triangular root of the mean products of the regressors, lines left out, "
+        "row by row from the diagonal on: where `opamc model evaluate` is on known ground.",
+    )
 
 
 class JointModelConfig(Section):

@@ -59,3 +59,24 @@ def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
     except np.linalg.LinAlgError:
         values, vectors = eigh(symmetric, driver="ev")
     return values, vectors
+
+
+def root_of(gram: Floats) -> Floats:
+    """Upper triangular R with ``R.T @ R`` a matrix of products, both (k, k)."""
+    scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+    values, vectors = eigenvectors(gram / np.outer(scale, scale))
+    root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return np.asarray(np.linalg.qr(root, mode="r") * scale)
+
+
+def leverage(columns: Floats, root: Floats) -> Floats:
+    """Squared distance of regressors, (n, k), from zero per direction that a fit could tell; (n,).
+
+    `root`, (any, k), is that of their mean products where they were fitted: there it is 1 on the
+    mean. Directions below 1e-7 of the largest got no coefficient.
+    """
+    scale = np.maximum(np.linalg.norm(root, axis=0), 1e-300)
+    _, sizes, vectors = np.linalg.svd(root / scale, full_matrices=False)
+    told = sizes**2 > SINGULAR_BELOW * sizes.max(initial=0.0) ** 2
+    whitened = columns @ (vectors[told] / sizes[told, None] / scale).T
+    return np.asarray(np.sum(whitened**2, axis=1) / max(np.count_nonzero(told), 1))

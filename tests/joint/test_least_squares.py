@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.joint import least_squares
-from opamc_cli.joint.least_squares import eigenvectors, inverse, solve
+from opamc_cli.joint.least_squares import eigenvectors, inverse, leverage, root_of, solve
 
 
 def random_columns(seed=4, sets=3, rows=40, width=6):
@@ -100,3 +100,19 @@ def test_eigenvalues_are_asked_for_only_where_one_may_be_small(monkeypatch):
     found, every = (one * sizes[:, None, :] * sizes[:, :, None] for one in (found, every))
     np.testing.assert_allclose(found, every, rtol=1e-9, atol=1e-9)
     assert asked[1] == (3, 6, 6)
+
+
+def test_leverage_is_one_on_the_mean_where_a_fit_was_made():
+    columns, _ = random_columns()
+    design = columns[0] * np.array([1e-4, 1, 3, 1e5, 1, 1])
+    design[:, 5] = 2 * design[:, 4]  # no fit tells the two apart
+    root = root_of(design.T @ design / len(design))
+    np.testing.assert_allclose(np.tril(root, -1), 0, atol=1e-9)
+    np.testing.assert_allclose(root.T @ root, design.T @ design / len(design), rtol=1e-6)
+    found = leverage(design, root)
+    assert found.mean() == pytest.approx(1.0)
+    scaled = design / np.linalg.norm(design, axis=0)
+    expected = np.sum((scaled @ np.linalg.pinv(scaled.T @ scaled, rcond=1e-9)) * scaled, axis=1)
+    np.testing.assert_allclose(found, expected * len(design) / 5, rtol=1e-6)
+    np.testing.assert_allclose(leverage(3 * design, root), 9 * found, rtol=1e-9)
+    assert leverage(np.zeros((4, 0)), np.zeros((0, 0))).tolist() == [0, 0, 0, 0]

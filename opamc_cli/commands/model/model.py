@@ -17,7 +17,7 @@ from opamc_cli.commands.model.shown import (
 )
 from opamc_cli.commands.terminal import options
 from opamc_cli.commands.terminal.output import Output
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, ExitCode
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -52,6 +52,8 @@ app.command()(effects)
 
 MOST_COEFFICIENTS = 4
 """Shown on a terminal; a drive's answer has dozens, all are in fit.parquet."""
+MOSTLY = 0.5
+"""Share of a motion on which a model was closed, below which its error says little."""
 
 
 @app.command()
@@ -156,6 +158,18 @@ def evaluate(
     _on_axes("evaluate", stage, _evaluation, *given, Output(as_json, quiet))
 
 
+def _unjudged(result: dict[str, Any]) -> list[str]:
+    """Say what of an evaluation means little: what was not applied, and where nothing is known."""
+    said = [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
+    known = result["familiar"]
+    if known is not None and known["share"] < MOSTLY:
+        said.append(
+            f"{1 - known['share']:.0%} of the motion lies where the model was not closed, and says "
+            "little of the joint: close it on runs of this program, too"
+        )
+    return said
+
+
 def _on_axes(
     step: str,
     work: Callable[..., "Outcome"],
@@ -182,18 +196,22 @@ def _on_axes(
         *(line for result in outcome.results for line in shown(result)),
         *(str(path) for path in outcome.written),
     )
-    for result in outcome.results if output.quiet else ():
-        for one in result.get("not_applied", ()):
-            output.failure(f"axis {result['axis']}: not applied {one['effect']}: {one['why']}")
-    _end(outcome, output)
+    unjudged = [
+        f"axis {result['axis']}: {said}"
+        for result in outcome.results
+        if "not_applied" in result
+        for said in _unjudged(result)
+    ]
+    for said in unjudged if output.quiet else ():
+        output.failure(said)
+    _end(outcome, output, ExitCode.NOT_ENOUGH_DATA if unjudged else ExitCode.DONE)
 
 
-def _end(outcome: "Outcome", output: Output) -> None:
-    """Say what the recordings lack and what failed, and end."""
+def _end(outcome: "Outcome", output: Output, code: ExitCode = ExitCode.DONE) -> None:
+    """Say what the recordings lack and what failed, and end, with a code unless something did."""
     output.notes(list(dict.fromkeys(note for one in outcome.results for note in one["notes"])))
-    raise typer.Exit(
-        output.failures([str(error) for error in outcome.errors], len(outcome.results))
-    )
+    failed = output.failures([str(error) for error in outcome.errors], len(outcome.results))
+    raise typer.Exit(failed or code)
 
 
 @contextmanager
@@ -266,5 +284,10 @@ def _evaluation(result: dict[str, Any]) -> Sequence["RenderableType"]:
         for run in result["runs"]:
             table.add_row(run["run"], f"{run['rmse_a']:.4g}", f"{run['r2']:.4f}")
         shown.append(table)
-    shown += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
-    return shown
+    known = result["familiar"]
+    if known is not None and 0 < known["share"] < 1:
+        shown.append(
+            f"where the model was closed, {known['share']:.0%} of the motion: error "
+            f"{known['rmse_a']:.4g} {unit}, r2 {known['r2']:.4f}"
+        )
+    return [*shown, *_unjudged(result)]

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import (
     MOST_ROUNDS,
     SETTLED,
@@ -30,6 +31,8 @@ class Applied:
     judged: Bools
     """Samples at which it means something: the joint moves, and the smoothing of the motion takes
     nothing from its acceleration; bool array of shape (n,)."""
+    terms: tuple[Term, ...] = ()
+    """What was applied."""
 
     def rmse(self, among: Bools | bool = True) -> float:
         """Root mean square residual on the judged samples, or on those that are `among` them."""
@@ -51,6 +54,11 @@ def why_not_applied(term: Term, track: Track) -> str | None:
     return None if term.effect.name == "load_friction" else term.effect.untestable(track)
 
 
+def may_extrapolate(effect: Effect) -> bool:
+    """Whether another motion may ask for more of an effect: a line is as high everywhere."""
+    return effect.carries_load or not effect.fast
+
+
 def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Floats]) -> Applied:
     """Apply terms with known coefficients; where some follow the model, until that settles.
 
@@ -68,4 +76,4 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
         if np.abs(total - before).max() <= SETTLED * max(np.abs(total).max(), 1e-12):
             break
         track = track.with_model(load, model, static_terms(terms))
-    return Applied(track, track.current_a - total, judged)
+    return Applied(track, track.current_a - total, judged, tuple(terms))

@@ -23,6 +23,20 @@ from opamc_cli.storage.runs import Run
 
 
 @dataclass(frozen=True)
+class AxisRecordings:
+    """One axis of some runs."""
+
+    recordings: list[Recording]
+    """In time order."""
+    unit: str
+    """Of the current: "A", or "Nm" where a torque stands for it."""
+    opposite: bool
+    """Whether the currents are the negative of what was logged."""
+    notes: list[str]
+    """What the runs lack."""
+
+
+@dataclass(frozen=True)
 class AxisModel:
     """A declared model laid on one axis's recordings."""
 
@@ -34,10 +48,18 @@ class AxisModel:
     """Model as declared."""
     library: Library
     """Effects that may be added."""
-    unit: str
-    """Of the current: "A", or "Nm" where a torque stands for it."""
-    notes: list[str]
-    """What the recordings lack."""
+    read: AxisRecordings
+    """What it was fitted to."""
+
+    @property
+    def unit(self) -> str:
+        """Of the current: "A", or "Nm" where a torque stands for it."""
+        return self.read.unit
+
+    @property
+    def notes(self) -> list[str]:
+        """What the recordings lack."""
+        return self.read.notes
 
     @property
     def dataset(self) -> Dataset:
@@ -76,7 +98,8 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     """
     library = library_of(model)
     declared = declared_effects(model, library)
-    recordings, unit, notes = recordings_of(runs, axis)
+    read = recordings_of(runs, axis)
+    recordings = read.recordings
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
 
@@ -96,7 +119,7 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, fit, declared, allowed, unit, notes)
+    return AxisModel(axis, fit, declared, allowed, read)
 
 
 def declared_effects(
@@ -114,8 +137,10 @@ def declared_effects(
     return tuple((effect_named(known, d.effect), d) for d in model.declared())
 
 
-def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str, list[str]]:
-    """Read one axis of some runs, in time order; return also its current's unit, and what lacks.
+def recordings_of(
+    runs: Sequence[Run], axis: int, opposite: bool | None = None
+) -> AxisRecordings:
+    """Read one axis of some runs; is its current the negative of what was logged? None: find out.
 
     Raises
     ------
@@ -146,17 +171,27 @@ def recordings_of(runs: Sequence[Run], axis: int) -> tuple[list[Recording], str,
     notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
-    if len(pairs) == len(recordings) and friction_drives(pairs, recordings[0].rate_hz):
+    sign = -1.0 if opposite else 1.0
+    if len(pairs) == len(recordings) and friction_drives(
+        [(sign * x, q) for x, q in pairs], recordings[0].rate_hz
+    ):
+        known = opposite is not None
+        opposite = opposite if known else True
         notes.append(
             f"{runs[0].path}: friction would drive axis {axis}: its current has the opposite sign "
-            "of its motion, and the negative of it is modelled"
+            + (
+                "of the one that the model was closed on, or the model does not hold"
+                if known
+                else "of its motion, and the negative of it is modelled"
+            )
         )
+    if opposite:
         recordings = [
-            replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)
+            replace(one, current_a=-one.current_a) for one in recordings if one.current_a is not None
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return recordings, units.pop(), notes
+    return AxisRecordings(recordings, units.pop(), bool(opposite), notes)
 
 
 def _too_little_motion(

@@ -11,11 +11,12 @@ from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.declared import BETTER, JUDGED
-from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
+from opamc_cli.joint.fit.frozen import Applied, apply_frozen, may_extrapolate, why_not_applied
 from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.least_squares import leverage
 from opamc_cli.joint.motion.kinematics import build_track, smoothings
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.track import Floats, Joint, Reference, Track
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Reference, Track
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
 from opamc_cli.stages.model.declared_terms import declared_term
@@ -23,6 +24,13 @@ from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import ensure_directory, write_json
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
+
+FAMILIAR = 10.0
+"""Leverage, in means of the recordings that a model was closed on, up to which it knows a sample:
+of 53 measured joints those whose error rose eightfold on another program had 83 to 100 % of it
+beyond, all others 0 to 75 % (docs/validation.md)."""
+ROWS = 50_000
+"""Samples whose regressors are laid beside each other at once."""
 
 
 def evaluate(
@@ -61,7 +69,8 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     closed = model.closed
     assert closed is not None
     effects = declared_effects(model, library_of(model))
-    recordings, unit, notes = recordings_of(runs, axis)
+    read = recordings_of(runs, axis, closed.opposite_sign)
+    recordings, unit = read.recordings, read.unit
     if unit != closed.unit:
         msg = f"{runs[0].path}: is in {unit}, the model was closed in {closed.unit}; give such runs"
         raise InputError(msg)
@@ -82,11 +91,19 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
         # the motion is differentiated in the way that predicts best, as when the model was closed
         if found.rmse() ** 2 < BETTER * applied.rmse() ** 2:
             applied = found
+    known = _familiar(applied, effects, closed, {entry["effect"] for entry in left_out})
     return {
         "axis": axis,
         "unit": unit,
         "rmse_a": applied.rmse(),
         "r2": applied.r2(),
+        "familiar": None
+        if known is None
+        else {
+            "share": float(np.mean(known[applied.judged])),
+            "rmse_a": applied.rmse(known),
+            "r2": applied.r2(known),
+        },
         "closed": {"rmse_a": closed.rmse, "r2": closed.r2},
         "runs": [
             {
@@ -97,8 +114,35 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             for place, recording in enumerate(recordings)
         ],
         "not_applied": left_out,
-        "notes": notes,
+        "notes": read.notes,
     }
+
+
+def _familiar(
+    applied: Applied,
+    effects: Sequence[tuple[Effect, Any]],
+    closed: ClosedConfig,
+    left_out: set[str],
+) -> Bools | None:
+    """Mark samples that lie where the model was closed; None where its file does not tell.
+
+    Elsewhere regressors that cancelled each other on the model's own recordings may not do so.
+    """
+    counted = [(effect, entry) for effect, entry in effects if may_extrapolate(effect)]
+    widths = [len(entry.coefficients) for _, entry in counted]
+    size = sum(widths)
+    if closed.regressors is None or [*map(len, closed.regressors)] != list(range(size, 0, -1)):
+        return None
+    root = np.zeros((size, size))
+    root[np.triu_indices(size)] = [value for row in closed.regressors for value in row]
+    root = root[:, np.repeat([effect.name not in left_out for effect, _ in counted], widths)]
+    terms = [term for term in applied.terms if may_extrapolate(term.effect)]
+    known = np.zeros(applied.track.size, dtype=bool)
+    rows = np.flatnonzero(applied.judged)
+    for some in np.array_split(rows, -(-rows.size // ROWS) or 1):
+        columns = [np.zeros((some.size, 0)), *(t.columns(applied.track, some) for t in terms)]
+        known[some] = leverage(np.concatenate(columns, axis=1), root) <= FAMILIAR
+    return known
 
 
 def _within(applied: Applied, place: int) -> "np.ndarray[Any, np.dtype[np.bool_]]":

@@ -9,8 +9,10 @@ import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.joint.effects.ripple import order_ties
+from opamc_cli.joint.fit.frozen import may_extrapolate
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Dataset, Fit, Term
+from opamc_cli.joint.least_squares import root_of
 from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
@@ -227,6 +229,10 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
             entry["columns"] = list(term.keep)
         entry["coefficients"] = [float(f"{value:.9g}") for value in values]
         effects.append(entry)
+    counted = [may_extrapolate(term.effect) for term in after.terms]
+    of = np.repeat(counted, [values.size for values in after.coefficients])
+    sums = after.sums
+    root = root_of(sums.gram.sum(axis=0)[np.ix_(of, of)] / sums.parts.counts.sum())
     track = after.dataset.fine.track
     warm = track.temperature_c is not None
     return {
@@ -240,6 +246,10 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
             "r2": float(f"{loop.r2_after:.6g}"),
             "speed_rad_s": float(track.speed_scale),
             "temperature_c": track.middle_temperature_c if warm else None,
+            "opposite_sign": laid.read.opposite,
+            "regressors": [
+                [float(f"{value:.6g}") for value in row[place:]] for place, row in enumerate(root)
+            ],
         },
     }
 
