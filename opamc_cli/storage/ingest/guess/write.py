@@ -259,6 +259,7 @@ def _angles(look: _Look) -> tuple[dict[int, Float], dict[int, Float]]:
 def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
     positions, speeds = _angles(look)
     position, speed = angle_units(positions, speeds, rate_hz)
+    every = {axis for choice in look.choices.values() for axis in choice.by_axis}
     lines: list[_Line] = []
     for kind, choice in look.choices.items():
         channels = choice.by_axis
@@ -289,7 +290,9 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
         if choice.passed_over:
             why += f"; not {', '.join(choice.passed_over[:3])}"
         extra = ", unwrap: true" if kind == "position" and wraps(positions, guess.unit) else ""
-        lines += _lines_of(kind, channels, guess.unit, extra, why)
+        # A line for all axes asks for as many of every kind.
+        all_axes = ", optional: true" if every - channels.keys() else ""
+        lines += _lines_of(kind, channels, guess.unit, extra, all_axes, why)
     return lines
 
 
@@ -299,7 +302,7 @@ def _fits(unit: str, kind: str) -> bool:
 
 
 def _lines_of(
-    kind: str, channels: dict[int, Meant], unit: str, extra: str, why: str
+    kind: str, channels: dict[int, Meant], unit: str, extra: str, all_axes: str, why: str
 ) -> list[_Line]:
     """Return one line for all axes where the sources count with them, else one for each."""
     shared: dict[tuple[str, int], list[int]] = {}
@@ -319,7 +322,7 @@ def _lines_of(
             where = f"source: {_quoted(pattern[:-1])}, index: {mark}"
         else:
             where = f"source: {_quoted(pattern.replace('#', mark))}"
-        lines.append(_Line(kind, f"axis{{n}}_{kind}: {{{where}, unit: {unit}{extra}}}", why))
+        lines.append(_Line(kind, f"axis{{n}}_{kind}: {{{where}, unit: {unit}{extra}{all_axes}}}", why))
     for axis, channel in channels.items():
         if axis not in covered:
             index = "" if channel.index is None else f", index: {channel.index}"

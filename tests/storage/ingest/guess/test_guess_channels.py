@@ -59,7 +59,8 @@ def test_a_torque_stands_for_a_current_that_was_not_measured():
 def test_columns_of_a_wide_channel_are_axes_from_its_first():
     axes, _ = chosen("temp_1", "temp_2", motor_cur=2, q=3)
     assert axes["current"] == {1: ("motor_cur", 0), 2: ("motor_cur", 1)}
-    assert axes["position"] == {1: ("q", 0), 2: ("q", 1)}
+    # a joint beside, whose current was not logged
+    assert axes["position"] == {k + 1: ("q", k) for k in range(3)}
     # where no current has a number in its name, others tell the lowest
     assert axes["temperature"] == {1: "temp_1", 2: "temp_2"}
 

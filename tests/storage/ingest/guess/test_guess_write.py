@@ -1,8 +1,10 @@
 """Maps that are guessed for recordings, line by line."""
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
+from opamc_cli.__main__ import main
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.guess.write import guess_map
 
@@ -152,6 +154,24 @@ def test_clocks_that_differ_end_at_one_rate_or_are_told(tmp_path):
     lines, _ = lines_of(log("late.csv", 100, late=0.3))
     assert lines[3].endswith(": 100 Hz, uneven by up to 3 ms")
     assert lines[4].startswith("resample_hz: 100 # an uneven clock is another one in every rec")
+
+
+def test_a_map_for_fewer_currents_than_positions_is_one_that_works(tmp_path):
+    columns = {
+        "t": T,
+        **{f"q{k}": k * ANGLE for k in (1, 2, 3)},
+        **{f"cur{k}": k * SPEED for k in (1, 2)},
+    }
+    path = table(tmp_path / "a.csv", columns)
+    (tmp_path / "map.yaml").write_text(guess_map([path]))
+    with pytest.raises(SystemExit) as stopped:
+        main(["ingest", str(path), "--map", str(tmp_path / "map.yaml"), "--out", str(tmp_path)])
+    assert not stopped.value.code
+    names = set(pq.read_schema(tmp_path / "a.parquet").names)
+    assert names == {
+        *(f"axis{n}_current" for n in (1, 2)),
+        *(f"axis{n}_position" for n in (1, 2, 3)),
+    }
 
 
 def test_three_columns_without_names_are_phases_if_they_behave_so(tmp_path):
