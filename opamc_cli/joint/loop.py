@@ -9,7 +9,6 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
-from opamc_cli.joint.motion.smoothing import measurement_noise
 from opamc_cli.joint.name.chain import Chain, chain_of, extended, released, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
@@ -17,6 +16,7 @@ from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
+from opamc_cli.signal.motion.smoothing import measurement_noise
 
 TWICE = 2.0
 """The open samples' error: sealed ones of 34 joints had 0.7 to 1.7 times it, one changed 2.6."""

@@ -11,8 +11,8 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.smoothing import CORNER_WINDOW, averaging_kernel
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, coarsen, joined
+from opamc_cli.signal.motion.smoothing import CORNER_WINDOW, averaging_kernel
 
 FEWEST_SAMPLES = 10
 

@@ -12,7 +12,8 @@ from opamc_cli.joint.motion.phases.following import follow_phases
 from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.phases.torque_axis import side_of_torque, torque_current
-from opamc_cli.joint.motion.smoothing import (
+from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
+from opamc_cli.signal.motion.smoothing import (
     CORNER_WINDOW,
     SHORTEST_WINDOW,
     averaging_kernel,
@@ -24,7 +25,6 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
 
 LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""

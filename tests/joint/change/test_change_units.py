@@ -21,8 +21,8 @@ from sessions import (
 from opamc_cli.joint.change.units import followed, own_fit, read_side, side_by_side
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.smoothing import CORNER_WINDOW, SHORTEST_WINDOW, averaging_kernel
 from opamc_cli.joint.motion.track import block_mean
+from opamc_cli.signal.motion.smoothing import CORNER_WINDOW, SHORTEST_WINDOW, averaging_kernel
 
 
 @pytest.fixture(scope="module")

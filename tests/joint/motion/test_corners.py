@@ -11,14 +11,14 @@ from opamc_cli.joint.fit.model import dataset_of
 from opamc_cli.joint.motion.corners import clear_of_corners
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
 from opamc_cli.joint.motion.recordings import grouped_track
-from opamc_cli.joint.motion.smoothing import (
+from opamc_cli.joint.motion.track import Joint
+from opamc_cli.signal.motion.smoothing import (
     averaging_kernel,
     derivatives,
     measurement_noise,
     smoothing_window,
     taken_noise_gain,
 )
-from opamc_cli.joint.motion.track import Joint
 
 
 def dataset_from(made, current):

@@ -24,8 +24,8 @@ from opamc_cli.joint.motion.phases.sensor_errors import (
     rounded,
     without_sensor_errors,
 )
-from opamc_cli.joint.motion.smoothing import derivatives
 from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.signal.motion.smoothing import derivatives
 
 STRONG = 5.0
 """A current vector counts where it is longer than this many times its noise."""

@@ -58,7 +58,7 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
     axes = {
         axis for kind in ("current", *PHASES) if kind in choices for axis in choices[kind].by_axis
     }
-    # Where the joints beside are matters to the others, whether their own current was logged or not.
+    # Where joints beside are matters to the others, whether their own current was logged or not.
     places = set(axes)
     logged = choices["position"].by_axis if axes and "position" in choices else {}
     while max(places, default=0) + 1 in logged:

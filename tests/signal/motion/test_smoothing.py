@@ -3,7 +3,8 @@ import pytest
 from scipy.signal import savgol_filter
 from simulator import simulate
 
-from opamc_cli.joint.motion.smoothing import (
+from opamc_cli.joint.motion.track import averaged
+from opamc_cli.signal.motion.smoothing import (
     SHORTEST_WINDOW,
     averaging_kernel,
     derivatives,
@@ -12,7 +13,6 @@ from opamc_cli.joint.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.joint.motion.track import averaged
 
 
 def slow_derivative(path, rate, window, order):

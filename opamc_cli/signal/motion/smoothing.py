@@ -3,9 +3,11 @@
 from math import perm
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
-from opamc_cli.joint.motion.track import Floats, Ints
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 POLYNOMIAL_ORDER = 3
 SHORTEST_WINDOW = 3
