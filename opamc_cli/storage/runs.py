@@ -174,6 +174,12 @@ class Run:
         """Axes with a current, ascending, counted from 1."""
         return tuple(self._channels)
 
+    @property
+    def positions(self) -> dict[int, str]:
+        """Columns of angles by axis; of an axis without a current, too."""
+        matches = [match for match in map(COLUMN.fullmatch, self.columns) if match is not None]
+        return {int(match[1]): match[0] for match in matches if match[2] == "position"}
+
     def channels(self, axis: int) -> AxisChannels:
         """Return the columns of one axis.
 

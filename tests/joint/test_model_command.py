@@ -13,6 +13,7 @@ import yaml
 from simulator import simulate
 
 from opamc_cli.__main__ import main
+from opamc_cli.signal.motion.signs import friction_drives
 
 MODEL = (
     "joint: {gear_ratio: null, pole_pairs: null}\neffects: [inertia, gravity, coulomb, viscous]\n"
@@ -374,6 +375,30 @@ def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path,
     capsys.readouterr()
     assert close(tmp_path, "--axis", "1", model=wrong) == 2
     assert "asks for the position of axis 7" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp_path, capsys):
+    t = np.arange(6000) / 250.0
+    q = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1)
+    beside = 0.7 * np.sin(1.9 * t + 2) + 0.3 * np.sin(3.7 * t)
+    current = 0.5 * np.sin(q) + 0.15 * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
+    current += 0.2 * np.gradient(np.gradient(q)) * 250**2
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    pairs = [(-current, q)]
+    assert not friction_drives(pairs, 250.0)
+    entries = []
+    for sign in (1, -1):
+        columns = {"axis1_current": sign * current, "axis1_position": q, "axis3_position": beside}
+        write_run(tmp_path / "run.parquet", 250.0, **columns)
+        assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+        assert ("the opposite sign of its motion" in capsys.readouterr().err) == (sign < 0)
+        entries += json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    straight, opposed = entries
+    assert straight["notes"] == []
+    assert {**opposed, "notes": []} == straight
+    closed = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())["closed"]
+    assert closed["opposite_sign"] is True
 
 
 def test_workers_do_not_change_the_bytes(folder, capsys):

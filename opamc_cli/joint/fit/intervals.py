@@ -55,6 +55,21 @@ def certainty(fit: Fit) -> Certainty:
     )
 
 
+def drag_t(fit: Fit) -> float:
+    """Mean friction against the motion, over its jackknife error; below 0 it drives."""
+    dataset, grid = fit.dataset, fit.dataset.fine
+    direction = grid.track.direction[grid.parts.rows]
+    weights = [
+        direction @ grid.parts.taken(dataset.columns(term, fine=True)) / direction.size
+        if term.effect.domain == "velocity" or term.effect.follows_load
+        else np.zeros(values.size)
+        for term, values in zip(fit.terms, fit.coefficients, strict=True)
+    ]
+    drags = fit.sums.coefficients @ np.concatenate([np.zeros(0), *weights])
+    error = float(np.std(drags)) * float(np.sqrt(max(drags.size - 1, 1)))
+    return float(np.mean(drags)) / max(error, 1e-300)
+
+
 def _inseparable(scaled: Floats, fit: Fit, widths: list[int]) -> tuple[tuple[str, ...], ...]:
     """Small eigenvectors of the scaled products name the terms that cancel in them."""
     if not widths:

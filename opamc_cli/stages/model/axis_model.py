@@ -21,6 +21,11 @@ from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.storage.runs import Run
 
+OPPOSITE = (
+    "friction would drive axis {}: its current has the opposite sign of its motion, and the "
+    "negative of it is modelled"
+)
+
 
 @dataclass(frozen=True)
 class AxisRecordings:
@@ -32,6 +37,8 @@ class AxisRecordings:
     """Of the current: "A", or "Nm" where a torque stands for it."""
     opposite: bool
     """Whether the currents are the negative of what was logged."""
+    driven: bool
+    """Whether friction would drive the joint nevertheless."""
     notes: list[str]
     """What the runs lack."""
 
@@ -84,8 +91,10 @@ def library_of(model: JointModelConfig) -> Library:
     return library
 
 
-def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
-    """Lay a declared model on one axis of some runs.
+def lay(
+    model: JointModelConfig, runs: Sequence[Run], axis: int, opposite: bool | None = None
+) -> AxisModel:
+    """Lay a declared model on one axis of some runs, the sign of the current as `recordings_of`.
 
     Raises
     ------
@@ -98,7 +107,7 @@ def lay(model: JointModelConfig, runs: Sequence[Run], axis: int) -> AxisModel:
     """
     library = library_of(model)
     declared = declared_effects(model, library)
-    read = recordings_of(runs, axis)
+    read = recordings_of(runs, axis, opposite)
     recordings = read.recordings
     joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
@@ -137,9 +146,7 @@ def declared_effects(
     return tuple((effect_named(known, d.effect), d) for d in model.declared())
 
 
-def recordings_of(
-    runs: Sequence[Run], axis: int, opposite: bool | None = None
-) -> AxisRecordings:
+def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) -> AxisRecordings:
     """Read one axis of some runs; is its current the negative of what was logged? None: find out.
 
     Raises
@@ -171,27 +178,20 @@ def recordings_of(
     notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
-    sign = -1.0 if opposite else 1.0
-    if len(pairs) == len(recordings) and friction_drives(
-        [(sign * x, q) for x, q in pairs], recordings[0].rate_hz
-    ):
-        known = opposite is not None
-        opposite = opposite if known else True
-        notes.append(
-            f"{runs[0].path}: friction would drive axis {axis}: its current has the opposite sign "
-            + (
-                "of the one that the model was closed on, or the model does not hold"
-                if known
-                else "of its motion, and the negative of it is modelled"
-            )
-        )
-    if opposite:
+    signed = len(pairs) == len(recordings)
+    drives = signed and friction_drives(
+        [(-x if opposite else x, q) for x, q in pairs], recordings[0].rate_hz
+    )
+    if drives and opposite is None:
+        notes.append(f"{runs[0].path}: {OPPOSITE.format(axis)}")
+        opposite, drives = True, False
+    if signed and opposite:
         recordings = [
-            replace(one, current_a=-one.current_a) for one in recordings if one.current_a is not None
+            replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return AxisRecordings(recordings, units.pop(), bool(opposite), notes)
+    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), drives, notes)
 
 
 def _too_little_motion(

@@ -97,8 +97,7 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
 
 def positions_beside(run: Run, axis: int) -> dict[int, Array]:
     """Read the logged positions of a run's other axes; those that mostly lack a number are none."""
-    logged = {other: run.channels(other).position for other in run.axes if other != axis}
-    names = {other: name for other, name in logged.items() if name is not None}
+    names = {other: name for other, name in run.positions.items() if other != axis}
     samples = run.read(list(names.values()))
     found = {other: np.asarray(samples[name], dtype=np.float64) for other, name in names.items()}
     return {

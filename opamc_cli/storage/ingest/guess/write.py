@@ -322,7 +322,8 @@ def _lines_of(
             where = f"source: {_quoted(pattern[:-1])}, index: {mark}"
         else:
             where = f"source: {_quoted(pattern.replace('#', mark))}"
-        lines.append(_Line(kind, f"axis{{n}}_{kind}: {{{where}, unit: {unit}{extra}{all_axes}}}", why))
+        text = f"axis{{n}}_{kind}: {{{where}, unit: {unit}{extra}{all_axes}}}"
+        lines.append(_Line(kind, text, why))
     for axis, channel in channels.items():
         if axis not in covered:
             index = "" if channel.index is None else f", index: {channel.index}"
