@@ -106,6 +106,8 @@ def folded(texts: Sequence[str]) -> list[str]:
     ['2 runs: no ratio', 'rate differs']
     >>> folded(["a.parquet: 3 samples lost", "b.parquet: 8 samples lost"])
     ['a.parquet: 3 samples lost; 1 more run likewise']
+    >>> folded(["axis 3: no temperature", "axis 6: no temperature"])
+    ['axes 3, 6: no temperature']
     """
     groups: dict[str, list[str]] = {}
     for text in dict.fromkeys(texts):
@@ -119,7 +121,10 @@ def folded(texts: Sequence[str]) -> list[str]:
     for alike in groups.values():
         more = len(alike) - 1
         rests = {text.partition(": ")[2] for text in alike}
-        if more and alike[0].startswith("axis "):
+        if more and alike[0].startswith("axis ") and len(rests) == 1:
+            axes = ", ".join(text.partition(": ")[0].removeprefix("axis ") for text in alike)
+            lines.append(f"axes {axes}: {rests.pop()}")
+        elif more and alike[0].startswith("axis "):
             lines.append(f"{alike[0]} (and {more} more like this)")
         elif more and len(rests) == 1:
             lines.append(f"{len(alike)} runs: {rests.pop()}")

@@ -220,7 +220,7 @@ def build_track(
     ValueError is raised where one holds neither three phases nor a current with position or speed.
     """
     rate = recordings[0].rate_hz
-    beside = _moving_beside(recordings)
+    beside = moving_beside(recordings)
     pieces = [_one(recording, joint, smoothing, beside) for recording in recordings]
     first, clock, times = recordings[0].started_s, 0.0, []
     for recording, piece in zip(recordings, pieces, strict=True):
@@ -236,7 +236,7 @@ def build_track(
     )
 
 
-def _moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
+def moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:
     """Axes that every recording holds; none where none of them moves."""
     common = set.intersection(*(set(recording.others_rad) for recording in recordings))
     moves = any(

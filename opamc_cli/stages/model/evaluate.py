@@ -30,8 +30,8 @@ FAMILIAR = 10.0
 of 53 measured joints those whose error rose eightfold on another program had 83 to 100 % of it
 beyond, all others 0 to 75 % (docs/validation.md)."""
 SIGN = (
-    "friction would drive axis {}: its current has the opposite sign of the one that the model was "
-    "closed on"
+    "axis {}: friction would drive the joint: its current has the opposite sign of the one that "
+    "the model was closed on"
 )
 ROWS = 50_000
 """Samples whose regressors are laid beside each other at once."""
@@ -118,7 +118,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             for place, recording in enumerate(recordings)
         ],
         "not_applied": left_out,
-        "notes": [*read.notes, *([f"{runs[0].path}: {SIGN.format(axis)}"] if read.driven else [])],
+        "notes": [*read.notes, *([SIGN.format(axis)] if read.driven else [])],
     }
 
 

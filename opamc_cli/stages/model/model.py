@@ -197,7 +197,7 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     if others and not laid.read.opposite and drag_t(loop.after) < -DRIVEN_T:
         laid = lay(model, runs, axis, opposite=True)
         loop = close_loop(laid.fit, laid.library, seed)
-        laid.notes.append(f"{runs[0].path}: {OPPOSITE.format(axis)}")
+        laid.notes.append(OPPOSITE.format(axis))
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),
