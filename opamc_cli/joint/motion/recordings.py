@@ -11,6 +11,12 @@ from opamc_cli.joint.motion.track import Floats, Joint, Track
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
 SHORTEST_PATH = 3.0
+MOST_PLACES, PROBED = 40_000, 100
+"""Of an arm's places those that are looked at, and those of which it is asked whether the arm comes
+back to them, a travel later."""
+SAME, MOSTLY = 0.05, 0.5
+"""Share of each joint's travel within which a place is the same, and of places that are passed
+again."""
 ENOUGH_SAMPLES = 200_000
 """Of a logged motion, by which the way to differentiate is chosen: all of 100 s at 2 kHz."""
 
@@ -21,13 +27,32 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     lengths = [cycle_length(*_speeds(track, start, stop)) for start, stop in track.bounds]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
-    # Places are passed at different times where the path is three times the travel, or more.
-    runs = [track.position_rad[start:stop] for start, stop in track.bounds]
-    path = sum(float(np.abs(np.diff(run)).sum()) for run in runs)
-    if path >= SHORTEST_PATH * float(np.ptp(track.position_rad)):
+    if _revisits(track):
         track = replace(track, channels=track.channels | {"revisits"})
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+
+
+def _revisits(track: Track) -> bool:
+    """Whether places are passed at different times; of an arm that moves, those of all its joints.
+
+    Of one joint they are where the path is three times the travel, or more.
+    """
+    runs = [track.position_rad[start:stop] for start, stop in track.bounds]
+    path = sum(float(np.abs(np.diff(run)).sum()) for run in runs)
+    again = path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
+    if track.others is None or not again:
+        return again
+    beside = track.others[:, : len(track.other_axes)]
+    places = np.column_stack([track.position_rad, beside])[track.moving]
+    places = places[:: max(len(places) // MOST_PLACES, 1)]
+    places = places / np.maximum(np.ptp(places, axis=0), SHORTEST_TRAVEL_RAD)
+    way = np.cumsum(np.abs(np.diff(places, axis=0, prepend=places[:1])).max(axis=1))
+    passed = [
+        np.any((np.abs(places - places[k]).max(axis=1) < SAME) & (np.abs(way - way[k]) > 1.0))
+        for k in range(0, len(places), max(len(places) // PROBED, 1))
+    ]
+    return float(np.mean(passed)) >= MOSTLY
 
 
 def _speeds(track: Track, start: int, stop: int) -> list[Floats]:
