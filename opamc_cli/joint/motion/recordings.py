@@ -41,12 +41,13 @@ def _revisits(track: Track) -> bool:
     runs = [track.position_rad[start:stop] for start, stop in track.bounds]
     path = sum(float(np.abs(np.diff(run)).sum()) for run in runs)
     again = path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
-    if track.others is None or not again:
+    if track.others is None or not again or not track.moving.any():
         return again
     beside = track.others[:, : len(track.other_axes)]
     places = np.column_stack([track.position_rad, beside])[track.moving]
     places = places[:: max(len(places) // MOST_PLACES, 1)]
-    places = places / np.maximum(np.ptp(places, axis=0), SHORTEST_TRAVEL_RAD)
+    travel = np.ptp(places, axis=0)
+    places = places / np.maximum(travel, max(SLOWEST_SHARE * travel[0], SHORTEST_TRAVEL_RAD))
     way = np.cumsum(np.abs(np.diff(places, axis=0, prepend=places[:1])).max(axis=1))
     passed = [
         np.any((np.abs(places - places[k]).max(axis=1) < SAME) & (np.abs(way - way[k]) > 1.0))

@@ -85,6 +85,35 @@ def test_places_are_revisited_where_the_path_is_three_times_the_travel(strokes, 
     assert ("revisits" in track.channels) == known
 
 
+@pytest.mark.parametrize(
+    ("beside", "known"),
+    [
+        (lambda t: 0.001 * np.sin(0.31 * t), True),  # stands, all but
+        (lambda t: np.sin(0.131 * t), False),
+        (lambda t: np.sin(np.pi * t + 1), True),
+    ],
+)
+def test_an_arm_comes_back_where_all_joints_that_move_do(beside, known):
+    time = np.arange(6000) / 200.0
+    place = np.sin(np.pi / 2 * time)
+    others = {2: beside(time), 3: 0.4 * np.cos(np.pi * time)}
+    run = Recording("run", 200.0, current_a=place, position_rad=place, others_rad=others)
+    track, _ = grouped_track([run], Joint())
+    assert ("revisits" in track.channels) == known
+
+
+def test_an_arm_comes_back_in_another_recording_of_its_program():
+    time = np.arange(4000) / 200.0
+    place = np.sin(2 * time)
+    others = {2: np.sin(0.31 * time), 3: np.cos(0.23 * time + 1)}
+    runs = [
+        Recording(f"run {k}", 200.0, current_a=place, position_rad=place, others_rad=others)
+        for k in range(2)
+    ]
+    for some, known in ((runs[:1], False), (runs, True)):
+        assert ("revisits" in grouped_track(some, Joint())[0].channels) == known
+
+
 def test_what_lies_between_two_recordings_is_no_path():
     runs = [stroke(rest_s=0.0, seconds=1.5, name=f"run {k}") for k in range(2)]
     track, _ = grouped_track(runs, Joint())
