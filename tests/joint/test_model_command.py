@@ -283,6 +283,7 @@ def test_motion_where_a_model_was_not_closed_is_said_also_if_quiet(tmp_path, cap
         (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
         assert (entry["familiar"]["share"] > 0.98) == (code == 0)
         assert (entry["familiar"]["share"] < 0.1) == (code == 5)
+        assert (entry["familiar"]["rmse_a"] is None) == (entry["familiar"]["share"] == 0)
         said = capsys.readouterr().err
         assert ("of the motion lies where the model was not closed" in said) == (code == 5)
         assert entry["r2"] > 0.9 or code == 5

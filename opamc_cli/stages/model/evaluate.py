@@ -101,13 +101,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
         "unit": unit,
         "rmse_a": applied.rmse(),
         "r2": applied.r2(),
-        "familiar": None
-        if known is None
-        else {
-            "share": float(np.mean(known[applied.judged])),
-            "rmse_a": applied.rmse(known),
-            "r2": applied.r2(known),
-        },
+        "familiar": None if known is None else _familiar_entry(applied, known),
         "closed": {"rmse_a": closed.rmse, "r2": closed.r2},
         "runs": [
             {
@@ -147,6 +141,16 @@ def _familiar(
         columns = [np.zeros((some.size, 0)), *(t.columns(applied.track, some) for t in terms)]
         known[some] = leverage(np.concatenate(columns, axis=1), root) <= FAMILIAR
     return known
+
+
+def _familiar_entry(applied: Applied, known: Bools) -> dict[str, float | None]:
+    share = float(np.mean(known[applied.judged]))
+    some = share > 0
+    return {
+        "share": share,
+        "rmse_a": applied.rmse(known) if some else None,
+        "r2": applied.r2(known) if some else None,
+    }
 
 
 def _within(applied: Applied, place: int) -> "np.ndarray[Any, np.dtype[np.bool_]]":
