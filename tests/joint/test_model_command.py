@@ -287,6 +287,14 @@ def test_motion_where_a_model_was_not_closed_is_said_also_if_quiet(tmp_path, cap
         said = capsys.readouterr().err
         assert ("of the motion lies where the model was not closed" in said) == (code == 5)
         assert entry["r2"] > 0.9 or code == 5
+        assert entry["notes"] == []
+    older = yaml.safe_load(model.read_text())
+    del older["closed"]["regressors"]
+    model.write_text(yaml.safe_dump(older))
+    assert opamc("model", "evaluate", run, "--model", model, "--out", out) == 0
+    (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
+    assert entry["familiar"] is None
+    assert "does not tell on what motion it was closed" in capsys.readouterr().err
 
 
 def test_a_channel_that_is_mostly_gaps_is_refused_also_if_quiet(folder, capsys):

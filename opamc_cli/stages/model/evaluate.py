@@ -28,10 +28,15 @@ from opamc_cli.storage.schemas import files
 FAMILIAR = 10.0
 """Leverage, in means of the recordings that a model was closed on, up to which it knows a sample:
 of 53 measured joints those whose error rose eightfold on another program had 83 to 100 % of it
-beyond, all others 0 to 75 % (docs/validation.md)."""
+beyond, all others 0 to 75 %; of a robot met later three of four such were beyond
+(docs/validation.md)."""
 SIGN = (
     "axis {}: friction would drive the joint: its current has the opposite sign of the one that "
     "the model was closed on"
+)
+UNTOLD = (
+    "axis {}: the model does not tell on what motion it was closed; close it again to hear whether "
+    "these runs go beyond it"
 )
 ROWS = 50_000
 """Samples whose regressors are laid beside each other at once."""
@@ -112,7 +117,11 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             for place, recording in enumerate(recordings)
         ],
         "not_applied": left_out,
-        "notes": [*read.notes, *([SIGN.format(axis)] if read.driven else [])],
+        "notes": [
+            *read.notes,
+            *([SIGN.format(axis)] if read.driven else []),
+            *([UNTOLD.format(axis)] if known is None else []),
+        ],
     }
 
 
