@@ -511,6 +511,17 @@ def test_phases_alone_are_enough(tmp_path):
     assert loop["after"]["rmse_a"] <= loop["before"]["rmse_a"]
 
 
+def test_phase_currents_have_no_opposite_sign(tmp_path, monkeypatch, capsys):
+    made = simulate(6, (), 1.0, rate=500.0, cycles=6)
+    phases = {f"axis1_{p}": made.phases[:, k] for k, p in enumerate("abc")}
+    beside = np.sin(0.01 * np.arange(len(made.position)))
+    columns = {**phases, "axis1_position": made.position, "axis2_position": beside}
+    write_run(tmp_path / "run.parquet", 500.0, **columns)
+    monkeypatch.setattr("opamc_cli.stages.model.model.drag_t", lambda _: -99.0)
+    assert close(tmp_path, "--axis", "1", "--jobs", "1", model=MODEL) == 0
+    assert "opposite sign" not in capsys.readouterr().err
+
+
 DATA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 
 

@@ -195,9 +195,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     # others ask.
     others = laid.dataset.fine.track.others is not None
     if others and not laid.read.opposite and drag_t(loop.after) < -DRIVEN_T:
-        laid = lay(model, runs, axis, opposite=True)
-        loop = close_loop(laid.fit, laid.library, seed)
-        laid.notes.append(OPPOSITE.format(axis))
+        negative = lay(model, runs, axis, opposite=True)
+        if negative.read.opposite:  # Of phase currents there is none.
+            laid, loop = negative, close_loop(negative.fit, negative.library, seed)
+            laid.notes.append(OPPOSITE.format(axis))
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),
