@@ -61,7 +61,8 @@ def _drive(joint, hidden, wanted, wanted_speed, wanted_acceleration, warmer, ste
      drag_width, spring, neutral, loaded_from, load_sin, load_cos, load_inertia, ripple, order,
      phase, dahl, dahl_length, warm, warm_s, hum, hum_hz, cold, cold_per_c, more, drier, thicker,
      weight, weight_at, heavier) = hidden  # fmt: skip
-    velocity_gain, position_gain = inertia * bandwidth, bandwidth / 5
+    tuned = inertia + heavier  # whoever sets up a drive tunes it to what it moves
+    velocity_gain, position_gain = tuned * bandwidth, bandwidth / 5
     logged = np.zeros((5, wanted.size))
     angle = link = wanted[0]
     speed = link_speed = bristle = 0.0
@@ -71,11 +72,12 @@ def _drive(joint, hidden, wanted, wanted_speed, wanted_acceleration, warmer, ste
     for j in range(wanted.size):
         error = position_gain * (wanted[j] - angle) + wanted_speed[j] - speed
         held += velocity_gain * bandwidth / 5 * error * dt
-        asked = velocity_gain * error + held + inertia * wanted_acceleration[j]
+        asked = velocity_gain * error + held + tuned * wanted_acceleration[j]
         for s in range(steps):
             t = j * dt + s * h
             current += (asked - current) * h / 8e-4
             side, size = np.tanh(speed / 2e-3), abs(speed)
+            carried = heavier
             at = link if stiffness > 0 else angle
             load = sine * np.sin(at) + cosine * np.cos(at)
             bristle += speed * h / dahl_length * (1 - side * bristle)
@@ -88,20 +90,21 @@ def _drive(joint, hidden, wanted, wanted_speed, wanted_acceleration, warmer, ste
             extra += asymmetry * (0.3 * stribeck_speed + size) + spring * (angle - neutral) + more
             if t >= loaded_from:
                 extra += load_sin * np.sin(angle) + load_cos * np.cos(angle)
-                extra += load_inertia * wanted_acceleration[j]
+                carried += load_inertia
             extra += ripple * np.sin(order * angle + phase) + dahl * bristle
             extra += speed * (warm * np.exp(-t / warm_s) + thicker)
             extra += speed * cold * (np.exp(-cold_per_c * warmer[j]) - 1)
-            extra += weight * np.sin(angle + weight_at) + heavier * wanted_acceleration[j]
+            extra += weight * np.sin(angle + weight_at)
             resists = dry * side + viscous * speed + offset + extra
             before = angle
             if stiffness > 0:
                 twist = stiffness * (angle - link) + damping * (speed - link_speed)
-                acceleration = (current - resists - twist) / (inertia * (1 - share))
+                acceleration = (current - resists - twist) / (inertia * (1 - share) + carried)
                 link_speed += (twist - load) / (inertia * share) * h
                 link += link_speed * h
             else:
-                acceleration = (current - resists - load) / inertia
+                acceleration = (current - resists - load) / (inertia + carried)
+            extra += carried * acceleration
             speed += acceleration * h
             angle += speed * h
             hums = hum * np.sin(2 * np.pi * hum_hz * t)
