@@ -126,6 +126,29 @@ def test_hum_has_a_phase_for_every_clock(starts, columns):
     assert np.any(hum[first:, 0]) == (columns == 2)
 
 
+@pytest.mark.parametrize(
+    ("line_hz", "rate_hz", "shown_hz"),
+    [
+        (50.0, 125.0, 50.0),
+        (100.0, 125.0, 25.0),
+        (180.0, 125.0, 55.0),
+        (600.0, 2000.0, 600.0),
+        (28.06, 125.0, None),  # The 20th order of a UR10's motor at 5 degrees a second.
+        (14.03, 125.0, None),
+    ],
+)
+def test_a_line_is_hum_near_a_multiple_of_the_mains_only(line_hz, rate_hz, shown_hz):
+    time_s = np.arange(round(10 * rate_hz)) / rate_hz
+    recording = Recording("run", rate_hz, np.sin(time_s), position_rad=np.cos(0.4 * time_s))
+    line = np.cos(2 * np.pi * line_hz * time_s)
+    found = built_in_library()["mains_hum"].guesses(build_track([recording], Joint()), line)
+    near = [one["frequency_hz"] for one in found if abs(one["frequency_hz"] - line_hz) < 0.1]
+    if shown_hz is None:
+        assert not near
+    else:
+        assert found[0]["frequency_hz"] == pytest.approx(shown_hz, abs=0.1)
+
+
 def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
     rng = np.random.default_rng(3)
     columns, pole = rng.normal(size=(50, 2)), np.exp(-1 / 2.5)
