@@ -9,7 +9,7 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
-from opamc_cli.joint.name.chain import Chain, chain_of, extended, released, without
+from opamc_cli.joint.name.chain import PRICE, Chain, chain_of, extended, released, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
@@ -189,7 +189,9 @@ def _opened(
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
     rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
     refused: list[Tried] = []
-    if rmse_after > rmse_before:
+    # Functions alone have to be worth the price of one.
+    least = 1.0 - PRICE * (not any(step.named for step in steps))
+    if steps and rmse_after**2 > least * rmse_before**2:
         # Functions without a name first, then all: steps are never chosen among by the sealed data.
         hold = rmse_named <= rmse_before
         why = "does not hold on the sealed data"

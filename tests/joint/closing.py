@@ -76,6 +76,18 @@ def moved(motion, rate=250.0, seconds=30.0, seed=40):
     return np.cumsum(v + 0.5 * a / rate) / rate - (v[0] + 0.5 * a[0] / rate) / rate, v, a
 
 
+def slow_stroke(inertia, quantum=1e-5, noise_a=0.02, rate=250.0, seed=1):
+    """Record one slow stroke there and back: it accelerates for 0.1 s, four times."""
+    t = np.arange(round(12 * rate)) / rate
+    there = 0.3 * np.clip(np.minimum(t - 0.3, 11.7 - t) / 0.1, 0, 1)
+    v = np.concatenate([there, np.zeros(round(0.3 * rate)), -there])
+    q = np.cumsum(v) / rate - 1.5
+    columns = [np.gradient(v) * rate, np.sin(q), np.cos(q), np.sign(v), v]
+    current = np.stack(columns, 1) @ [inertia, 1.0, 0.4, MODEL["coulomb"], MODEL["viscous"]]
+    current += np.random.default_rng(seed).normal(0, noise_a, q.size)
+    return Recording("run", rate, current_a=current, position_rad=np.round(q / quantum) * quantum)
+
+
 def joint_of(motion, effect, strength=15.0, noise_a=0.02, **options):
     """Record a joint whose current lacks nothing, or one shape of `strength` times the noise.
 

@@ -4,7 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closing import MOTIONS, close_on, close_recording, fit_declared, joint_of, moved
+from closing import (
+    MOTIONS,
+    close_on,
+    close_recording,
+    fit_declared,
+    joint_of,
+    moved,
+    slow_stroke,
+)
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint import loop as loop_module
@@ -67,6 +75,15 @@ def test_an_effect_of_fifteen_times_the_noise_does_not_hide(motion, effect):
     assert loop.verdict == "closed"
     assert loop.rmse_before_a > 0.1
     assert loop.rmse_after_a < 1.5 * 0.02
+
+
+@pytest.mark.parametrize(("quantum", "rate"), [(1e-5, 250.0), (1e-4, 1000.0)])
+def test_what_is_missing_next_to_corners_of_the_motion_is_in_the_error(quantum, rate):
+    # There lies all that the inertia does; elsewhere the error was 0.02 A with and without it.
+    loop = close(slow_stroke(0.5, quantum, rate=rate), base=("gravity", "coulomb", "viscous"))
+    assert loop.steps[0].term.effect.name == "inertia"
+    assert loop.rmse_before_a > 5 * 0.02
+    assert loop.rmse_after_a < 0.4 * loop.rmse_before_a
 
 
 def test_a_ripple_that_folds_is_found_where_the_speed_changes():

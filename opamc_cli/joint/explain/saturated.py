@@ -64,7 +64,7 @@ def ceiling(before: Fit, explained: Fit) -> Ceiling:
 
 def sealed_parts(fit: Fit) -> Floats:
     """Sum of squared errors over each of the parts that the sealed samples are cut into."""
-    opened = fit.opened
-    values = opened.residual_a[opened.dataset.sharp.sealed]
+    found = fit.opened.judged
+    values = found.residual_a[found.sealed]
     pieces = np.array_split(values, min(SEALED_PARTS, max(values.size, 1)))
     return np.array([float(piece @ piece) for piece in pieces])

@@ -1,7 +1,7 @@
 """A fitted model applied to other recordings: nothing is estimated."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,12 +9,15 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.fit.model import (
     MOST_ROUNDS,
     SETTLED,
+    Fit,
     Term,
     currents,
+    dataset_of,
     r2_of,
     rmse_of,
     static_terms,
 )
+from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 
 PLACED = ("motor-angle", "joint-angle")
@@ -27,10 +30,11 @@ class Applied:
 
     track: Track
     residual_a: Floats
-    """Current less model; (n,)."""
+    current_a: Floats
+    """With `residual_a`: current, and current less model; next to a corner of the motion both as
+    smooth as the motion; (n,) each."""
     judged: Bools
-    """Samples at which it means something: the joint moves, and the smoothing of the motion takes
-    nothing from its acceleration; bool array of shape (n,)."""
+    """Samples at which it means something: the joint moves; bool array of shape (n,)."""
     terms: tuple[Term, ...] = ()
     """What was applied."""
 
@@ -41,7 +45,12 @@ class Applied:
     def r2(self, among: Bools | bool = True) -> float:
         """Share of the current's variance that the model explains; negative if it adds to it."""
         rows = self.judged & among
-        return r2_of(self.track.current_a[rows], self.residual_a[rows])
+        return r2_of(self.current_a[rows], self.residual_a[rows])
+
+    def is_opposed(self, among: Bools | bool = True) -> bool:
+        """Whether the negative of the current leaves less than half of the error."""
+        negative = replace(self, residual_a=self.residual_a - 2 * self.current_a)
+        return 2 * negative.rmse(among) < self.rmse(among)
 
 
 def why_not_applied(term: Term, track: Track) -> str | None:
@@ -65,8 +74,6 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
     The track holds other recordings, at the full rate, with the reference that the terms were
     fitted with.
     """
-    judged = track.moving & track.clear
-    judged = judged if judged.any() else track.moving
     circular = not all(term.is_constant for term in terms)
     total = np.zeros(track.size)
     for _ in range(MOST_ROUNDS if circular else 1):
@@ -76,4 +83,9 @@ def apply_frozen(track: Track, terms: Sequence[Term], coefficients: Sequence[Flo
         if np.abs(total - before).max() <= SETTLED * max(np.abs(total).max(), 1e-12):
             break
         track = track.with_model(load, model, static_terms(terms))
-    return Applied(track, track.current_a - total, judged, tuple(terms))
+    # One open group: nothing is fitted, but errors are judged as those of a fit.
+    whole = Grouping(np.zeros(track.size, dtype=np.int64), ("all",), (), "recordings")
+    dataset = dataset_of(track, whole, track.size).with_model(load, model, static_terms(terms))
+    found = Fit(tuple(terms), tuple(coefficients), dataset, track.current_a - total).judged
+    judged = found.open if found.open.any() else track.moving
+    return Applied(track, found.residual_a, found.current_a, judged, tuple(terms))

@@ -14,7 +14,16 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
-from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, averaged, block_mean, coarsen
+from opamc_cli.joint.motion.track import (
+    Bools,
+    Floats,
+    Ints,
+    Track,
+    averaged,
+    block_mean,
+    coarsen,
+    unfolded,
+)
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 8_000
@@ -27,8 +36,6 @@ LOAD_SAMPLES = 10_000
 """Samples by which a load is found that friction follows; all are fitted beside it."""
 TINY = 1e-6
 """Share of the largest load by which it is moved for its derivatives."""
-SMALLEST_KERNEL = 5
-"""A moving average of up to 5 samples needs no counterpart."""
 
 
 @dataclass(frozen=True)
@@ -180,15 +187,12 @@ class Dataset:
 def dataset_of(track: Track, grouping: Grouping, most: int = MOST_SAMPLES) -> Dataset:
     """Arrange a track for the loop; of more than so many moving samples by some of them."""
     track = replace(track, group=grouping.group)
-    if track.kernel.size <= SMALLEST_KERNEL:
-        track = replace(track, kernel=np.ones(1))
     if int(np.count_nonzero(track.moving & (track.group >= 0))) <= most:
         return _dataset(track, grouping)
     pieces = thinned(track, grouping, grouping.open, most)
     sealed = thinned(track, grouping, grouping.sealed, most)
-    grid = grid_of(cut(track, sorted((*pieces, *sealed))), grouping.sealed)
-    dataset = _dataset(cut(track, pieces), grouping)
-    return replace(dataset, opened=Dataset(grid, grid, 1, grouping))
+    both = cut(track, sorted((*pieces, *sealed)))
+    return replace(_dataset(cut(track, pieces), grouping), opened=_dataset(both, grouping))
 
 
 def _dataset(track: Track, grouping: Grouping) -> Dataset:
@@ -201,10 +205,11 @@ def _dataset(track: Track, grouping: Grouping) -> Dataset:
         # The moving average must not carry sealed samples into open ones.
         sealed = widened(np.isin(track.group, grouping.sealed), track.kernel.size // 2)
         touched = block_mean(sealed.astype(float), track.bounds, factor) > 0
-        moving = coarse_track.moving & ~touched
+        locked = np.isin(coarse_track.group, grouping.sealed)
+        moving = coarse_track.moving & (locked | ~touched)
         # Of a second of motion a long moving average may leave nothing.
-        if np.any(moving & (coarse_track.group >= 0)):
-            coarse = grid_of(replace(coarse_track, moving=moving))
+        if np.any(moving & ~locked & (coarse_track.group >= 0)):
+            coarse = grid_of(replace(coarse_track, moving=moving), grouping.sealed)
     return Dataset(fine, coarse, factor, grouping)
 
 
@@ -223,6 +228,17 @@ def grid_of(track: Track, sealed: tuple[int, ...] = (), whole: bool = False) -> 
     near = np.concatenate([parts.rows, np.flatnonzero(beside)])
     near = near if near.size < track.size else np.arange(track.size)
     return Grid(replace(track, open_samples=fit), fit, member & locked, parts, near)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a fit leaves of every moving sample, each counted once; (n,) on the fine grid."""
+
+    residual_a: Floats
+    current_a: Floats
+    open: Bools
+    sealed: Bools
+    """With `open`: samples at which the residual means something."""
 
 
 @dataclass(frozen=True)
@@ -250,15 +266,19 @@ class Fit:
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
         """
+        slow, fast = self._on_coarse()
+        return self.dataset.sums((), False, *slow, fast[:, None]).less_last(), slow, fast
+
+    def _on_coarse(self) -> tuple[list[Floats], Floats]:
+        """Regressors of the slow terms on the coarse grid, and the fast terms' current there."""
         dataset, track = self.dataset, self.dataset.fine.track
         fast = np.zeros(track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.fast:
                 fast += dataset.fine.spread(dataset.columns(term, True) @ values)
         smooth = averaged(fast, track.bounds, track.kernel)
-        fast = block_mean(smooth, track.bounds, dataset.factor)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        return dataset.sums((), False, *slow, fast[:, None]).less_last(), slow, fast
+        return slow, block_mean(smooth, track.bounds, dataset.factor)
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -296,18 +316,37 @@ class Fit:
         self.dataset.cache.clear()
         return fit_terms(replace(dataset, held=self.dataset.held), self.terms)
 
+    @property
+    def judged(self) -> Judged:
+        """Residuals at the full rate where the motion is clear of corners, as of `sharp`.
+
+        Else on the coarse grid, where the current is as smooth as the motion: what is missing may
+        show nowhere but there.
+        """
+        dataset, track = self.dataset, self.dataset.fine.track
+        coarse, sharp = dataset.coarse, dataset.sharp
+        own = self.residual_a, track.current_a, sharp.fit, sharp.sealed
+        if sharp is dataset.fine or coarse is dataset.fine:
+            return Judged(*own)
+        blocks, fast = self._on_coarse()
+        slow = [v for t, v in zip(self.terms, self.coefficients, strict=True) if not t.effect.fast]
+        current = coarse.track.current_a
+        left = current - fast - sum(map(np.matmul, blocks, slow))
+        smooth = left, current, coarse.fit, coarse.sealed
+        pairs = zip(own, smooth, strict=True)
+        laid = ((one, unfolded(by, track.bounds, dataset.factor)) for one, by in pairs)
+        return Judged(*(np.where(track.clear, one, by) for one, by in laid))
+
     def rmse(self, sealed: bool) -> float:
-        """Root mean square residual on the open or on the sealed samples."""
-        fit = self.opened if sealed else self
-        grid = fit.dataset.sharp
-        return rmse_of(fit.residual_a[grid.sealed if sealed else grid.fit])
+        """Root mean square error of the open or of the sealed samples."""
+        found = (self.opened if sealed else self).judged
+        return rmse_of(found.residual_a[found.sealed if sealed else found.open])
 
     @property
     def sealed_r2(self) -> float:
         """Share of the current's variance on the sealed samples that the fit predicts."""
-        fit = self.opened
-        grid = fit.dataset.sharp
-        return r2_of(grid.track.current_a[grid.sealed], fit.residual_a[grid.sealed])
+        found = self.opened.judged
+        return r2_of(found.current_a[found.sealed], found.residual_a[found.sealed])
 
 
 def rmse_of(residual: Floats) -> float:
@@ -333,7 +372,7 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUN
     best, least = dataset, np.inf
     for number in range(1, rounds + 1):
         fitted = _fit_once(dataset, terms)
-        error = fitted.rmse(sealed=False)
+        error = rmse_of(fitted.residual_a[fitted.dataset.sharp.fit])
         falls = error < (1 - SETTLED) * least
         if falls or number <= fewest:
             best, least, found = dataset, error, fitted

@@ -237,6 +237,19 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
     return np.concatenate(parts, axis=-1).T / factor
 
 
+def unfolded(
+    values: NDArray[Any], bounds: tuple[tuple[int, int], ...], factor: int
+) -> NDArray[Any]:
+    """Give each of the samples that a block was of its value, (n,); those of a rest get none, 0."""
+    found = np.zeros(bounds[-1][1], dtype=values.dtype)
+    place = 0
+    for start, stop in bounds:
+        blocks = (stop - start) // factor
+        found[start : start + blocks * factor] = np.repeat(values[place : place + blocks], factor)
+        place += blocks
+    return found
+
+
 def sampled(track: Track) -> dict[str, Any]:
     """Return what a track has per sample, by name: every array but the kernel."""
     every = {one.name: getattr(track, one.name) for one in fields(track) if one.name != "kernel"}

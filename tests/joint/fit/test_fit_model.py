@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closing import joint_of, plain_fit
+from closing import joint_of, plain_fit, slow_stroke
 
 from opamc_cli.joint.effects.base import Effect, stack
 from opamc_cli.joint.effects.library import built_in_library
@@ -76,12 +76,14 @@ def test_the_coarse_grid_averages_and_leaves_out_what_a_sealed_sample_reaches(mo
     dataset = dataset_from(joint_of("one stroke", None, rate=1000.0))
     assert dataset.factor == 4
     assert dataset.coarse.track.rate_hz == 1000.0 / dataset.factor
-    assert not dataset.coarse.sealed.any()
     fine = np.flatnonzero(dataset.fine.sealed)
+    assert dataset.coarse.sealed.sum() == pytest.approx(fine.size / 4, rel=0.01)
+    assert not (dataset.coarse.sealed & dataset.coarse.fit).any()
     blocks = np.unique(fine // dataset.factor)
     assert not dataset.coarse.fit[blocks[blocks < dataset.coarse.track.size]].any()
-    # A grid that is as coarse as the recording is the recording.
-    slow = dataset_from(joint_of("cyclic", None, rate=100.0))
+    # A grid that is as coarse as the recording is the recording, where nothing was averaged.
+    track, grouping = grouped_track([joint_of("cyclic", None, rate=100.0)], Joint())
+    slow = dataset_of(replace(track, kernel=np.ones(1)), grouping)
     assert slow.coarse is slow.fine
 
 
@@ -105,6 +107,25 @@ def test_what_is_not_clear_is_fitted_and_not_looked_at():
     assert dataset_of(replace(track, clear=np.ones_like(clear)), grouping).sharp is not None
     whole = dataset_of(replace(track, clear=np.ones_like(clear)), grouping)
     assert whole.sharp is whole.fine
+
+
+def test_every_moving_sample_is_judged_once():
+    dataset = dataset_from(slow_stroke(0.5))
+    fine, coarse, clear = dataset.fine, dataset.coarse, dataset.fine.track.clear
+    fitted = fit_terms(dataset, rigid()[1:])
+    found = fitted.judged
+    for known, own, smooth in (
+        (found.open, fine.fit, coarse.fit), (found.sealed, fine.sealed, coarse.sealed)
+    ):  # fmt: skip
+        np.testing.assert_array_equal(known, np.where(clear, own, smooth))
+        assert (known & ~clear).any()
+    np.testing.assert_array_equal(found.residual_a[clear], fitted.residual_a[clear])
+    columns = np.concatenate([one.columns(coarse.track) for one in fitted.terms], axis=1)
+    left = coarse.track.current_a - columns @ np.concatenate(fitted.coefficients)
+    np.testing.assert_allclose(found.residual_a[~clear], left[~clear], atol=1e-12)
+    assert fitted.rmse(sealed=True) == model.rmse_of(found.residual_a[found.sealed])
+    # A second fitted beside it holds what lies there.
+    assert fit_terms(dataset, rigid()).rmse(sealed=True) < 0.3 * fitted.rmse(sealed=True)
 
 
 def test_a_load_friction_is_found_together_with_the_load_whose_zero_it_moves():

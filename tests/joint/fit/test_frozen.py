@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from closing import joint_of, plain_fit
+from closing import joint_of, plain_fit, slow_stroke
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
@@ -25,6 +25,15 @@ def test_a_model_says_of_its_own_recordings_what_it_said():
     fitted = plain_fit(recording)
     applied = apply_frozen(track_of(recording), fitted.terms, fitted.coefficients)
     np.testing.assert_allclose(applied.residual_a, fitted.residual_a, atol=1e-12)
+
+
+def test_corners_of_the_motion_count_as_in_the_fit():
+    fitted = plain_fit(slow_stroke(0.5), ("gravity", "coulomb", "viscous"))
+    applied = apply_frozen(track_of(slow_stroke(0.5)), fitted.terms, fitted.coefficients)
+    known = fitted.judged
+    rows = known.open | known.sealed
+    np.testing.assert_array_equal(applied.judged & rows, rows)
+    np.testing.assert_allclose(applied.residual_a[rows], known.residual_a[rows], atol=1e-12)
 
 
 def test_nothing_is_estimated():
@@ -57,7 +66,8 @@ def test_terms_that_follow_the_load_are_applied_until_that_settles():
 
 def test_errors_are_of_moving_samples_that_are_clear_or_of_some_of_them():
     recording = joint_of("cyclic", None)
-    track = track_of(recording)
+    # Over three samples there is nothing to average where the motion is not clear.
+    track = replace(track_of(recording), kernel=np.ones(1))
     fitted = plain_fit(recording)
     half = np.arange(track.size) < track.size // 2
     clear = replace(track, clear=half)
@@ -78,7 +88,7 @@ def test_errors_are_of_moving_samples_that_are_clear_or_of_some_of_them():
 def test_nothing_is_explained_of_a_current_that_stays():
     track = track_of(joint_of("cyclic", None))
     steady = replace(track, current_a=np.full(track.size, 2.0))
-    applied = Applied(steady, np.ones(track.size), track.moving)
+    applied = Applied(steady, np.ones(track.size), steady.current_a, track.moving)
     assert (applied.rmse(), applied.r2()) == (1.0, 0.0)
 
 
