@@ -247,16 +247,22 @@ def test_a_current_of_the_opposite_sign_is_said_and_closed_alike(folder, capsys)
     closed = folder / "out" / "model.yaml"
     out = folder / "evaluated"
     run = folder / "run.parquet"
-    assert opamc("model", "evaluate", run, "--model", closed, "--axis", 1, "--out", out) == 0
+    evaluate = ("model", "evaluate", run, "--model", closed, "--axis", 1, "--out", out, "--quiet")
+    assert opamc(*evaluate) == 0
     (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
     assert entry["r2"] > 0.9
-    assert entry["notes"] == []
+    assert (entry["notes"], entry["opposite_sign"]) == ([], [])
+    assert capsys.readouterr() == ("", "")
     # A model holds for the sign that it was closed on, whatever a run alone would say.
     pq.write_table(table, run)
-    assert opamc("model", "evaluate", run, "--model", closed, "--axis", 1, "--out", out) == 0
+    assert opamc(*evaluate) == 5
     (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
     assert entry["r2"] < 0
-    assert "opposite sign of the one that the model was closed on" in entry["notes"][0]
+    assert entry["opposite_sign"] == ["run"]
+    said = (
+        "axis 1: the current of run has the opposite sign of the one that the model was closed on"
+    )
+    assert said in capsys.readouterr().err
 
 
 def test_motion_where_a_model_was_not_closed_is_said_also_if_quiet(tmp_path, capsys):

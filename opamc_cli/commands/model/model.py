@@ -159,8 +159,13 @@ def evaluate(
 
 
 def _unjudged(result: dict[str, Any]) -> list[str]:
-    """Say what of an evaluation means little: what was not applied, and where nothing is known."""
-    said = [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
+    """Say what of an evaluation means little, and why."""
+    said = [
+        f"the current of {run} has the opposite sign of the one that the model was closed on: its "
+        "negative leaves less than half of the error"
+        for run in result["opposite_sign"]
+    ]
+    said += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
     known = result["familiar"]
     if known is not None and known["share"] < MOSTLY:
         said.append(

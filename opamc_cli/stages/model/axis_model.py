@@ -37,8 +37,6 @@ class AxisRecordings:
     """Of the current: "A", or "Nm" where a torque stands for it."""
     opposite: bool
     """Whether the currents are the negative of what was logged."""
-    driven: bool
-    """Whether friction would drive the joint nevertheless."""
     notes: list[str]
     """What the runs lack."""
 
@@ -181,21 +179,16 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     signed = len(pairs) == len(recordings)
     # Of a heavy joint of an arm it may be anything until the others' torques are known: one of
     # positive friction (by 44 errors) drove by 14 in another program.
-    drives = (
-        signed
-        and not moving_beside(recordings)
-        and friction_drives([(-x if opposite else x, q) for x, q in pairs], recordings[0].rate_hz)
-    )
-    if drives and opposite is None:
-        notes.append(OPPOSITE.format(axis))
-        opposite, drives = True, False
+    if opposite is None and signed and not moving_beside(recordings):
+        opposite = friction_drives(pairs, recordings[0].rate_hz)
+        notes += [OPPOSITE.format(axis)] if opposite else []
     if signed and opposite:
         recordings = [
             replace(one, current_a=-x) for one, (x, _) in zip(recordings, pairs, strict=True)
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), drives, notes)
+    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes)
 
 
 def _too_little_motion(

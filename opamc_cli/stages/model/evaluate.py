@@ -30,10 +30,6 @@ FAMILIAR = 10.0
 of 53 measured joints those whose error rose eightfold on another program had 83 to 100 % of it
 beyond, all others 0 to 75 %; of a robot met later three of four such were beyond
 (docs/validation.md)."""
-SIGN = (
-    "axis {}: friction would drive the joint: its current has the opposite sign of the one that "
-    "the model was closed on"
-)
 UNTOLD = (
     "axis {}: the model does not tell on what motion it was closed; close it again to hear whether "
     "these runs go beyond it"
@@ -116,10 +112,14 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             }
             for place, recording in enumerate(recordings)
         ],
+        "opposite_sign": [
+            recording.name
+            for place, recording in enumerate(recordings)
+            if applied.is_opposed(_within(applied, place))
+        ],
         "not_applied": left_out,
         "notes": [
             *read.notes,
-            *([SIGN.format(axis)] if read.driven else []),
             *([UNTOLD.format(axis)] if known is None else []),
         ],
     }
