@@ -1,5 +1,7 @@
 """Simulate a joint and close the loop on it."""
 
+from dataclasses import replace
+
 import numpy as np
 from simulator import DECLARED, simulate
 
@@ -37,9 +39,13 @@ def fit_declared(recordings, joint=None, base=DECLARED):
     return best_fit(recordings, joint or Joint(), lambda dataset: terms)
 
 
-def plain_fit(recording, base=DECLARED):
-    """Fit the declared model to a motion differentiated as its own noise asks for."""
+def plain_fit(recording, base=DECLARED, averaged=True):
+    """Fit the declared model to a motion differentiated as its own noise asks for.
+
+    As of differences over three samples, which nothing has to be averaged beside, if not `averaged`.
+    """
     track, grouping = grouped_track([recording], Joint())
+    track = track if averaged else replace(track, kernel=np.ones(1))
     library = built_in_library()
     return fit_terms(dataset_of(track, grouping), tuple(Term(library[name], {}) for name in base))
 

@@ -71,9 +71,8 @@ def sealed(residual):
     """Return a fit whose sealed samples, every second one, leave a residual."""
     values = np.repeat(np.asarray(residual, dtype=float), 2)
     values[1::2] = 99.0
-    grid = SimpleNamespace(sealed=np.arange(values.size) % 2 == 0)
-    opened = SimpleNamespace(residual_a=values, dataset=SimpleNamespace(sharp=grid))
-    return SimpleNamespace(opened=opened)
+    judged = SimpleNamespace(residual_a=values, sealed=np.arange(values.size) % 2 == 0)
+    return SimpleNamespace(opened=SimpleNamespace(judged=judged))
 
 
 def test_sealed_samples_are_cut_into_twelve_parts_in_their_order():

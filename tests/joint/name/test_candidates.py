@@ -23,7 +23,7 @@ def stribeck(q, v, a, t):
 @pytest.fixture(scope="module")
 def slow_chain():
     """One grid for all: 100 Hz."""
-    return chain_of(plain_fit(joint_of("cyclic", stribeck, rate=100.0)), 0)
+    return chain_of(plain_fit(joint_of("cyclic", stribeck, rate=100.0), averaged=False), 0)
 
 
 @pytest.fixture(scope="module")

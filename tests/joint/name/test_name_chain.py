@@ -286,7 +286,9 @@ def test_a_drive_s_answer_is_held_and_let_go_of_where_that_predicts_better(chain
     assert released(held).score == better.score
 
 
-def test_on_one_grid_the_error_is_that_of_the_parts_that_are_judged(chain):
+def test_on_one_grid_the_error_is_that_of_the_parts_that_are_judged():
+    recording = joint_of("cyclic", stribeck, strength=5.0, rate=100.0)
+    chain = chain_of(plain_fit(recording, averaged=False), 0)
     dataset = chain.fit.dataset
     parts, sums = dataset.parts[0], chain.fit.sums
     assert dataset.coarse is dataset.fine
