@@ -42,7 +42,7 @@ def fit_declared(recordings, joint=None, base=DECLARED):
 def plain_fit(recording, base=DECLARED, averaged=True):
     """Fit the declared model to a motion differentiated as its own noise asks for.
 
-    As of differences over three samples, which nothing has to be averaged beside, if not `averaged`.
+    As if by differences over three samples, beside which nothing is averaged, if not `averaged`.
     """
     track, grouping = grouped_track([recording], Joint())
     track = track if averaged else replace(track, kernel=np.ones(1))
