@@ -161,8 +161,7 @@ def evaluate(
 def _unjudged(result: dict[str, Any]) -> list[str]:
     """Say what of an evaluation means little, and why."""
     said = [
-        f"the current of {run} has the opposite sign of the one that the model was closed on: its "
-        "negative leaves less than half of the error"
+        f"the current of {run} has the opposite sign of the one that the model was closed on"
         for run in result["opposite_sign"]
     ]
     said += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]

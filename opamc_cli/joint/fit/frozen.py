@@ -48,9 +48,9 @@ class Applied:
         return r2_of(self.current_a[rows], self.residual_a[rows])
 
     def is_opposed(self, among: Bools | bool = True) -> bool:
-        """Whether the negative of the current leaves less than half of the error."""
+        """Whether the model explains most of the negative of the current, and less of itself."""
         negative = replace(self, residual_a=self.residual_a - 2 * self.current_a)
-        return 2 * negative.rmse(among) < self.rmse(among)
+        return negative.r2(among) > max(0.5, self.r2(among))
 
 
 def why_not_applied(term: Term, track: Track) -> str | None:
@@ -59,6 +59,12 @@ def why_not_applied(term: Term, track: Track) -> str | None:
         return "its coefficients are of the recordings that it was fitted to"
     if term.effect.domain in PLACED and "logged" not in track.channels:
         return "the phases tell how far the joint turns, but not where it begins: log the position"
+    # A resonance above half the rate is a filter that never settles.
+    reach = max((v for k, v in term.parameters.items() if k.endswith("_hz")), default=0.0)
+    if reach >= track.rate_hz / 2:
+        return (
+            f"it reaches up to {reach:.4g} Hz, runs of {track.rate_hz:g} Hz to half of their rate"
+        )
     # load_friction asks for a load, which comes with the model
     return None if term.effect.name == "load_friction" else term.effect.untestable(track)
 

@@ -64,6 +64,17 @@ def test_terms_that_follow_the_load_are_applied_until_that_settles():
     np.testing.assert_allclose(applied.residual_a[rows], fitted.residual_a[rows], atol=2e-3)
 
 
+def test_a_resonance_above_half_the_rate_is_not_applied():
+    # As a filter it is unstable: currents of 1e224 A ended as a bug.
+    track = track_of(joint_of("cyclic", None, rate=100.0))
+    forms = {"order": 20.0, "direction": 1.0, "answer": 1.0}
+    assert why_not_applied(Term(LIBRARY["ripple"], {**forms, "top_hz": 49.0}), track) is None
+    said = why_not_applied(Term(LIBRARY["ripple"], {**forms, "top_hz": 125.7}), track)
+    assert said == "it reaches up to 125.7 Hz, runs of 100 Hz to half of their rate"
+    soft = Term(LIBRARY["elasticity"], {"resonance_hz": 50.0, "damping": 0.1})
+    assert "50 Hz" in why_not_applied(soft, track)
+
+
 def test_errors_are_of_moving_samples_that_are_clear_or_of_some_of_them():
     recording = joint_of("cyclic", None)
     # Over three samples there is nothing to average where the motion is not clear.
