@@ -49,7 +49,7 @@ def best_fit(
     ways = [] if "windows" in without_rules else smoothings(recordings)
     smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
     if smoothing is not None:
-        track = _judged_alike(build_track(recordings, joint, smoothing), track)
+        track = judged_alike(build_track(recordings, joint, smoothing), track)
         dataset = dataset_of(track, grouping)
     return declared_fit(dataset, model)
 
@@ -73,7 +73,7 @@ def _best_of(
 
     first, error, best = track, held_out(track), None
     for smoothing in ways:
-        other = _judged_alike(build_track(recordings, joint, smoothing), first)
+        other = judged_alike(build_track(recordings, joint, smoothing), first)
         found = held_out(other)
         if found < BETTER * error:
             track, error, best = other, found, smoothing
@@ -83,7 +83,7 @@ def _best_of(
     return best
 
 
-def _judged_alike(other: Track, track: Track) -> Track:
+def judged_alike(other: Track, track: Track) -> Track:
     """Judge both by the same samples: where the first takes nothing from the acceleration."""
     return replace(other, **{name: getattr(track, name) for name in JUDGED})
 

@@ -10,12 +10,12 @@ import numpy as np
 from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.explain.declared import BETTER, JUDGED
+from opamc_cli.joint.explain.declared import BETTER, judged_alike
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, may_extrapolate, why_not_applied
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.least_squares import leverage
-from opamc_cli.joint.motion.kinematics import build_track, smoothings
-from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
+from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Reference, Track
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
@@ -87,15 +87,12 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     if any(recording.position_rad is None for recording in recordings):
         # a speed is summed up from wherever the recording begins
         track = replace(track, channels=track.channels - {"logged"})
+    smoothing = _best_of(
+        smoothings(recordings), excerpts(recordings, track), track, effects, closed
+    )
+    if smoothing is not None:
+        track = judged_alike(build_track(recordings, joint, smoothing), track)
     applied, left_out = _apply(track, effects, closed)
-    for smoothing in smoothings(recordings):
-        other = build_track(recordings, joint, smoothing)
-        # all are judged where the first one takes nothing from the acceleration
-        same = {name: getattr(track, name) for name in JUDGED}
-        found, _ = _apply(replace(other, **same), effects, closed)
-        # the motion is differentiated in the way that predicts best, as when the model was closed
-        if found.rmse() ** 2 < BETTER * applied.rmse() ** 2:
-            applied = found
     known = _familiar(applied, effects, closed, {entry["effect"] for entry in left_out})
     return {
         "axis": axis,
@@ -123,6 +120,28 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             *([UNTOLD.format(axis)] if known is None else []),
         ],
     }
+
+
+def _best_of(
+    ways: list[Smoothing],
+    recordings: list[Recording],
+    whole: Track,
+    effects: Sequence[tuple[Effect, Any]],
+    closed: ClosedConfig,
+) -> Smoothing | None:
+    """Return the way to differentiate with which the model predicts best, as it was closed.
+
+    None for what the noise asks for.
+    """
+    first = grouped_track(recordings, whole.joint)[0]
+    first = replace(first, channels=whole.channels)
+    best, least = None, _apply(first, effects, closed)[0].rmse()
+    for smoothing in ways:
+        other = judged_alike(build_track(recordings, whole.joint, smoothing), first)
+        found = _apply(other, effects, closed)[0].rmse()
+        if found**2 < BETTER * least**2:
+            best, least = smoothing, found
+    return best
 
 
 def _familiar(
