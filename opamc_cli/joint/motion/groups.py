@@ -82,10 +82,10 @@ def group_samples(
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
-    little moves to seal anything off. The last 27 % of cycles, or of recordings, are sealed (of
-    each recording that holds four cycles or more, else of all). Fewer than four are cut into blocks
-    of equal moving time, of which a quarter is sealed, since the end of a single stroke would be a
-    place that the fit has never seen.
+    little moves to seal anything off. The last 27 % of the cycles of each recording are
+    sealed, if each holds four or more, else as many of all cycles or recordings, evenly spaced.
+    Fewer than four are cut into blocks of equal moving time, of which a quarter is sealed, since
+    the end of a single stroke would be a place that the fit has never seen.
     """
     group = np.full(moving.size, -1, dtype=np.int64)
     pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
@@ -109,10 +109,15 @@ def group_samples(
 
 
 def _sealed(runs: list[int]) -> tuple[int, ...]:
-    """Which pieces are sealed: the last of each run, if each has four or more, else of all."""
+    """Which pieces are sealed: the last of each run, if each has four or more, else evenly spaced.
+
+    The last runs may be all that there is of a speed, or a program: of ten runs of a joint at three
+    speeds all of the third were sealed, and every line was taken back that the others had shown.
+    """
     batches = [np.flatnonzero(np.equal(runs, run)) for run in dict.fromkeys(runs)]
     if min(batch.size for batch in batches) < 4:
-        batches = [np.arange(len(runs))]
+        count = max(round(SEALED_SHARE * len(runs)), 1)
+        return tuple(int((k + 0.5) * len(runs) / count) for k in range(count))
     last = [batch[-max(round(SEALED_SHARE * batch.size), 1) :] for batch in batches]
     return tuple(np.sort(np.concatenate(last)).tolist())
 

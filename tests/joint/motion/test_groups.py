@@ -41,12 +41,17 @@ def test_a_single_stroke_is_cut_into_blocks_and_some_of_its_middle_is_sealed():
     assert grouping.sealed == (2, 5, 9)
 
 
-def test_recordings_are_groups_where_nothing_repeats_inside_them():
-    moving = np.ones(5000, dtype=bool)
-    bounds = tuple((k * 1000, k * 1000 + 1000) for k in range(5))
-    grouping = group_samples(moving, bounds, None, 100.0, tuple("abcde"))
+@pytest.mark.parametrize(
+    ("count", "sealed"), [(4, "c"), (5, "c"), (6, "be"), (10, "bfi"), (12, "cgk")]
+)
+def test_recordings_are_groups_where_nothing_repeats_inside_them(count, sealed):
+    # The last of ten may be all that there is of a speed: sealed ones are evenly spaced.
+    moving = np.ones(count * 1000, dtype=bool)
+    bounds = tuple((k * 1000, k * 1000 + 1000) for k in range(count))
+    grouping = group_samples(moving, bounds, None, 100.0, tuple("abcdefghijkl"[:count]))
     assert grouping is not None
-    assert [grouping.names[g] for g in grouping.sealed] == ["e"]
+    assert grouping.kind == "recordings"
+    assert "".join(grouping.names[g] for g in grouping.sealed) == sealed
 
 
 @pytest.mark.parametrize("count", [2, 3])
