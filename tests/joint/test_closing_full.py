@@ -25,27 +25,27 @@ RIGID = ("inertia", "gravity", "coulomb", "viscous")
 
 
 @cache
-def recording(cycles=5):
+def recording(cycles=5, rate_hz=RATE_HZ):
     config = load_testbed(Path(__file__).parents[2] / "configs" / "testbed.yaml")
     program = replace(
         config.program, axes=(AXIS,), cycles=cycles, dwell_jitter_s=0.0, speed_percent=30.0
     )
-    made = simulate(config.robot, program, seed=SEED, sampling_rate_hz=RATE_HZ, axes=[AXIS]).axes[
+    made = simulate(config.robot, program, seed=SEED, sampling_rate_hz=rate_hz, axes=[AXIS]).axes[
         AXIS
     ]
     joint = config.robot.joints[AXIS - 1]
     known = Joint(joint.gear.ratio, joint.motor.pole_pairs)
     return known, Recording(
         "session",
-        RATE_HZ,
+        rate_hz,
         current_a=made.reported_a.astype(float),
         position_rad=made.position_rad,
         temperature_c=made.temperature_c.astype(float),
     )
 
 
-def close(names, orders=(), cycles=5):
-    known, session = recording(cycles)
+def close(names, orders=(), **options):
+    known, session = recording(**options)
     library = built_in_library()
     forms = {"speed": 1.0, "direction": 1.0, "load": 1.0}
     ripple = library["ripple"]
@@ -80,7 +80,7 @@ def test_what_is_found_beside_declared_parts_is_there():
 
 @pytest.mark.long
 def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
-    loop = close(RIGID, cycles=3)
+    loop = close(RIGID, cycles=3, rate_hz=1024.0)
     assert "time_delay" not in {step.term.effect.name for step in loop.steps}
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
 
