@@ -83,9 +83,9 @@ def group_samples(
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
     little moves to seal anything off. The last 27 % of the cycles of each recording are
-    sealed, if each holds four or more, else as many of all cycles or recordings, evenly spaced.
-    Fewer than four are cut into blocks of equal moving time, of which a quarter is sealed, since
-    the end of a single stroke would be a place that the fit has never seen.
+    sealed, if each holds four or more, else the third, sixth and tenth of every twelve cycles or
+    recordings. Fewer than four are cut into blocks of equal moving time, of which a quarter is
+    sealed, since the end of a single stroke would be a place that the fit has never seen.
     """
     group = np.full(moving.size, -1, dtype=np.int64)
     pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
@@ -109,15 +109,14 @@ def group_samples(
 
 
 def _sealed(runs: list[int]) -> tuple[int, ...]:
-    """Which pieces are sealed: the last of each run, if each has four or more, else evenly spaced.
+    """Which pieces are sealed: the last of each run, if each has four or more, else as of blocks.
 
     The last runs may be all that there is of a speed, or a program: of ten runs of a joint at three
     speeds all of the third were sealed, and every line was taken back that the others had shown.
     """
     batches = [np.flatnonzero(np.equal(runs, run)) for run in dict.fromkeys(runs)]
     if min(batch.size for batch in batches) < 4:
-        count = max(round(SEALED_SHARE * len(runs)), 1)
-        return tuple(int((k + 0.5) * len(runs) / count) for k in range(count))
+        return tuple(k for k in range(len(runs)) if k % BLOCKS_WITHOUT_CYCLES in SEALED_BLOCKS)
     last = [batch[-max(round(SEALED_SHARE * batch.size), 1) :] for batch in batches]
     return tuple(np.sort(np.concatenate(last)).tolist())
 
