@@ -80,6 +80,11 @@ class Chain:
         return all(signs[first:]) and not (turned and self.terms[-1].effect.follows_load)
 
     @property
+    def plausible(self) -> list[bool]:
+        """Whether each of the added terms has the sign that physics gives it."""
+        return self._signs[len(self.fit.terms) - self.added :]
+
+    @property
     def _signs(self) -> list[bool]:
         pairs, grid = self._valued, self.fit.dataset.fine
         way, speed = np.unique(grid.track.direction[grid.fit]), np.abs(grid.track.velocity)
