@@ -55,6 +55,16 @@ def test_a_single_chain_takes_what_imitates_a_spring_and_two_find_it():
     assert off.signature == single.signature
 
 
+def test_what_is_right_takes_the_place_of_what_has_imitated_it():
+    """A delay had imitated a ripple of 15 times the noise, which was refused for its sake."""
+    chain = chain_on("cyclic", lambda q, v, a, t: np.sin(60 * q), strength=15.0)
+    imitated = extended(chain, Term(LIBRARY["time_delay"], {"delay_s": -0.015}))
+    assert imitated.plausible == [False]
+    trial, *_ = trials(imitated, pool_of(chain, "ripple"))
+    assert names_of(trial.chain) == ["ripple"]
+    assert trial.why_not is None
+
+
 def test_nothing_is_added_to_noise():
     chain = chain_on("cyclic", None)
     names = ("spring", "stribeck", "position_drag", "hysteresis", "quadratic_friction")
