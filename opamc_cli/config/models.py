@@ -121,6 +121,11 @@ class IdentifyConfig(Section):
         0.35,
         description="Largest relative difference of a segment's duration from the reference's.",
     )
+    speed_tolerance: Positive = Field(
+        0.01,
+        description="Largest relative difference of how long a recording's motions last, the "
+        "middle one, from the baseline's; of another speed nothing can be compared.",
+    )
     f_max_tolerance: Positive = Field(
         0.25, description="Largest relative difference of f_d,max from the reference's."
     )

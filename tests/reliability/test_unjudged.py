@@ -73,6 +73,13 @@ def other_program(columns):
         columns[f"axis2_{name}"] = np.roll(columns[f"axis1_{name}"], int(0.1 * RATE_HZ))
 
 
+def faster(columns):
+    """Run the whole program three per cent faster."""
+    for name, values in columns.items():
+        at = np.arange(0, values.size - 1, 1.03)
+        columns[name] = np.interp(at, np.arange(values.size), values).astype(np.float32)
+
+
 REASONS = {
     gone: "The target: it has no current of axis 2.",
     dead: "its sensor is dead",
@@ -117,8 +124,17 @@ def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp
     assert REASONS[wrong] in " ".join(second["reasons"])
 
 
+def test_a_night_at_another_speed_is_not_judged(opamc, baseline, tmp_path):
+    """Of virtual joints three per cent made a fault with p = 1e-224."""
+    target = record(tmp_path / "tonight.parquet", 9, faster)
+    ended = diagnose(opamc, baseline, target, tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.NOT_ENOUGH_DATA
+    (sentence,) = ended.sentences
+    assert "its motions last 0.971 times as long as the baseline's" in sentence
+
+
 @pytest.mark.parametrize(
-    "wrong", [long(hundredfold), frozen, long(one_phase)], ids=lambda w: w.__name__
+    "wrong", [long(hundredfold), frozen, long(one_phase), faster], ids=lambda w: w.__name__
 )
 def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     opamc, baseline, tonight, tmp_path, wrong

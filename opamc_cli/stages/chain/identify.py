@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
+import pyarrow.compute as pc
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import IdentifyConfig
@@ -23,6 +24,7 @@ from opamc_cli.signal.identification import (
 )
 from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.chain.speeds import OTHER_SPEEDS, odd_speeds
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
 from opamc_cli.storage.runs import Run
@@ -177,6 +179,9 @@ def run(
     if outcome.errors and not outcome.results:
         raise outcome.errors[0]
     motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()
+    known = motions if reference is None else read_table(reference, "identify", MOTIONS)
+    other_speeds = odd_speeds(motions, known, config.identify.speed_tolerance)
+    motions = _without_cycles(motions, other_speeds)
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
     path = out / files.MOTIONS
     write_table(
@@ -189,9 +194,18 @@ def run(
             "reference_run": reference_run,
         },
         inputs=inputs,
-        extra=sources_record(list(sources.values()), out),
+        extra=sources_record(list(sources.values()), out) | {OTHER_SPEEDS: other_speeds},
     )
     return IdentifyOutcome(path, motions, outcome.errors, tuple(_unlike(motions, rule)))
+
+
+def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
+    """Take cycles and motions off the segments of some runs."""
+    left = pc.is_in(motions["run"], pa.array(sorted(runs), pa.string()))
+    for name in ("cycle", "motion"):
+        kept = pc.if_else(left, pa.scalar(UNIDENTIFIED, MOTIONS.field(name).type), motions[name])
+        motions = motions.set_column(motions.schema.get_field_index(name), name, kept)
+    return motions.cast(MOTIONS)
 
 
 def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:

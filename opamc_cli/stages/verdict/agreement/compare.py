@@ -7,6 +7,7 @@ from pathlib import Path
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.segment import SegmentOutcome
+from opamc_cli.stages.chain.speeds import OTHER_SPEEDS
 from opamc_cli.stages.verdict.agreement.exchanged import exchanged
 from opamc_cli.stages.verdict.agreement.findings import Finding, Reference, findings, reference_of
 from opamc_cli.stages.verdict.agreement.measured import Measured, measure
@@ -19,7 +20,7 @@ from opamc_cli.stages.verdict.agreement.unjudged import (
 )
 from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import read_sources
-from opamc_cli.storage.tables import read_table
+from opamc_cli.storage.tables import read_table, record_at
 
 
 @dataclass
@@ -82,7 +83,13 @@ class Agreement:
             Tables of stage `identify`.
         """
         sides = [
-            Side(role, self.measured[role], self.found[role], read_table(path, "identify", MOTIONS))
+            Side(
+                role,
+                self.measured[role],
+                self.found[role],
+                read_table(path, "identify", MOTIONS),
+                record_at(path)[OTHER_SPEEDS],
+            )
             for role, path in (("baseline", baseline), ("target", target))
         ]
         return unjudged(sides[0], sides[1])

@@ -26,6 +26,8 @@ class Side:
     """What is left out of the comparison."""
     motions: pa.Table
     """Rows of the motion table."""
+    slowness: Mapping[str, float] = field(default_factory=dict)
+    """By run of another speed, how many times as long as the baseline's its motions last."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""
@@ -68,7 +70,7 @@ class Unjudged:
 def unjudged(baseline: Side, target: Side) -> Unjudged:
     """Find the axes that move on either side but cannot be compared."""
     axes: dict[int, tuple[str, ...]] = {}
-    errors: list[OpamcError] = []
+    errors: list[str] = []
     at_rest: dict[int, dict[str, InputError]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
@@ -80,10 +82,11 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
                 axes[axis] = axes.get(axis, ()) + tuple(sentence(side.role, why) for why in whys)
                 continue
             paths = {own.run: own.path for own in side.measured}
-            errors += [InputError(f"{paths[run]}: {why}") for run, why in lost.items()]
+            errors += [f"{paths[run]}: {why}" for run, why in lost.items()]
             if side is target:
                 at_rest[axis] = {run: InputError(f"{paths[run]}: {idle[run]}") for run in idle}
-    return Unjudged(axes, tuple(errors), at_rest)
+    # what is wrong with all of a run is said once
+    return Unjudged(axes, tuple(map(InputError, dict.fromkeys(errors))), at_rest)
 
 
 def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
@@ -141,7 +144,8 @@ def _lost(axis: int, side: Side) -> dict[str, str]:
         if not rows.num_rows:
             lost[measured.run] = f"the motions of axis {axis} could not be identified"
         elif pc.max(rows["cycle"]).as_py() < 0:
-            lost[measured.run] = _unfitting(axis, rows)
+            ratio = side.slowness.get(measured.run)
+            lost[measured.run] = _unfitting(axis, rows) if ratio is None else _slower(ratio)
     return lost
 
 
@@ -155,6 +159,13 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
         elif measured.axis == axis and not measured.moves:
             idle.setdefault(measured.run, f"axis {axis} does not move")
     return idle
+
+
+def _slower(ratio: float) -> str:
+    return (
+        f"its motions last {ratio:.3g} times as long as the baseline's: of another speed nothing "
+        "can be compared"
+    )
 
 
 def _unfitting(axis: int, rows: pa.Table) -> str:

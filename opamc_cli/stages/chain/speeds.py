@@ -1,0 +1,70 @@
+"""Recordings of another speed than the others: how long their motions last."""
+
+import numpy as np
+import numpy.typing as npt
+import pyarrow as pa
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Strings = npt.NDArray[np.str_]
+
+OTHER_SPEEDS = "other_speeds"
+"""Where a motion table's record has what `odd_speeds` found."""
+
+OPEN_SAMPLES = 2.0
+"""By which the length of one motion is known."""
+
+
+def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[str, float]:
+    """Find the runs whose motions are slower or faster than the baseline's.
+
+    All joints of a robot change their speed together: a run is judged by the motions of all of
+    them, so that a joint whose fault moves its boundaries does not count alone.
+
+    Parameters
+    ----------
+    motions
+        Rows of a motion table.
+    baseline
+        Those of the baseline's, which may be the same: then the speed that most runs share is its.
+    tolerance
+        Relative difference that counts as none, beside what sampling leaves open.
+
+    Returns
+    -------
+    dict of str to float
+        By run, how many times as long as the baseline's its motions last, in the middle.
+    """
+    run, axis, ratio, samples = _lasting(motions)
+    usual = _usual(baseline, tolerance)
+    ratio = ratio / np.array([usual.get(own, 1.0) for own in axis.tolist()])
+    found = {}
+    for name in np.unique(run):
+        own = run == name
+        middle = float(np.median(ratio[own]))
+        known_to = OPEN_SAMPLES / np.median(samples[own]) / np.sqrt(np.count_nonzero(own))
+        if abs(middle - 1) > tolerance + known_to:
+            found[str(name)] = middle
+    return found
+
+
+def _usual(baseline: pa.Table, tolerance: float) -> dict[int, float]:
+    """Return, by axis, how long most of the baseline's runs take, in its reference cycle's time."""
+    run, axis, ratio, _ = _lasting(baseline)
+    usual = {}
+    for number in np.unique(axis):
+        own = axis == number
+        middles = np.array([np.median(ratio[own & (run == name)]) for name in np.unique(run[own])])
+        alike = np.abs(middles[:, None] - middles) <= tolerance
+        usual[int(number)] = float(np.median(middles[alike[np.argmax(alike.sum(axis=0))]]))
+    return usual
+
+
+def _lasting(motions: pa.Table) -> tuple[Strings, Ints, Floats, Ints]:
+    """Run, axis, length in the reference's and length in samples of each identified motion."""
+    identified = np.asarray(motions["cycle"]) >= 0
+    run, axis, start, stop, reference = (
+        np.asarray(motions[name])[identified]
+        for name in ("run", "axis", "start", "stop", "reference_samples")
+    )
+    return run.astype(str), axis, (stop - start) / reference, stop - start

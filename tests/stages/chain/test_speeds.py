@@ -1,0 +1,61 @@
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from opamc_cli.stages.chain.speeds import odd_speeds
+
+
+def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
+    """Two axes of some runs, four motions each, of which a reference cycle has its own speed."""
+    rows = [
+        {
+            "run": f"run{number}",
+            "axis": axis + 1,
+            "cycle": 0,
+            "start": 0,
+            "stop": round(samples * (1 + 0.2 * motion) / speed * (odd_axis if axis else 1.0)),
+            "reference_samples": round(samples * (1 + 0.2 * motion) / references[axis]),
+        }
+        for number, speed in enumerate(speeds)
+        for axis in range(2)
+        for motion in range(4)
+    ]
+    return pa.Table.from_pylist(rows)
+
+
+def test_a_run_that_is_three_per_cent_slower_is_of_another_speed():
+    motions = table([1.0, 1.0, 0.97, 1.0])
+    assert odd_speeds(motions, motions, 0.01) == {"run2": pytest.approx(1 / 0.97, rel=3e-3)}
+
+
+def test_the_speed_is_the_one_that_most_runs_share_and_not_that_of_the_reference_cycle():
+    motions = table([1.0, 0.97, 1.0, 1.0], references=(0.97, 1.0))
+    assert odd_speeds(motions, motions, 0.01).keys() == {"run1"}
+
+
+def test_two_runs_of_two_speeds_are_not_both_refused():
+    motions = table([1.0, 0.97])
+    assert len(odd_speeds(motions, motions, 0.01)) == 1
+
+
+def test_a_target_is_held_against_what_is_left_of_the_baseline():
+    baseline = table([1.0, 1.0, 1.03], references=(1.03, 1.03))
+    kept = baseline.filter(np.asarray(baseline["run"]) != "run2")
+    assert not odd_speeds(table([1.0, 1.0], references=(1.03, 1.03)), kept, 0.01)
+    assert odd_speeds(table([1.03], references=(1.03, 1.03)), kept, 0.01).keys() == {"run0"}
+
+
+def test_few_samples_leave_the_speed_open():
+    assert not odd_speeds(table([0.97], samples=12), table([1.0], samples=12), 0.01)
+
+
+def test_a_joint_whose_boundaries_move_does_not_make_another_speed():
+    odd = table([1.0], odd_axis=1.012)
+    assert not odd_speeds(odd, table([1.0]), 0.01)
+
+
+def test_nothing_identified_has_no_speed():
+    motions = table([1.0])
+    none = motions.set_column(2, "cycle", pa.array([-1] * motions.num_rows))
+    assert not odd_speeds(none, motions, 0.01)
+    assert not odd_speeds(motions, none, 0.01)
