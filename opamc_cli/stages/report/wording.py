@@ -5,7 +5,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.stages.recordings.sessions import started
-from opamc_cli.stages.verdict.reasons import CHECK_FIRST, FOUND, INSPECT, lies_outside
+from opamc_cli.stages.verdict.reasons import (
+    CHECK_FIRST,
+    FOUND,
+    INSPECT,
+    explains_little,
+    lies_outside,
+)
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
 
@@ -150,6 +156,8 @@ def inspection(entry: Mapping[str, Any]) -> str | None:
     meaning, told, action = _meaning(cause)
     first = action[:1].upper() + action[1:] if told else f"Look for {meaning}"
     if lies_outside(cause):
+        if explains_little(cause):
+            return INSPECT
         return f"{first}; do that before opening the gear."
     return (
         f"{first}; after that the rest of the strain wave gear, brake, motor connector and "

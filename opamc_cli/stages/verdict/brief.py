@@ -9,7 +9,7 @@ from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
-from opamc_cli.stages.verdict.reasons import lies_outside
+from opamc_cli.stages.verdict.reasons import SMALLER_PART, explains_little, lies_outside
 
 MOST_EVIDENCE = 2
 FEW_SESSIONS = 4
@@ -17,6 +17,8 @@ FEW_SESSIONS = 4
 
 SMOOTHER = 0.5
 """Of the baseline's fluctuations: a run-in or a warmer gear takes some per cent, a filter most."""
+
+GEAR = "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
 
 COMMON = 1.5
 """Times as far as usual that the siblings have moved, to be worth a word."""
@@ -57,11 +59,11 @@ def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bund
                 "Check the filters of drive and log before the gear: the current's fluctuations "
                 "have become smaller, which wear does not do."
             )
-        return (
-            "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
-        )
+        return GEAR
     meaning = cause.get("interpretation") or cause.get("effect")
     if lies_outside(cause):
+        if explains_little(cause):
+            return f"{GEAR} {SMALLER_PART.format(meaning)}"
         return f"Check before the gear: {meaning}."
     return f"Inspect the joint for {meaning}."
 
@@ -133,7 +135,7 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
             f"The other joints moved too, {math.exp(judgement.common_log_ratio):.2g} times as far "
             "as usual: temperature, supply, payload?"
         )
-    if cause is not None and float(cause.get("explained", cause.get("share", 1.0))) < 0.5:
+    if cause is not None and explains_little(cause):
         return "The named cause explains less than half of the change."
     if cause is not None and cause.get("ties"):
         return f"The recordings cannot tell it from: {cause['ties'][0]}."

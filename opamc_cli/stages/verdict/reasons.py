@@ -35,6 +35,7 @@ REPEAT = (
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
+SMALLER_PART = "A smaller part of the change is {}."
 CHECK_FIRST = (
     "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
     "stay."
@@ -91,6 +92,8 @@ def reasons(
         meaning = cause.get("interpretation") or cause.get("effect")
         outside = lies_outside(cause)
         known = [CHECK_FIRST] if outside else [FOUND, REPEAT]
+        if outside and explains_little(cause):
+            known = [SMALLER_PART]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
         if outside and judgement.state == "fault":
             sentences += [INSPECT]  # it does not explain enough
@@ -102,6 +105,11 @@ def reasons(
 def lies_outside(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause of verdict.json is no fault of the joint: load, environment, sensors."""
     return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"
+
+
+def explains_little(cause: Mapping[str, Any]) -> bool:
+    """Tell whether a cause of verdict.json holds less than half of the change."""
+    return float(cause.get("explained", cause.get("share", 1.0))) < 0.5
 
 
 def _change(

@@ -29,3 +29,17 @@ def test_a_current_that_became_smooth_is_no_worn_gear(size, loudest, first):
     told = brief(judged, bundle, None)["inspect"]
     assert f"{first}" in told.split(":")[0]
     assert ("filters" in told) == (first == "filters")
+
+
+@pytest.mark.parametrize(
+    ("explained", "first"), [(0.09, "Inspect the gear"), (0.9, "Check before")]
+)
+def test_a_harmless_cause_of_a_small_part_sends_nobody_away_from_the_gear(explained, first):
+    """A backlash of which colder grease held 9 % was first of all said to be colder grease."""
+    cause = {"effect": "viscous", "interpretation": "colder grease", "harmless": True}
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, Bundle([], {}), cause | {"explained": explained})
+    assert told["inspect"].startswith(first)
+    assert "colder grease" in told["inspect"]
