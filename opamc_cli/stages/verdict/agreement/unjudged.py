@@ -163,7 +163,7 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
 
 def _slower(ratio: float) -> str:
     return (
-        f"its motions last {ratio:.3g} times as long as the baseline's: of another speed nothing "
+        f"its motions last {ratio:.2f} times as long as the baseline's: of another speed nothing "
         "can be compared"
     )
 
