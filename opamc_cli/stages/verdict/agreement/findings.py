@@ -33,6 +33,10 @@ nothing and some of it; less tells no direction."""
 REVERSING = 0.1
 """Share of the samples with the rarer sign, from which on a current that has none lost it."""
 
+RETURNING = 0.1
+"""Share of the way in the rarer direction, from which on a joint moves both ways: one that moves
+one way alone has a current of one sign, and leans as its load does."""
+
 CLIPPED_SHARE = 0.01
 """Of the samples, beyond the baseline's: from here the clipped crests are patterns of their own."""
 
@@ -68,6 +72,7 @@ class Reference:
     leaning: Mapping[int, float]
     reversing: Mapping[int, float]
     level: Mapping[int, float]
+    returning: Mapping[int, float]
     changing: Mapping[int, float]
 
 
@@ -92,6 +97,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
     )
 
@@ -223,7 +229,9 @@ def _clipped(own: Measured, reference: Reference) -> str | None:
 
 def _other_sign(own: Measured, reference: Reference) -> str | None:
     usual = reference.leaning[own.axis], reference.reversing[own.axis]
-    if own.leaning is None or own.reversing is None or own.level is None:
+    if own.leaning is None or own.reversing is None or own.level is None or own.returning is None:
+        return None
+    if (own.returning < RETURNING) != (reference.returning[own.axis] < RETURNING):
         return None
     # a load that is always there takes one sign away, too, but adds to the current
     as_large = _away_by(own.level, reference.level[own.axis]) <= math.log(ALIKE)

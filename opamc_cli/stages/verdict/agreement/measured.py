@@ -15,10 +15,13 @@ from opamc_cli.storage.runs import AxisChannels, Run
 from opamc_cli.storage.sources import RunSource
 
 LOOKS = 8
-"""Stretches of each axis that are looked at, spread over the run."""
+"""Places of each axis that are looked at, spread over the run."""
 
 LONGEST_LOOK = 1 << 15
 """Samples of a stretch that are looked at."""
+
+AT_ONE_PLACE = 2 * LONGEST_LOOK
+"""Samples of neighbouring motions from which on no further one is looked at: of two at least."""
 
 FROZEN_S = 0.25
 """A phase that keeps one value for so long while another swings is frozen: the slowest carrier
@@ -60,6 +63,8 @@ class Measured:
     """Of a reported current: share of the samples that have the rarer of both signs."""
     level: float | None = None
     """Of a reported current: root mean square with its mean, which no sign changes."""
+    returning: float | None = None
+    """Beside a reported current: share of the joint's way that leads in the rarer direction."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +108,7 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
     signal = _signal(channels)
     motion = [name for name in (channels.position, channels.velocity) if name]
     names = list(dict.fromkeys([*signal, *motion]))
-    stretches = spans[:: -(-len(spans) // LOOKS) or 1] or [
+    stretches = _neighbours(spans) or [
         (start, start + LONGEST_LOOK)
         for start in range(0, run.n_samples, max(run.n_samples // LOOKS, LONGEST_LOOK))
     ]
@@ -142,6 +147,24 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         ),
         **(_signs(looks, currents[0], motion[0]) if motion_told else {}),
     }
+
+
+def _neighbours(spans: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Pick motions at some places of a run, at each of them neighbours.
+
+    Single ones, evenly spaced, may be the same motion of the program each time: of sixteen to and
+    fro the way there alone.
+    """
+    picked = []
+    apart = -(-len(spans) // LOOKS) or 1
+    for first in range(0, len(spans), apart):
+        seen = 0
+        for start, stop in spans[first : first + apart]:
+            if seen >= AT_ONE_PLACE:
+                break
+            picked.append((start, stop))
+            seen += min(stop - start, LONGEST_LOOK)
+    return picked
 
 
 def _signal(channels: AxisChannels) -> tuple[str, ...]:
@@ -198,20 +221,24 @@ def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> li
 
 
 def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> dict[str, float]:
-    """Return how a reported current leans with the speed, its rarer sign's share, and its size."""
+    """Return how a reported current leans with the speed, the rarer signs of both, and its size."""
     values = np.concatenate([look[current] for look in looks])
-    speeds = [
-        look[motion]
-        if motion.endswith("velocity")
-        else np.diff(look[motion], prepend=look[motion][:1])
-        for look in looks
-    ]
-    drawn, size = np.nansum(values * np.sign(np.concatenate(speeds))), np.nansum(np.abs(values))
+    speeds = np.concatenate(
+        [
+            look[motion]
+            if motion.endswith("velocity")
+            else np.diff(look[motion], prepend=look[motion][:1])
+            for look in looks
+        ]
+    )
+    drawn, size = np.nansum(values * np.sign(speeds)), np.nansum(np.abs(values))
+    forth, back = (float(np.nansum(np.maximum(way * speeds, 0.0))) for way in (1, -1))
     signed = [int(np.count_nonzero(values > 0)), int(np.count_nonzero(values < 0))]
     return {
         "leaning": float(drawn / size) if size else 0.0,
         "reversing": min(signed) / max(sum(signed), 1),
         "level": _rms([values]),
+        "returning": min(forth, back) / (forth + back) if forth + back else 0.0,
     }
 
 
