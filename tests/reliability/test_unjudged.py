@@ -144,8 +144,24 @@ def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     assert ended.code == ExitCode.PARTIAL
     (sentence,) = ended.sentences
     assert sentence.startswith(f"opamc: {odd}: ")
-    states = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
-    assert [axis["state"] for axis in states] == ["healthy", "healthy"]
+    assert sentence.endswith(" Only axis 2 of this recording is left out")
+    axes = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
+    assert [axis["state"] for axis in axes] == ["healthy", "healthy"]
+    assert [axis.get("not_compared") for axis in axes] == [None, {"baseline": ["odd"]}]
+
+
+def test_a_recording_of_which_two_axes_are_wrong_is_not_said_to_lack_one_alone(
+    opamc, baseline, tonight, tmp_path
+):
+    def both(columns):
+        frozen(columns)
+        columns["axis1_c"] *= -1
+
+    odd = record(tmp_path / "odd.parquet", 5, both)
+    ended = diagnose(opamc, baseline, tonight, tmp_path / "out", "--baseline", odd, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    left_out = [f" Axis {axis} of this recording is left out" for axis in (1, 2)]
+    assert [s.endswith(end) for s, end in zip(ended.sentences, left_out, strict=True)] == [True] * 2
 
 
 def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):

@@ -212,12 +212,14 @@ def content(
                 strict=True,
             )
         }
+        lacking = _not_compared(axis, decided.sides)
         which = decided.sessions_at_fault(axis)
         axes.append(
             {
                 "axis": axis,
                 "state": final.state,
                 **({"session": decided.named(axis)} if axis in decided.alone else {}),
+                **({"not_compared": lacking} if lacking else {}),
                 "health_index": _finite(final.health_index),
                 "p_value": _finite(final.p_value),
                 "p_adjusted": _finite(final.p_adjusted),
@@ -312,6 +314,17 @@ def _with_cause(
 
 def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
     return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.runs}
+
+
+def _not_compared(axis: int, sides: Sides) -> dict[str, list[str]]:
+    """Return, by role, the runs of a side that have no part in what is said of an axis."""
+    found = {}
+    for role, side, rows in zip(
+        ("baseline", "target"), (sides.baseline, sides.target), sides.rows, strict=True
+    ):
+        there = _runs_of(axis, rows)
+        found[role] = [source.name for source in side.sources if source.name not in there]
+    return {role: names for role, names in found.items() if names}
 
 
 def _divergences(scores: pa.Table) -> dict[tuple[str, int, int, int, int], list[float]]:

@@ -1,7 +1,9 @@
 """Which axes cannot be judged, and the true reason: what no verdict may be silent about."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
@@ -70,23 +72,31 @@ class Unjudged:
 def unjudged(baseline: Side, target: Side) -> Unjudged:
     """Find the axes that move on either side but cannot be compared."""
     axes: dict[int, tuple[str, ...]] = {}
-    errors: list[str] = []
+    dropped: dict[tuple[Path, str], list[int]] = {}
+    n_lost: Counter[Path] = Counter()
     at_rest: dict[int, dict[str, InputError]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
             lost = _lost(axis, side)
             idle = _idle(axis, side)
-            runs = {own.run for own in side.measured}
-            if runs <= lost.keys() | idle.keys():
+            paths = {own.run: own.path for own in side.measured}
+            n_lost.update(paths[run] for run in lost)
+            if paths.keys() <= lost.keys() | idle.keys():
                 whys = dict.fromkeys([*lost.values(), *({} if lost else idle).values()])
                 axes[axis] = axes.get(axis, ()) + tuple(sentence(side.role, why) for why in whys)
                 continue
-            paths = {own.run: own.path for own in side.measured}
-            errors += [f"{paths[run]}: {why}" for run, why in lost.items()]
+            for run, why in lost.items():
+                dropped.setdefault((paths[run], why), []).append(axis)
             if side is target:
                 at_rest[axis] = {run: InputError(f"{paths[run]}: {idle[run]}") for run in idle}
-    # what is wrong with all of a run is said once
-    return Unjudged(axes, tuple(map(InputError, dict.fromkeys(errors))), at_rest)
+    n_axes = Counter(own.path for side in (baseline, target) for own in side.measured)
+    errors: list[OpamcError] = []
+    for (path, why), lacking in dropped.items():
+        which = "Only axis" if n_lost[path] == 1 < n_axes[path] else "Axis"
+        left_out = f" {which} {lacking[0]} of this recording is left out"
+        # what is wrong with all of a recording is said once
+        errors.append(InputError(f"{path}: {_ended(why)}{left_out * (len(lacking) == 1)}"))
+    return Unjudged(axes, tuple(errors), at_rest)
 
 
 def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
@@ -130,7 +140,11 @@ _EMPTY: Mapping[str, Any] = {
 
 def sentence(role: str, why: str) -> str:
     """Return a clause about one side as a sentence."""
-    return f"The {role}: {why}{'' if why.endswith('?') else '.'}"
+    return f"The {role}: {_ended(why)}"
+
+
+def _ended(why: str) -> str:
+    return why if why.endswith("?") else f"{why}."
 
 
 def _lost(axis: int, side: Side) -> dict[str, str]:
