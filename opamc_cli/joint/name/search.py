@@ -9,7 +9,15 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form
-from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of, without
+from opamc_cli.joint.name.chain import (
+    PRICE,
+    Chain,
+    Signature,
+    extended,
+    line_of,
+    signature_of,
+    without,
+)
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import p_value
 
