@@ -230,10 +230,10 @@ def _certainty(judgement: Judgement) -> str:
     if judgement.p_adjusted != judgement.p_value:
         own += f", {_p(judgement.p_adjusted)} after correction for the number of joints"
     how = {
-        "sessions": "by its rank among all sessions, each held against the others, and how far out it "
-        "lies",
-        "relabelled-sessions": "by exchanging whole sessions between baseline and target, and how far "
-        "beyond them it lies",
+        "sessions": "by its rank among all sessions, each held against the others, and how far "
+        "out it lies",
+        "relabelled-sessions": "by exchanging whole sessions between baseline and target, and "
+        "how far beyond them it lies",
         "one-session": "by the allowance for a single baseline session",
         "none": "",
     }[judgement.method]
