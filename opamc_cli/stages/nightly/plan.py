@@ -124,7 +124,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     fixed = {one.sha256 for one in now.fixed}
     judged = [one for one in usable if one.sha256 not in fixed]
     series = _main_conditions(judged)
-    baselines = _Baselines(now, series, usable)
+    baselines = _Baselines(now, series, usable, {one.night for one in recordings})
     nights = []
     known: dict[int, list[str]] = {}
     before: dict[str, dict[str, tuple[Recording, ...]]] = {}
@@ -211,10 +211,13 @@ def _main_conditions(recordings: Sequence[Recording]) -> Series:
 class _Baselines:
     """Which recordings a night is held against."""
 
-    def __init__(self, now: Situation, series: Series, usable: Sequence[Recording]) -> None:
+    def __init__(
+        self, now: Situation, series: Series, usable: Sequence[Recording], nights: set[str]
+    ) -> None:
         self._now = now
         self._series = series
         self._usable = usable
+        self._nights = nights
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self._thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
         self._gone: dict[str, str] = {}
@@ -246,18 +249,19 @@ class _Baselines:
             return Comparison(program, condition, targets, missing=self._never_there(key))
         left = [n for n in members if n in self._there[key]]
         gone = ", ".join(n for n in members if n not in left)
+        there = {one.night for one in self._now.fixed} if key[2] == rule.runs else self._nights
+        how = "are gone" if there.isdisjoint({*members} - {*left}) else "cannot be used any more"
         if gone and len(left) < LEAST_NIGHTS:
             why = (
-                f"the recordings of the baseline's nights {gone} are gone; put them back, or begin "
-                "a new baseline with `opamc nightly rebaseline`"
+                f"the recordings of the baseline's nights {gone} {how}; put them back, or begin a "
+                "new baseline with `opamc nightly rebaseline`"
             )
             return Comparison(program, condition, targets, (), "", why, tuple(members), True)
         if gone:
             self._thinned[key] = (
                 max(set(members) - set(left)),
-                f"the recordings of the baseline's nights {gone} cannot be used any more, "
-                f"{len(left)} nights are left; put them back, with fewer than {LEAST_NIGHTS} "
-                "nothing is judged",
+                f"the recordings of the baseline's nights {gone} {how}, {len(left)} nights "
+                f"are left; put them back, with fewer than {LEAST_NIGHTS} nothing is judged",
             )
         if key not in self._used:
             used = tuple(one for n in left for one in self._there[key][n])
@@ -273,9 +277,10 @@ class _Baselines:
 
     def said(self) -> tuple[tuple[str, str], ...]:
         """Return what is gone of baselines, each with a sentence; of one start they are one."""
+        is_gone = "is gone" if len(self._gone) == 1 else "are gone"
         text = (
-            f"of the baseline {some(sorted(self._gone.values()))} cannot be used any more; what "
-            "was judged stays, new nights are judged by the recordings that are left"
+            f"of the baseline {some(sorted(self._gone.values()))} {is_gone}; what was judged "
+            "stays, new nights are judged by the recordings that are left"
         )
         return (*self._thinned.values(), *((name, text) for name in sorted(self._gone)))
 

@@ -153,8 +153,8 @@ def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, 
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
     assert first.code == ExitCode.DONE
     assert first.out == (
-        f"r1 the recordings of the baseline's nights {night(1)} cannot be used any more, 2 nights "
-        "are left; put them back, with fewer than 2 nothing is judged\n"
+        f"r1 the recordings of the baseline's nights {night(1)} are gone, 2 nights are left; put "
+        "them back, with fewer than 2 nothing is judged\n"
     )
     assert second.out == ""
     # no verdict of before is another one now, though its baseline is not whole or even gone
@@ -223,7 +223,7 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
     assert to_do() == "0"
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
     assert first.out.startswith("r1 of the baseline ")
-    assert f"{places[0, 'second'].name} cannot be used any more; what was judged" in first.out
+    assert f"{places[0, 'second'].name} is gone; what was judged" in first.out
     assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
     add_night(logs, 5)
     opamc("nightly", cell)
