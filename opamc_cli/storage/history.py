@@ -76,11 +76,14 @@ CREATE TABLE rule (hash TEXT NOT NULL);
 CREATE TABLE stale (robot TEXT NOT NULL PRIMARY KEY) WITHOUT ROWID;
 """
 
-OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed")
+OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed", "partial")
 """Kinds of event that follow from the nights of one robot."""
 
 OF_NIGHT = ("judged-anew", "lacking")
 """Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
+
+UNJUDGED = ("failed", "broken")
+"""What a night's status is if nothing of it could be judged."""
 
 DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
 """Kinds of event that follow from the nights; the others were declared by a user."""
@@ -472,8 +475,8 @@ class History:
             place = (night.robot, night.night)
             # another reason than the one that was told is news
             self._db.execute(
-                "DELETE FROM told WHERE kind = 'failed' AND robot = ? AND time = ? AND EXISTS "
-                "(SELECT * FROM night WHERE robot = ? AND night = ? AND why <> ?)",
+                "DELETE FROM told WHERE kind IN ('failed', 'partial') AND robot = ? AND time = ? "
+                "AND EXISTS (SELECT * FROM night WHERE robot = ? AND night = ? AND why <> ?)",
                 (*place, *place, night.why),
             )
             for table in ("verdict", "measure"):

@@ -17,7 +17,14 @@ from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 from opamc_cli.decision.trend.chart import LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
-from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow, begun_anew
+from opamc_cli.storage.history import (
+    UNJUDGED,
+    AlarmRow,
+    Declared,
+    Event,
+    NightRow,
+    begun_anew,
+)
 
 MOST_NIGHTS = 365
 """Nights that the beginning of a change is sought in."""
@@ -263,15 +270,22 @@ def _failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterat
             yield Event("", robot, None, "failed", row.why)
     dated = [row for row in nights if row.night]
     for failing, part in groupby(dated, key=lambda row: bool(row.why)):
-        streak = list(part)
-        if failing:
-            dates, reasons = [row.night for row in streak], [row.why for row in streak]
+        streak = list(part) if failing else []
+        for kind in ("partial", "failed"):
+            rows = [row for row in streak if (row.status in UNJUDGED) == (kind == "failed")]
+            if not rows:
+                continue
+            dates, reasons = [row.night for row in rows], [row.why for row in rows]
             span = dates[0]
             if len(dates) > 1:
-                span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights in a row)"
+                in_a_row = " in a row" if len(rows) == len(streak) else ""
+                span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights{in_a_row})"
+            if kind == "partial":
+                judged = any(row.status != "baseline" for row in rows)
+                span += f": in part not {'judged' if judged else 'used'}"
             text = f"{span}: {_in_one(dates, reasons)}"
             for index in said_in(dates, reasons, remind_after):
-                yield Event(dates[index], robot, None, "failed", text)
+                yield Event(dates[index], robot, None, kind, text)
 
 
 def _in_one(nights: Sequence[str], reasons: Sequence[str]) -> str:

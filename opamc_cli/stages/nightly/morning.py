@@ -18,7 +18,10 @@ from opamc_cli.storage.schemas import files
 OVER = {
     kind: rank
     for rank, kind in enumerate(
-        ("ended", "silent", "thinned", "lacking", "failed", "not-judged", "missing", "cleared")
+        (
+            *("ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
+            *("missing", "cleared"),
+        )
     )
 }
 """Kinds of event that are a line of their own, in the order in which they are said."""

@@ -39,6 +39,7 @@ from opamc_cli.stages.nightly.workers.workers import Broken, run_all
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history import (
+    UNJUDGED,
     Event,
     History,
     MeasureRow,
@@ -468,7 +469,7 @@ def _first(reasons: Sequence[str]) -> Iterator[str]:
 
 
 def _note(outcome: CellOutcome, row: NightRow) -> None:
-    if row.status not in ("failed", "broken"):
+    if row.status not in UNJUDGED:
         outcome.done.append((row.robot, row.night))
     if row.why:
         outcome.failed.append((row.robot, row.night, row.why))

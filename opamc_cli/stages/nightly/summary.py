@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from opamc_cli.storage.history import AlarmRow, History, NightRow
+from opamc_cli.storage.history import UNJUDGED, AlarmRow, History, NightRow
 
 SEVERITY = (
     "alarm",
@@ -83,7 +83,7 @@ class RobotSummary:
     @property
     def failure(self) -> NightRow | None:
         """Its last night if that could not be judged at all, or files that may be of it."""
-        failed = self.last is not None and self.last.status in ("failed", "broken")
+        failed = self.last is not None and self.last.status in UNJUDGED
         return self.undated or (self.last if failed else None)
 
     @property

@@ -68,6 +68,30 @@ def test_a_new_reason_is_said_and_an_old_one_is_not_said_again():
     assert [day for day, _ in failures(*[slow] * 9)] == ["01", "08"]
 
 
+def test_a_night_that_was_judged_in_part_is_not_called_failed():
+    slow, sign = "took longer than 5 s (limits.seconds)", "axis 4 has lost its sign"
+
+    def said(*nights):
+        rows = [
+            NightRow("r1", f"2026-03-0{day}", "", status, 0, why)
+            for day, (status, why) in enumerate(nights, start=1)
+        ]
+        events = settle_robot("r1", (), rows, (), AlarmConfig(), 0.4, 6).events
+        return [(one.kind, one.text) for one in events]
+
+    partial = ("partial", sign)
+    assert said(partial) == [("partial", f"2026-03-01: in part not judged: {sign}")]
+    row = "2026-03-01 to 2026-03-02 (2 nights in a row)"
+    assert said(partial, partial) == [("partial", f"{row}: in part not judged: {sign}")]
+    baseline = ("baseline", sign)
+    assert said(baseline) == [("partial", f"2026-03-01: in part not used: {sign}")]
+    # one that failed among them is a line of its own, and the others are not said again
+    assert said(partial, ("broken", slow), partial) == [
+        ("partial", f"2026-03-01 to 2026-03-03 (2 nights): in part not judged: {sign}"),
+        ("failed", f"2026-03-02: {slow}"),
+    ]
+
+
 def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():
     alarm = AlarmRow("r1", "", 0, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
     joints = [
