@@ -597,6 +597,12 @@ class History:
         with self.transaction():
             self._put("declared", [said])
             self._put("event", [Event(said.time, said.robot, said.axis, said.kind, text)])
+            if said.kind == "rebaselined":  # what its nights say from now on is news
+                self._db.execute(
+                    "DELETE FROM told "
+                    "WHERE robot = ? AND time >= ? AND kind IN ('alarm', 'reminder')",
+                    (said.robot, said.night),
+                )
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (said.robot,))
 
     def events(self, *, untold: bool = False) -> list[Event]:

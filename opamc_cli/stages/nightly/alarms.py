@@ -72,7 +72,6 @@ def settle_robot(
     alarms: list[AlarmRow] = []
     standing: list[tuple[str, int, str]] = []
     events: list[Event] = []
-    acknowledged = [one for one in declared if one.kind == "acknowledged"]
     several = len({row["program"] for row in series}) > 1
     for (program, axis), group in groupby(series, key=lambda row: (row["program"], row["axis"])):
         joint = list(group)
@@ -82,7 +81,7 @@ def settle_robot(
             seen = _nights(rows, rule, baseline_nights)
             for found in episodes(seen, rule.nights, rule.of):
                 signal = _first_signal(seen, found.raised, rule.of)
-                alarm, said = _alarm(rows, found, signal, name, acknowledged, rule, fault_effect)
+                alarm, said = _alarm(rows, found, signal, name, declared, rule, fault_effect)
                 alarms.append(alarm)
                 events += said
                 stop = len(rows) if found.cleared is None else found.cleared
@@ -137,7 +136,7 @@ def _alarm(
     found: Episode,
     signal: int,
     name: str,
-    acknowledged: Sequence[Declared],
+    declared: Sequence[Declared],
     rule: AlarmConfig,
     fault_effect: float,
 ) -> tuple[AlarmRow, list[Event]]:
@@ -161,10 +160,7 @@ def _alarm(
     latest = rows[last - 1]
     text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
     until = "9999" if found.cleared is None else rows[found.cleared]["night"]
-    known = next(
-        (one for one in acknowledged if one.axis == axis and first["night"] <= one.night < until),
-        None,
-    )
+    known = _acknowledged(declared, axis, first["night"], until)
     events = [Event(first["night"], robot, axis, "alarm", f"{name}: {text}")]
     nights = [row["night"] for row in rows[found.raised : last]]
     events += [
@@ -195,6 +191,26 @@ def _alarm(
         trend=json.dumps(trend, sort_keys=True),
     )
     return alarm, events
+
+
+def _acknowledged(
+    declared: Sequence[Declared], axis: int, raised: str, until: str
+) -> Declared | None:
+    """Return what silences an alarm: of another baseline it is another alarm."""
+
+    def in_force(said: Sequence[Declared]) -> str:
+        return max((night for _, night in begun_anew(said) if night <= raised), default="")
+
+    return next(
+        (
+            one
+            for n, one in enumerate(declared)
+            if (one.kind, one.axis) == ("acknowledged", axis)
+            and raised <= one.night < until
+            and in_force(declared[:n]) == in_force(declared)
+        ),
+        None,
+    )
 
 
 def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms import settle_robot
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
-from opamc_cli.storage.history import AlarmRow, NightRow
+from opamc_cli.storage.history import AlarmRow, Declared, NightRow
 
 
 def nights_of(states, distances=None):
@@ -90,6 +90,23 @@ def test_a_night_that_was_judged_in_part_is_not_called_failed():
         ("partial", f"2026-03-01 to 2026-03-03 (2 nights): in part not judged: {sign}"),
         ("failed", f"2026-03-02: {slow}"),
     ]
+
+
+def test_an_acknowledged_alarm_is_another_after_a_new_baseline():
+    series = nights_of(["healthy"] * 5 + ["fault"] * 3)
+    known = Declared("t", "r1", 2, "acknowledged", "2026-03-07", "gear ordered")
+    new = Declared("t", "r1", None, "rebaselined", "2026-03-02", "oil")
+    late = Declared("t", "r1", None, "rebaselined", "2026-03-20", "oil")
+    back = Declared("t", "r1", None, "taken-back", "2026-03-02", "a mistake")
+
+    def acknowledged(*declared):
+        found = settle_robot("r1", series, (), declared, AlarmConfig(), 0.4, 6).alarms
+        return [one.acknowledged for one in found]
+
+    assert acknowledged() == [None]
+    for said in ((known,), (new, known), (known, late), (known, new, back), (known, new, known)):
+        assert acknowledged(*said) == ["gear ordered"]
+    assert acknowledged(known, new) == [None]
 
 
 def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():

@@ -149,6 +149,23 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
 
 
+def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(cell, opamc):
+    alarm = "r2 axis 2: ALARM"
+    at = ("--why", "gear ordered", "--cell", cell)
+    begin = ("nightly", "rebaseline", "r2", "--from", NIGHTS[0], *at)
+    with nightly_kills.with_stand_in():
+        assert alarm in opamc("nightly", cell, "--quiet").out
+        opamc("nightly", "acknowledge", "r2", "--axis", 2, *at)
+        assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+        opamc(*begin)
+        again = opamc("nightly", cell, "--quiet")
+        assert (again.code, alarm in again.out) == (ExitCode.UNHEALTHY, True)
+        assert opamc("nightly", cell, "--quiet").out == ""
+        # taken back, the alarm is the one that is known
+        opamc(*begin, "--undo")
+        assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+
+
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     plain = cell.read_text()
     watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
