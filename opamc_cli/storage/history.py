@@ -499,11 +499,12 @@ class History:
         self._db.execute(f"DELETE FROM told WHERE {where}", key)
         self._put("event", [event])
 
-    def forget_undated(self, robot: str) -> None:
-        """Forget that a robot had files that tell no night: they are mended, or gone."""
+    def forget_nights(self, robot: str, nights: Iterable[str]) -> None:
+        """Forget nights of which nothing could be judged: their files are mended, or gone."""
+        places = [(robot, night) for night in nights]
         with self.transaction():
-            for table, column in (("night", "night"), ("told", "time")):
-                self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND {column} = ''", (robot,))
+            for what in ("night WHERE robot = ? AND night", "told WHERE robot = ? AND time"):
+                self._db.executemany(f"DELETE FROM {what} = ?", places)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (robot,))
 
     # -- trend and alarm ---------------------------------------------------------------------

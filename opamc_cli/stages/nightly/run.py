@@ -168,8 +168,7 @@ def run(
         for key, members in planned.complete.items():
             if past.pinned.get(robot, {}).get(key) != list(members):
                 history.pin_baseline((robot, *key), members)
-        if "" in past.recorded.get(robot, {}) and all(night.night for night in planned.nights):
-            history.forget_undated(robot)
+        _forget(history, past, robot, recordings.by_robot[robot], planned)
         outcome.thinned += [
             Event(night, robot, None, "thinned", text) for night, text in planned.thinned
         ]
@@ -242,6 +241,22 @@ class _Past:
         self.begun: dict[str, list[str]] = {}
         for robot, night in begun_anew(history.declared()):
             self.begun.setdefault(robot, []).append(night)
+
+
+def _forget(
+    history: History, past: _Past, robot: str, own: Sequence[Recording], planned: RobotPlan
+) -> None:
+    """Forget what became of nights that there is nothing of."""
+    there = {one.night for one in own}
+    # older ones are cleared away by age, and their logs may be out of reach all together
+    last = max(there, default="9999")
+    lost = [
+        night
+        for night, row in past.recorded.get(robot, {}).items()
+        if night not in there and (not night or (night > last and row.status in UNJUDGED))
+    ]
+    if lost:
+        history.forget_nights(robot, lost)
 
 
 def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:

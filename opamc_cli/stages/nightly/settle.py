@@ -1,5 +1,6 @@
 """What follows from the history: alarms, what is worth saying, old folders, pages and metrics."""
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -112,9 +113,11 @@ def _missing(
 
     A robot of which somebody has said that it is gone is not reminded of until it has files again.
     """
-    nights = sorted({row.night for rows in by_robot.values() for row in rows})
+    nights = sorted({night for rows in by_robot.values() for night in _recorded(rows)})
     for robot in sorted(robots | set(by_robot)):
-        own = {row.night for row in by_robot.get(robot, ())}
+        own = {row.night for row in by_robot.get(robot, ()) if row.night}
+        if not own and by_robot.get(robot):
+            continue  # all its files tell no night, which is said
         if not own:
             yield Event(nights[0] if nights else "", robot, None, "missing", "no file at all")
             continue
@@ -129,6 +132,16 @@ def _missing(
                     if not gap[0] <= gone.get(robot, "") <= gap[index]:
                         yield Event(gap[index], robot, None, "missing", text)
                 gap = []
+
+
+def _recorded(rows: Sequence[NightRow]) -> Iterator[str]:
+    """Yield a robot's nights but those that are copies of earlier ones: nobody knows of these."""
+    known: set[str] = set()
+    for row in rows:
+        contents = {one.rpartition(" ")[2] for one in json.loads(row.key)["files"]}
+        if row.night and not contents <= known:
+            yield row.night
+        known |= contents
 
 
 def _prune(cell: CellConfig, history: History) -> None:

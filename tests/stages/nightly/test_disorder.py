@@ -299,6 +299,36 @@ def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc
     assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
 
 
+def test_a_copy_is_no_night_of_the_cell_and_is_forgotten_once_it_is_removed(cell, logs, opamc):
+    opamc("nightly", cell)
+    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
+    ended = opamc("nightly", cell, "--quiet")
+    assert f"r1 {night(5)}: " in ended.out
+    assert "no file of" not in ended.out
+    assert "1 robot could not be judged" in opamc("nightly", cell).out
+    aside = cell.parent / "aside"
+    logs.rename(aside)  # a disk that is not mounted mends nothing
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.PARTIAL
+    aside.rename(logs)
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.PARTIAL
+    shutil.rmtree(logs / "r1" / night(5))
+    ended = opamc("nightly", cell, "--json")
+    assert (ended.code, json.loads(ended.out)["robots"]["r1"]["state"]) == (
+        ExitCode.DONE,
+        "healthy",
+    )
+    assert "could not be judged" not in (cell.parent / "nightly" / "index.html").read_text()
+    # the same file again is told again
+    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
+    assert f"r1 {night(5)}: " in opamc("nightly", cell, "--quiet").out
+
+
+def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opamc):
+    (logs / "r1" / night(5)).mkdir()
+    (logs / "r1" / night(5) / "cycle.parquet").write_text("half a file")
+    assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
+
+
 def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch):
     closed = [str(logs / "r1" / night(4))]
     file = logs / "r1" / night(4) / "cycle.parquet"
