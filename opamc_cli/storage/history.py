@@ -627,13 +627,25 @@ class History:
                 [(one.robot, one.axis or 0, one.kind, one.time) for one in events],
             )
 
-    def forget_reports(self, robot: str, nights: Iterable[str]) -> None:
-        """Forget where the reports of nights lay that have been removed."""
+    def reports(self) -> dict[str, dict[str, list[str]]]:
+        """Return where reports lie, by robot and night, in time order."""
+        found: dict[str, dict[str, list[str]]] = {}
+        query = "SELECT DISTINCT robot, night, report FROM verdict WHERE report IS NOT NULL"
+        for row in self.rows(f"{query} ORDER BY night, report"):
+            found.setdefault(row["robot"], {}).setdefault(row["night"], []).append(row["report"])
+        return found
+
+    def forget_reports(
+        self, robot: str, nights: Iterable[str], events: Iterable[Event] = ()
+    ) -> None:
+        """Forget where the reports of nights lay that have been removed, and keep it as news."""
         with self.transaction():
             self._db.executemany(
                 "UPDATE verdict SET report = NULL WHERE robot = ? AND night = ?",
                 [(robot, night) for night in nights],
             )
+            for one in events:
+                self._put_news(one, replaces=False)
 
     def _put(self, table: str, rows: Iterable[Any]) -> None:
         values = [astuple(row) for row in rows]

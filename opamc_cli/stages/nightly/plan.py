@@ -93,6 +93,8 @@ class Situation:
     """Nights of baselines that were complete before, by program, condition and since."""
     recorded: Mapping[str, NightRow]
     """What became of the robot's nights."""
+    removed: Sequence[str]
+    """Nights whose results somebody has removed."""
     config_hash: str
     """Of the options of its diagnosis."""
 
@@ -165,6 +167,8 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         earlier = before[now_there]
         record = now.recorded.get(night)
         why = _why(key, record, any(one.lost for one in comparisons), earlier)
+        if not why and record is not None and night in now.removed and key == record.key:
+            why = "its results were removed"
         if record is not None and earlier and not why:
             baselines.say_gone(earlier.get(json.loads(record.key)["baseline"], ()))
         nights.append(

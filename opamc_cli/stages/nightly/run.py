@@ -99,7 +99,7 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     """Say what would be done, without doing it."""
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     outcome = CellOutcome()
-    past = _Past(history)
+    past = _Past(cell, history)
     recordings = _own(recordings, past)
     for robot in recordings.by_robot:
         planned = _robot_plan(cell, source, past, recordings, robot)
@@ -148,7 +148,7 @@ def run(
     progress("looking for recordings")
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     jobs_of: dict[tuple[str, str], PlannedNight] = {}
-    past = _Past(history)
+    past = _Past(cell, history)
     recordings = _own(recordings, past)
     outcome.thinned += [
         Event(
@@ -231,7 +231,7 @@ def _answers(
 class _Past:
     """What the history knows, by robot."""
 
-    def __init__(self, history: History) -> None:
+    def __init__(self, cell: CellConfig, history: History) -> None:
         self.recorded: dict[str, dict[str, NightRow]] = {}
         for (robot, night), row in history.nights().items():
             self.recorded.setdefault(robot, {})[night] = row
@@ -241,12 +241,20 @@ class _Past:
         self.begun: dict[str, list[str]] = {}
         for robot, night in begun_anew(history.declared()):
             self.begun.setdefault(robot, []).append(night)
+        self.removed: dict[str, list[str]] = {}
+        for robot, reports in history.reports().items():
+            # those of before are pruned, by a start that may have been killed at it
+            for night in list(reports)[-cell.keep.reports :]:
+                places = [cell.out / report for report in reports[night]]
+                files_of = [p for at in places for p in (at, at.with_name(files.VERDICT))]
+                if not all(map(Path.is_file, files_of)):
+                    self.removed.setdefault(robot, []).append(night)
 
 
 def _forget(
     history: History, past: _Past, robot: str, own: Sequence[Recording], planned: RobotPlan
 ) -> None:
-    """Forget what became of nights that there is nothing of."""
+    """Forget what became of nights that there is nothing of, and reports that are gone for good."""
     there = {one.night for one in own}
     # older ones are cleared away by age, and their logs may be out of reach all together
     last = max(there, default="9999")
@@ -257,6 +265,11 @@ def _forget(
     ]
     if lost:
         history.forget_nights(robot, lost)
+    to_do = {night.night for night in planned.nights if night.why}
+    gone = [night for night in past.removed.get(robot, ()) if night not in to_do]
+    if gone:
+        text = f"the results of {some(gone)} are gone, and not all that they were made from is left"
+        history.forget_reports(robot, gone, [Event(gone[-1], robot, None, "lacking", text)])
 
 
 def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:
@@ -279,6 +292,7 @@ def _robot_plan(
         begun=past.begun.get(robot, ()),
         pinned=past.pinned.get(robot, {}),
         recorded=past.recorded.get(robot, {}),
+        removed=past.removed.get(robot, ()),
         config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),
     )
     return plan_robot(robot, recordings.by_robot[robot], situation)

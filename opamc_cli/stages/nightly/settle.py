@@ -146,12 +146,8 @@ def _recorded(rows: Sequence[NightRow]) -> Iterator[str]:
 
 def _prune(cell: CellConfig, history: History) -> None:
     """Remove the folders of all but a robot's last nights; the history keeps what they said."""
-    kept: dict[str, list[str]] = {}
-    query = "SELECT DISTINCT robot, night FROM verdict WHERE report IS NOT NULL ORDER BY night"
-    for row in history.rows(query):
-        kept.setdefault(row["robot"], []).append(row["night"])
-    for robot, nights in kept.items():
-        old = nights[: -cell.keep.reports]
+    for robot, nights in history.reports().items():
+        old = list(nights)[: -cell.keep.reports]
         for night in old:
             remove_folder(cell.out / robot / night, of=OF_NIGHT)
         if old:  # only then: a start that was killed finds them again

@@ -329,6 +329,31 @@ def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opa
     assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
 
 
+def test_results_that_were_removed_are_made_again_or_said_to_be_gone(cell, logs, opamc):
+    opamc("nightly", cell)
+    results = cell.parent / "nightly" / "r1"
+    for index in (3, 4):
+        shutil.rmtree(results / night(index))
+    planned = opamc("nightly", cell, "--dry-run").out
+    assert f"r1 {night(4)}: its results were removed" in planned
+    shutil.rmtree(logs / "r1" / night(3))  # of which nothing can be made any more
+    # a start that is killed before it says so leaves it to the next one
+    loaded = load_cell(cell)
+    with stage.open_history(loaded) as history:
+        stage.run(loaded, str(cell), history, stage.Wanted())
+    ended = opamc("nightly", cell, "--quiet")
+    assert (results / night(4) / "report.html").is_file()
+    assert ended.out.count("\n") == 1
+    assert (
+        f"r1 the results of {night(3)} are gone, and not all that they were made from is left"
+        in ended.out
+    )
+    assert f"r1/{night(3)}/report.html" not in (results.parent / "index.html").read_text()
+    again = opamc("nightly", cell, "--quiet")
+    assert (again.code, again.out) == (ExitCode.DONE, "")
+    assert states(cell) == ["baseline"] * 3 + ["done"] * 2
+
+
 def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch):
     closed = [str(logs / "r1" / night(4))]
     file = logs / "r1" / night(4) / "cycle.parquet"
