@@ -122,6 +122,7 @@ def run(
         output.result(
             {**morning.values, "absent": outcome.absent, "page": str(page)},
             *morning.lines,
+            *(() if quiet else morning.standing),
             *([] if quiet and morning.lines else [f"{summary.headline()}; {page}"]),
             urgent=bool(morning.lines),
         )

@@ -27,6 +27,9 @@ OVER = {
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
+MOST_STANDING = 20
+"""Lines of what was said before and still stands."""
+
 MOST_OTHERS = 3
 """Verdicts that are others than before which are told one by one."""
 
@@ -40,6 +43,8 @@ class Morning:
 
     lines: tuple[str, ...]
     """Sentences for people: robots that need a look first, three lines each."""
+    standing: tuple[str, ...]
+    """What was said before and still stands, worst first, one line each."""
     values: dict[str, Any]
     """The same for programs."""
     exit_code: ExitCode
@@ -88,11 +93,23 @@ def tell(
     news = [event for event in untold if event.robot in names or event.kind in ("silent", "ended")]
     failed_now = {(robot, why) for robot, _, why in outcome.failed}
     lines = list(outcome.absent)
+    standing_lines: list[str] = []
     for robot in summary.needing():
         fresh = {e.axis for e in news if e.robot == robot.name and e.kind in ("alarm", "reminder")}
         for joint in robot.alarms:
             if joint.axis in fresh:
                 lines += _alarm_lines(robot, joint, out, cell)
+            else:
+                place, text = _place(robot, joint), robot.text_of(joint)
+                standing_lines.append(f"{place}: alarm since {joint.since}, {text}")
+        said_now = any(e.robot == robot.name and e.kind in ("failed", "missing") for e in news)
+        if robot.broken and not said_now:
+            of = robot.failure
+            why = f"{of.night} could not be judged: {of.why}" if of else "no recording"
+            standing_lines.append(f"{robot.name} {why}")
+    if len(standing_lines) > MOST_STANDING:
+        more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
+        standing_lines[MOST_STANDING:] = [more]
     standing = {(r.name, joint.axis) for r in summary.robots for joint in r.joints if joint.alarm}
     said: dict[tuple[int, str], list[str]] = {}
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
@@ -114,20 +131,24 @@ def tell(
     ended = any(event.kind == "ended" for event in news)
     failed = failed_now or broken or ended or outcome.absent or outcome.ended
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
-    return Morning(tuple(lines), _values(summary, outcome), code)
+    return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
 
 
 def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path, cell: Path) -> Iterator[str]:
     alarm = joint.alarm
     assert alarm is not None
-    program = f", program {joint.program}" if robot.several_programs else ""
-    yield f"{robot.name} axis {joint.axis}{program}: ALARM, not as it was since {alarm.since}"
+    yield f"{_place(robot, joint)}: ALARM, not as it was since {alarm.since}"
     yield f"  {robot.text_of(joint)}"
     where = out / joint.report if joint.report else out / files.PAGE
     yield (
         f"  see {where}; silence it with: opamc nightly acknowledge {quote(robot.name)} "
         f"--axis {joint.axis} --why TEXT --cell {quote(str(cell))}"
     )
+
+
+def _place(robot: RobotSummary, joint: JointSummary) -> str:
+    program = f", program {joint.program}" if robot.several_programs else ""
+    return f"{robot.name} axis {joint.axis}{program}"
 
 
 def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:

@@ -161,6 +161,10 @@ def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(
         again = opamc("nightly", cell, "--quiet")
         assert (again.code, alarm in again.out) == (ExitCode.UNHEALTHY, True)
         assert opamc("nightly", cell, "--quiet").out == ""
+        # who looks into it finds it named, though it was told
+        named = opamc("nightly", cell)
+        assert named.out.startswith("r2 axis 2: alarm since ")
+        assert named.out.count("\n") == 2
         # taken back, the alarm is the one that is known
         opamc(*begin, "--undo")
         assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
