@@ -13,7 +13,7 @@ import re
 import shutil
 import stat
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from datetime import date
 from pathlib import Path
@@ -36,7 +36,10 @@ NOT_IN_A_LINE = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-
 NAMELESS = "its name holds control characters or is not UTF-8; rename it"
 
 A_NIGHT = r"\d{4}[-_.]?\d{1,2}[-_.]?\d{1,2}"
-"""What stands for {night}, or is meant to; other names beside the nights are no logs."""
+"""What stands for {night}, or is meant to; files of other names are strays, and no logs."""
+
+A_NAME = r"[^/.][^/]*?"
+"""What stands for {night} in a stray's path."""
 
 
 @dataclass(frozen=True)
@@ -126,6 +129,33 @@ def find_logs(pattern: str, robots: tuple[str, ...] | None) -> list[LogFile]:
         If an address cannot be listed.
     """
     listed = (_remote if "://" in pattern else _local)(pattern, robots)
+    return _sorted(listed, pattern, robots)
+
+
+def find_logs_and_strays(
+    pattern: str, robots: tuple[str, ...] | None
+) -> tuple[list[LogFile], list[tuple[str, str]]]:
+    """List as `find_logs` does, and robot and path of what would be logs, were it called a night.
+
+    A path ends with what stands in the place of {night}; {robot} has to be in the pattern.
+    """
+    listed = list((_remote if "://" in pattern else _local)(pattern, robots))
+    strays = set()
+    for path, _, _ in listed if "{night}" in pattern else ():
+        found = None if fits(pattern, path) else _expression(pattern, A_NAME).fullmatch(path)
+        if found is not None:
+            robot, path = (
+                NOT_IN_A_LINE.sub(NO_TEXT, text)
+                for text in (found["robot"], path[: found.end("night")])
+            )
+            if robots is None or robot in robots:
+                strays.add((robot, path))
+    return _sorted(listed, pattern, robots), sorted(strays)
+
+
+def _sorted(
+    listed: Iterable[tuple[str, int, int]], pattern: str, robots: tuple[str, ...] | None
+) -> list[LogFile]:
     return sorted(_as_logs(listed, pattern, robots), key=lambda one: (one.robot, one.path))
 
 
@@ -158,7 +188,7 @@ def find_closed(pattern: str, robots: tuple[str, ...]) -> list[LogFile]:
 
 
 def _as_logs(
-    listed: Iterator[tuple[str, int, int]], pattern: str, robots: tuple[str, ...] | None
+    listed: Iterable[tuple[str, int, int]], pattern: str, robots: tuple[str, ...] | None
 ) -> Iterator[LogFile]:
     expression = _expression(pattern)
     for path, size, mtime_ns in listed:
@@ -292,7 +322,7 @@ def _remote(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str,
 
 
 @functools.cache
-def _expression(pattern: str) -> re.Pattern[str]:
+def _expression(pattern: str, a_night: str = A_NIGHT) -> re.Pattern[str]:
     """Turn a pattern into a regular expression with the groups robot and night."""
     parts = re.split(r"(\{robot\}|\{night\}|\*\*/|\*|\?|\[[^\]]*\])", pattern)
     known: set[str] = set()
@@ -300,7 +330,7 @@ def _expression(pattern: str) -> re.Pattern[str]:
     for part in parts:
         if part in ("{robot}", "{night}"):
             name = part[1:-1]
-            form = r"[^/]+?" if name == "robot" else A_NIGHT
+            form = r"[^/]+?" if name == "robot" else a_night
             text += f"(?P={name})" if name in known else f"(?P<{name}>{form})"
             known.add(name)
         elif part.startswith("["):

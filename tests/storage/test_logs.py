@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.logs import Facts, LogFile, copy_name, fetch, find_logs, read_facts
+from opamc_cli.storage.logs import (
+    Facts,
+    LogFile,
+    copy_name,
+    fetch,
+    find_logs,
+    find_logs_and_strays,
+    read_facts,
+)
 from opamc_cli.storage.runs import RunInfo, save_run
 
 
@@ -27,11 +35,23 @@ def test_a_night_is_a_day_or_left_to_the_recording(tmp_path, folder, night):
     assert (log.robot, log.night) == ("r1", night)
 
 
-def test_other_folders_beside_the_nights_are_no_logs(tmp_path):
-    for folder in ("archive", "2026", "tmp-2026-03-02"):
-        (tmp_path / "r1" / folder).mkdir(parents=True)
-        (tmp_path / "r1" / folder / "a.parquet").write_bytes(b"")
-    assert find_logs(f"{tmp_path}/{{robot}}/{{night}}/*.parquet", None) == []
+def test_other_folders_beside_the_nights_are_no_logs_but_strays(tmp_path):
+    folders = ("2026", "archive", "tmp-2026-03-02")
+    for folder in (*folders, ".hidden", "2026-03-02"):
+        touch(tmp_path / "r1" / folder / "a.parquet")
+        touch(tmp_path / "r1" / folder / "b.parquet")
+    touch(tmp_path / "r1" / "notes" / "a.txt")
+    for scheme in ("", "file://"):
+        pattern = f"{scheme}{tmp_path}/{{robot}}/{{night}}/*.parquet"
+        logs, strays = find_logs_and_strays(pattern, None)
+        assert logs == find_logs(pattern, None)
+        assert [log.night for log in logs] == ["2026-03-02", "2026-03-02"]
+        assert strays == [("r1", f"{scheme}{tmp_path}/r1/{folder}") for folder in folders]
+        assert find_logs_and_strays(pattern, ("r2",)) == ([], [])
+        assert find_logs_and_strays(pattern.replace("{night}", "*"), None)[1] == []
+    assert find_logs(f"{tmp_path}/r1/{{night}}/*.parquet", ("r1",)) == find_logs(
+        f"{tmp_path}/{{robot}}/{{night}}/*.parquet", None
+    )
 
 
 def touch(path, content=b""):

@@ -113,6 +113,7 @@ def run(
         if wanted == stage.Wanted():
             today = datetime.now(UTC).date()
             now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
+            now += outcome.strays
             now += left(history, loaded)
             untold += history.untold(now)
         morning = tell(summary, untold, outcome, loaded.out, cell)
@@ -120,7 +121,12 @@ def run(
             output.failure(outcome.ended)
         page = loaded.out / files.PAGE
         output.result(
-            {**morning.values, "absent": outcome.absent, "page": str(page)},
+            {
+                **morning.values,
+                "absent": outcome.absent,
+                "strays": [stray.time for stray in outcome.strays],
+                "page": str(page),
+            },
             *morning.lines,
             *(() if quiet else morning.standing),
             *([] if quiet and morning.lines else [f"{summary.headline()}; {page}"]),
@@ -147,8 +153,10 @@ def _print_plan(output: Output, outcome: Any) -> None:
             ],
             "done": len(outcome.planned) - len(todo),
             "absent": outcome.absent,
+            "strays": [stray.time for stray in outcome.strays],
         },
         *outcome.absent,
+        *(f"{stray.robot} {stray.text}" for stray in outcome.strays),
         *(
             f"{night.robot} {night.night}: {night.why}"
             + (", part of the baseline" if night.in_baseline else "")

@@ -9,7 +9,7 @@ from typing import Any
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly.inputs.recordings import some
+from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
 from opamc_cli.stages.nightly.run import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
@@ -26,6 +26,9 @@ OVER = {
 }
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
+
+NO_ROBOTS = ("silent", "ended", "stray")
+"""Kinds of event that may be of none of the cell's robots."""
 
 MOST_STANDING = 20
 """Lines of what was said before and still stands."""
@@ -90,7 +93,7 @@ def tell(
         The cell's file, for what can be done about an alarm.
     """
     names = {robot.name for robot in summary.robots}
-    news = [event for event in untold if event.robot in names or event.kind in ("silent", "ended")]
+    news = [event for event in untold if event.robot in names or event.kind in NO_ROBOTS]
     failed_now = {(robot, why) for robot, _, why in outcome.failed}
     lines = list(outcome.absent)
     standing_lines: list[str] = []
@@ -120,15 +123,19 @@ def tell(
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
+    strays: dict[str, list[str]] = {}
     others: dict[str, list[str]] = {}
     for event in news:
         if event.kind == "judged-anew":
             others.setdefault(event.robot, []).append(event.text)
+        elif event.kind == "stray":
+            strays.setdefault(event.robot, []).append(event.time)
     for name, texts in sorted(others.items()):
         lines.append(f"{name} judged anew: {some(sorted(texts), MOST_OTHERS)}")
+    lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     alarms = any(robot.alarms for robot in summary.robots)
     broken = any(robot.broken for robot in summary.robots)
-    ended = any(event.kind == "ended" for event in news)
+    ended = any(event.kind in ("ended", "stray") for event in news)  # of which nothing stays
     failed = failed_now or broken or ended or outcome.absent or outcome.ended
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
     return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)

@@ -17,6 +17,7 @@ from opamc_cli.stages.nightly.inputs.recordings import (
     CellRecordings,
     Recording,
     find_recordings,
+    said_of_strays,
     some,
 )
 from opamc_cli.stages.nightly.inputs.strangers import (
@@ -87,6 +88,8 @@ class CellOutcome:
     """Sentences that say of what was asked for that there is no recording of it."""
     thinned: list[Event] = field(default_factory=list)
     """Baselines that have lost recordings."""
+    strays: list[Event] = field(default_factory=list)
+    """Recordings that lie in the place of a night and are called otherwise."""
     ended: str = ""
     """Why the start came to an end before all was done; empty if it did not."""
     robots: tuple[str, ...] = ()
@@ -98,7 +101,7 @@ class CellOutcome:
 def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> CellOutcome:
     """Say what would be done, without doing it."""
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
-    outcome = CellOutcome()
+    outcome = CellOutcome(strays=_strays(recordings))
     past = _Past(cell, history)
     recordings = _own(recordings, past)
     for robot in recordings.by_robot:
@@ -147,6 +150,7 @@ def run(
     outcome = CellOutcome()
     progress("looking for recordings")
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
+    outcome.strays = _strays(recordings)
     jobs_of: dict[tuple[str, str], PlannedNight] = {}
     past = _Past(cell, history)
     recordings = _own(recordings, past)
@@ -249,6 +253,13 @@ class _Past:
                 files_of = [p for at in places for p in (at, at.with_name(files.VERDICT))]
                 if not all(map(Path.is_file, files_of)):
                     self.removed.setdefault(robot, []).append(night)
+
+
+def _strays(recordings: CellRecordings) -> list[Event]:
+    return [
+        Event(path, robot, None, "stray", said_of_strays([path]))
+        for robot, path in recordings.strays
+    ]
 
 
 def _forget(

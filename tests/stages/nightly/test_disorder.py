@@ -329,6 +329,39 @@ def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opa
     assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
 
 
+def test_recordings_of_a_folder_that_is_no_night_are_said(cell, logs, opamc):
+    opamc("nightly", cell)
+    odd = logs / "r1" / "mar-06"
+    shutil.copytree(logs / "r1" / night(4), odd)
+    shutil.copytree(logs / "r1" / night(4), logs / "r9" / "mar-06")
+    said = f"r1 {odd}: no night by name"
+    planned = opamc("nightly", cell, "--dry-run")
+    assert said in planned.out
+    assert json.loads(opamc("nightly", cell, "--dry-run", "--json").out)["strays"] == [
+        str(odd),
+        str(logs / "r9" / "mar-06"),
+    ]
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert (first.code, second.code, second.out) == (ExitCode.PARTIAL, ExitCode.DONE, "")
+    assert said in first.out
+    assert f"r9 {logs / 'r9' / 'mar-06'}: no night by name" in first.out
+    # one more is said, too
+    odd.rename(logs / "r1" / "mar-07")
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, "mar-07: no night by name" in ended.out) == (ExitCode.PARTIAL, True)
+    # those of the baseline are named
+    text = cell.read_text().replace("{nights: 3}", '{runs: "logs/{robot}/mar-07/*.parquet"}')
+    cell.write_text(text + "robots: {r1: {}, r3: {}}\n")
+    assert "no night by name" not in opamc("nightly", cell, "--dry-run").out
+    shutil.rmtree(cell.parent / "nightly")
+    for name in ("r1", "r3"):
+        shutil.rmtree(logs / name)
+    shutil.copytree(logs / "r9", logs / "r1")
+    ended = opamc("nightly", cell, "--quiet")
+    assert ended.code == ExitCode.BAD_INPUT
+    assert f"{logs / 'r1' / 'mar-06'}: no night by name" in ended.err
+
+
 def test_results_that_were_removed_are_made_again_or_said_to_be_gone(cell, logs, opamc):
     opamc("nightly", cell)
     results = cell.parent / "nightly" / "r1"

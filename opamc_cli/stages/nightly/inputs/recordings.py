@@ -16,6 +16,7 @@ from opamc_cli.storage.logs import (
     fetch,
     find_closed,
     find_logs,
+    find_logs_and_strays,
     fits,
     read_facts,
 )
@@ -78,6 +79,8 @@ class CellRecordings:
     """Those that `baseline.runs` names."""
     beside: dict[str, list[Recording]]
     """What is known of the recordings of robots that are not asked for."""
+    strays: list[tuple[str, str]]
+    """Robot and path of recordings that lie in the place of a night and are called otherwise."""
 
 
 def find_recordings(
@@ -102,15 +105,22 @@ def find_recordings(
         If nothing is found, or a robot that was asked for is none of the cell's.
     """
     named = None if cell.robots == "auto" else tuple(cell.robots)
-    logs = find_logs(cell.runs, named)
+    logs, strays = find_logs_and_strays(cell.runs, named)
     judged = {robot for robot, _ in history.nights()}
     # a robot whose logs were cleared away, or are out of reach, keeps its alarm
     robots = sorted(named or {log.robot for log in logs} | judged)
     logs += find_closed(cell.runs, tuple(robots))
     fixed = find_logs(cell.baseline.runs, tuple(robots)) if cell.baseline.runs else []
+    strays = [
+        (robot, path)
+        for robot, path in strays
+        if not Path(path).is_relative_to(cell.out)
+        and not any(log.path.startswith(path) for log in fixed)
+    ]
     if not logs and not judged:
         of = f" of {some(named)}" if named else ""
         msg = f"{cell.runs}: no file{of} fits this pattern; check `runs` of the cell's file"
+        msg += f"; {said_of_strays([path for _, path in strays])}" if strays else ""
         raise InputError(msg)
     known = sorted({*robots, *judged})
     for name in only or ():
@@ -125,6 +135,7 @@ def find_recordings(
         {robot: [] for robot in wanted},
         {robot: [] for robot in wanted},
         {},
+        [one for one in strays if only is None or one[0] in only],
     )
     for log in logs:
         if log.robot in result.by_robot:
@@ -232,3 +243,11 @@ def _is_free(robot: str) -> bool:
 def some(names: Sequence[str], most: int = 8) -> str:
     """Return the first names of many."""
     return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
+
+
+def said_of_strays(paths: Sequence[str]) -> str:
+    """Say that paths are called otherwise than a night."""
+    return (
+        f"{some(paths, 3)}: no night by name, nothing of it is judged; call it YYYY-MM-DD, or keep "
+        "it where `runs` does not look"
+    )
