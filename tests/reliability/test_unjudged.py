@@ -160,6 +160,15 @@ def test_one_baseline_run_at_another_speed_is_left_out_in_one_sentence(
     assert sentence.startswith(f"opamc: {odd}: its motions last 0.97 times as long")
 
 
+def test_the_stage_alone_says_which_run_is_of_another_speed(opamc, baseline, tmp_path):
+    odd = record(tmp_path / "odd.parquet", 5, faster)
+    assert opamc("segment", baseline, odd, "--out", tmp_path / "out", "--quiet").code == 0
+    ended = opamc("identify", "--out", tmp_path / "out", "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    (sentence,) = ended.sentences
+    assert sentence.startswith("opamc: odd: its motions last 0.97 times as long")
+
+
 def test_a_recording_of_which_two_axes_are_wrong_is_not_said_to_lack_one_alone(
     opamc, baseline, tonight, tmp_path
 ):

@@ -63,4 +63,6 @@ def identify(
         ),
         str(outcome.path),
     )
-    raise typer.Exit(output.failures([str(error) for error in outcome.errors], len(found)))
+    raise typer.Exit(
+        output.failures([*map(str, outcome.errors), *outcome.of_other_speeds], len(found))
+    )

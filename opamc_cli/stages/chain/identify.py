@@ -1,6 +1,6 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,8 @@ class IdentifyOutcome:
     """One for each axis of a run that could not be read."""
     notes: tuple[str, ...]
     """One for each axis of which only the motion told the cycles."""
+    of_other_speeds: tuple[str, ...]
+    """One for each run that is left out for its speed."""
 
     def cycles(self) -> dict[tuple[str, int], tuple[int, int]]:
         """Return the numbers of cycles and of unidentified segments by (run, axis)."""
@@ -196,7 +198,8 @@ def run(
         inputs=inputs,
         extra=sources_record(list(sources.values()), out) | {OTHER_SPEEDS: other_speeds},
     )
-    return IdentifyOutcome(path, motions, outcome.errors, tuple(_unlike(motions, rule)))
+    notes = tuple(_unlike(motions, rule))
+    return IdentifyOutcome(path, motions, outcome.errors, notes, _of_other_speeds(other_speeds))
 
 
 def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
@@ -206,6 +209,14 @@ def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
         kept = pc.if_else(left, pa.scalar(UNIDENTIFIED, MOTIONS.field(name).type), motions[name])
         motions = motions.set_column(motions.schema.get_field_index(name), name, kept)
     return motions.cast(MOTIONS)
+
+
+def _of_other_speeds(slowness: Mapping[str, float]) -> tuple[str, ...]:
+    return tuple(
+        f"{run}: its motions last {ratio:.2f} times as long as the baseline's: of another speed "
+        "none is identified"
+        for run, ratio in slowness.items()
+    )
 
 
 def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:
