@@ -331,8 +331,7 @@ def _one(
     kernel = max(motion.kernel, averaging_kernel(CORNER_WINDOW, 2), key=len)
     clear = clear_of_corners(motion.acceleration, current, moving, kernel, uncertain)
     if motion.window <= CORNER_WINDOW:
-        # The coarse grid has no counterpart for so short an average.
-        moving &= clear
+        moving &= clear  # The coarse grid has no counterpart for so short an average.
     return Track(
         rate_hz=rate,
         bounds=((0, n),),

@@ -79,10 +79,13 @@ class Chain:
         turned = any(b and not n and t.effect.name == "coulomb" for n, b, t in kept)
         return all(signs[first:]) and not (turned and self.terms[-1].effect.follows_load)
 
-    @property
-    def plausible(self) -> list[bool]:
-        """Whether each of the added terms has the sign that physics gives it."""
-        return self._signs[len(self.fit.terms) - self.added :]
+    def in_place(self) -> "Chain":
+        """Put the last effect in the place of those that have lost their sign beside it."""
+        *earlier, own = self._signs[len(self.fit.terms) - self.added :]
+        chain = self
+        for place in reversed(np.flatnonzero(np.logical_not(earlier)).tolist() if own else []):
+            chain = without(chain, place)
+        return chain
 
     @property
     def _signs(self) -> list[bool]:

@@ -9,15 +9,7 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form
-from opamc_cli.joint.name.chain import (
-    PRICE,
-    Chain,
-    Signature,
-    extended,
-    line_of,
-    signature_of,
-    without,
-)
+from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import p_value
 
@@ -193,19 +185,9 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         child = _best_with(chain, forms)
         if forms[0].effect.follows_load:
             child = _best_with(chain, _variants(child.terms[-1]), child)
-        child = _in_place(child)
+        child = child.in_place()
         found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found
-
-
-def _in_place(child: Chain) -> Chain:
-    """Put the last effect in the place of those that have lost their sign beside it."""
-    lost = [place for place, right in enumerate(child.plausible[:-1]) if not right]
-    if not lost or not child.plausible[-1]:
-        return child
-    for place in reversed(lost):
-        child = without(child, place)
-    return child
 
 
 def _best_with(chain: Chain, forms: Sequence[Term], *others: Chain) -> Chain:
