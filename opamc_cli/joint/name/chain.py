@@ -80,9 +80,9 @@ class Chain:
         return all(signs[first:]) and not (turned and self.terms[-1].effect.follows_load)
 
     def in_place(self) -> "Chain":
-        """Put the last effect in the place of those that have lost their sign beside it."""
+        """Put the last effect, if it has a name, in the place of what lost its sign by it."""
         *earlier, own = self._signs[len(self.fit.terms) - self.added :]
-        chain = self
+        chain, own = self, own and not self.terms[-1].effect.unnamed
         for place in reversed(np.flatnonzero(np.logical_not(earlier)).tolist() if own else []):
             chain = without(chain, place)
         return chain
