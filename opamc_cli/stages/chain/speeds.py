@@ -61,8 +61,12 @@ def _usual(baseline: pa.Table, tolerance: float) -> dict[int, float]:
 
 
 def _lasting(motions: pa.Table) -> tuple[Strings, Ints, Floats, Ints]:
-    """Run, axis, length in the reference's and length in samples of each identified motion."""
+    """Run, axis, length in the reference's and length in samples of each identified motion.
+
+    How long a window is, or a motion at the edge of a recording, is the logger's affair.
+    """
     identified = np.asarray(motions["cycle"]) >= 0
+    identified &= ~np.asarray(motions["edge"]) & (np.asarray(motions["kind"]) == "motion")
     run, axis, start, stop, reference = (
         np.asarray(motions[name])[identified]
         for name in ("run", "axis", "start", "stop", "reference_samples")

@@ -14,6 +14,8 @@ def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
             "cycle": 0,
             "start": 0,
             "stop": round(samples * (1 + 0.2 * motion) / speed * (odd_axis if axis else 1.0)),
+            "edge": False,
+            "kind": "motion",
             "reference_samples": round(samples * (1 + 0.2 * motion) / references[axis]),
         }
         for number, speed in enumerate(speeds)
@@ -59,3 +61,12 @@ def test_nothing_identified_has_no_speed():
     none = motions.set_column(2, "cycle", pa.array([-1] * motions.num_rows))
     assert not odd_speeds(none, motions, 0.01)
     assert not odd_speeds(motions, none, 0.01)
+
+
+@pytest.mark.parametrize(("name", "value"), [("kind", "window"), ("edge", True)])
+def test_windows_and_motions_that_an_edge_has_cut_tell_no_speed(name, value):
+    slower, usual = table([0.97]), table([1.0])
+    of_all = pa.array([value] * slower.num_rows)
+    odd = slower.set_column(slower.schema.get_field_index(name), name, of_all)
+    assert not odd_speeds(odd, usual, 0.01)
+    assert odd_speeds(slower, usual, 0.01)
