@@ -2,7 +2,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from opamc_cli.stages.chain.speeds import odd_speeds
+from opamc_cli.stages.chain.compared.speeds import odd_speeds
 
 
 def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
