@@ -23,8 +23,8 @@ from opamc_cli.signal.identification import (
     identify_anywhere,
 )
 from opamc_cli.signal.motion.reported import fluctuation_frequency
-from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
+from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
 from opamc_cli.storage.runs import Run

@@ -16,6 +16,7 @@ def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
             "stop": round(samples * (1 + 0.2 * motion) / speed * (odd_axis if axis else 1.0)),
             "edge": False,
             "kind": "motion",
+            "sampling_rate_hz": 100.0,
             "reference_samples": round(samples * (1 + 0.2 * motion) / references[axis]),
         }
         for number, speed in enumerate(speeds)

@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
+from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.segment import SegmentOutcome
-from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS
 from opamc_cli.stages.verdict.agreement.exchanged import exchanged
 from opamc_cli.stages.verdict.agreement.findings import Finding, Reference, findings, reference_of
 from opamc_cli.stages.verdict.agreement.measured import Measured, measure
