@@ -71,3 +71,18 @@ def test_windows_and_motions_that_an_edge_has_cut_tell_no_speed(name, value):
     odd = slower.set_column(slower.schema.get_field_index(name), name, of_all)
     assert not odd_speeds(odd, usual, 0.01)
     assert odd_speeds(slower, usual, 0.01)
+
+
+def test_a_baseline_of_several_runs_tells_by_its_own_scatter_what_is_another_speed():
+    """Of half a second three alone are known to 4 %, five that are alike to a sample."""
+    alike = table([1.0] * 5, samples=1000)
+    fast = alike.set_column(
+        alike.schema.get_field_index("sampling_rate_hz"), "sampling_rate_hz",
+        pa.array([2000.0] * alike.num_rows),
+    )  # fmt: skip
+    odd = fast.set_column(
+        fast.schema.get_field_index("stop"), "stop",
+        pa.array([round(stop / 0.98) for stop in fast["stop"].to_pylist()]),
+    )  # fmt: skip
+    assert odd_speeds(odd, fast, 0.01).keys() == {f"run{n}" for n in range(5)}
+    assert not odd_speeds(odd, fast.slice(0, 3 * 8), 0.01)

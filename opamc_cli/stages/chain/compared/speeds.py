@@ -1,5 +1,7 @@
 """Recordings of another speed than the others: how long their motions last."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
@@ -17,6 +19,12 @@ OPEN_S = 0.02
 what moves one of its boundaries moves all. Of a measured actuator's recordings at 25 Hz the middle
 of eight strokes differs by two samples; of motions of a second, from phase currents, by 10 ms."""
 
+FEWEST_RUNS = 5
+"""Of a baseline, from which on the scatter of its own recordings tells better."""
+
+SCATTERS = 3.0
+"""Of it, beyond which hardly a recording of the same speed lies."""
+
 
 def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[str, float]:
     """Find the runs whose motions are slower or faster than the baseline's.
@@ -31,24 +39,38 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
     baseline
         Those of the baseline's, which may be the same: then the speed that most runs share is its.
     tolerance
-        Relative difference that counts as none, beside what sampling leaves open.
+        Relative difference that counts as none, beside what is open of the lengths.
 
     Returns
     -------
     dict of str to float
         By run, how many times as long as the baseline's its motions last, in the middle.
     """
-    run, axis, ratio, samples, rate = _lasting(motions)
     usual = _usual(baseline, tolerance)
+    known = [middle for middle, _, _ in _middles(baseline, usual).values()]
+    scatter = 1.4826 * float(np.median(np.abs(np.array(known) - 1))) if known else 0.0
+    found = {}
+    for run, (middle, sample, open_) in _middles(motions, usual).items():
+        if len(known) >= FEWEST_RUNS:
+            open_ = max(sample, min(open_, SCATTERS * scatter))
+        if abs(middle - 1) > tolerance + open_:
+            found[run] = middle
+    return found
+
+
+def _middles(
+    motions: pa.Table, usual: Mapping[int, float]
+) -> dict[str, tuple[float, float, float]]:
+    """By run, how long its motions last, what a sample is of it, and what may be open of it."""
+    run, axis, ratio, samples, rate = _lasting(motions)
     ratio = ratio / np.array([usual.get(own, 1.0) for own in axis.tolist()])
     found = {}
     for name in np.unique(run):
         own = run == name
-        middle = float(np.median(ratio[own]))
-        open_s = max(OPEN_SAMPLES / float(rate[own][0]), OPEN_S)
-        length_s = float(np.median(samples[own] / rate[own]))
-        if abs(middle - 1) > tolerance + open_s / length_s / np.sqrt(np.unique(axis[own]).size):
-            found[str(name)] = middle
+        joints = np.sqrt(np.unique(axis[own]).size)
+        sample = 1 / float(np.median(samples[own])) / joints
+        open_ = sample * max(OPEN_SAMPLES, OPEN_S * float(rate[own][0]))
+        found[str(name)] = float(np.median(ratio[own])), sample, open_
     return found
 
 
