@@ -158,6 +158,8 @@ def test_one_baseline_run_at_another_speed_is_left_out_in_one_sentence(
     assert ended.code == ExitCode.PARTIAL
     (sentence,) = ended.sentences
     assert sentence.startswith(f"opamc: {odd}: its motions last 0.97 times as long")
+    notes = json.loads((tmp_path / "out" / "verdict.json").read_text())["notes"]
+    assert "of another speed than the baseline's, and left out: odd" in notes
 
 
 def test_the_stage_alone_says_which_run_is_of_another_speed(opamc, baseline, tmp_path):

@@ -145,7 +145,12 @@ def _identify_and_count(
     )
     return _Done(
         (*identified.errors, *counted.errors),
-        (*counted.notes, *_unidentified(identified), *identified.notes),
+        (
+            *_of_other_speeds(identified),
+            *counted.notes,
+            *_unidentified(identified),
+            *identified.notes,
+        ),
     )
 
 
@@ -159,6 +164,15 @@ def _put_down(tables: pa.Table, out: Path) -> None:
     for row in tables.to_pylist():
         with atomic_path(out / row["name"]) as path:
             path.write_bytes(row["content"])
+
+
+def _of_other_speeds(identified: identify.IdentifyOutcome) -> list[str]:
+    """Say which runs are left out for their speed, which a page about what is left would not."""
+    runs = [sentence.partition(": ")[0] for sentence in identified.of_other_speeds]
+    if not runs:
+        return []
+    named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
+    return [f"of another speed than the baseline's, and left out: {named}"]
 
 
 def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:
