@@ -34,6 +34,7 @@ def identify(
     """Find cycles and motions in a segment table; writes motions.parquet."""
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain import identify as stage
+    from opamc_cli.stages.chain.compared.speeds import of_another_speed
     from opamc_cli.storage.files.lock import output_lock
 
     output = Output(as_json, quiet)
@@ -63,6 +64,5 @@ def identify(
         ),
         str(outcome.path),
     )
-    raise typer.Exit(
-        output.failures([*map(str, outcome.errors), *outcome.of_other_speeds], len(found))
-    )
+    left_out = [f"{run}: {of_another_speed(r)}" for run, r in outcome.other_speeds.items()]
+    raise typer.Exit(output.failures([*map(str, outcome.errors), *left_out], len(found)))

@@ -59,8 +59,8 @@ class IdentifyOutcome:
     """One for each axis of a run that could not be read."""
     notes: tuple[str, ...]
     """One for each axis of which only the motion told the cycles."""
-    of_other_speeds: tuple[str, ...]
-    """One for each run that is left out for its speed."""
+    other_speeds: Mapping[str, float]
+    """What `odd_speeds` found: runs that are left out for their speed."""
 
     def cycles(self) -> dict[tuple[str, int], tuple[int, int]]:
         """Return the numbers of cycles and of unidentified segments by (run, axis)."""
@@ -199,7 +199,7 @@ def run(
         extra=sources_record(list(sources.values()), out) | {OTHER_SPEEDS: other_speeds},
     )
     notes = tuple(_unlike(motions, rule))
-    return IdentifyOutcome(path, motions, outcome.errors, notes, _of_other_speeds(other_speeds))
+    return IdentifyOutcome(path, motions, outcome.errors, notes, other_speeds)
 
 
 def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
@@ -209,14 +209,6 @@ def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
         kept = pc.if_else(left, pa.scalar(UNIDENTIFIED, MOTIONS.field(name).type), motions[name])
         motions = motions.set_column(motions.schema.get_field_index(name), name, kept)
     return motions.cast(MOTIONS)
-
-
-def _of_other_speeds(slowness: Mapping[str, float]) -> tuple[str, ...]:
-    return tuple(
-        f"{run}: its motions last {ratio:.2f} times as long as the baseline's: of another speed "
-        "none is identified"
-        for run, ratio in slowness.items()
-    )
 
 
 def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:

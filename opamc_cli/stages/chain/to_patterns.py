@@ -168,7 +168,7 @@ def _put_down(tables: pa.Table, out: Path) -> None:
 
 def _of_other_speeds(identified: identify.IdentifyOutcome) -> list[str]:
     """Say which runs are left out for their speed, which a page about what is left would not."""
-    runs = [sentence.partition(": ")[0] for sentence in identified.of_other_speeds]
+    runs = list(identified.other_speeds)
     if not runs:
         return []
     named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")

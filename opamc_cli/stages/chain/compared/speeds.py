@@ -58,6 +58,14 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
     return found
 
 
+def of_another_speed(ratio: float) -> str:
+    """Say why a run, whose motions last so many times as long as the baseline's, is left out."""
+    return (
+        f"its motions last {ratio:.2f} times as long as the baseline's: of another speed nothing "
+        "can be compared"
+    )
+
+
 def _middles(
     motions: pa.Table, usual: Mapping[int, float]
 ) -> dict[str, tuple[float, float, float]]:

@@ -88,7 +88,7 @@ class Agreement:
                 self.measured[role],
                 self.found[role],
                 read_table(path, "identify", MOTIONS),
-                record_at(path)[OTHER_SPEEDS],
+                record_at(path).get(OTHER_SPEEDS, {}),
             )
             for role, path in (("baseline", baseline), ("target", target))
         ]

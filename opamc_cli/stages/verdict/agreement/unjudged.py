@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.stages.chain.compared.side import Sides
+from opamc_cli.stages.chain.compared.speeds import of_another_speed
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 from opamc_cli.stages.verdict.evidence import session_names
@@ -159,7 +160,9 @@ def _lost(axis: int, side: Side) -> dict[str, str]:
             lost[measured.run] = f"the motions of axis {axis} could not be identified"
         elif pc.max(rows["cycle"]).as_py() < 0:
             ratio = side.slowness.get(measured.run)
-            lost[measured.run] = _unfitting(axis, rows) if ratio is None else _slower(ratio)
+            lost[measured.run] = (
+                _unfitting(axis, rows) if ratio is None else of_another_speed(ratio)
+            )
     return lost
 
 
@@ -173,13 +176,6 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
         elif measured.axis == axis and not measured.moves:
             idle.setdefault(measured.run, f"axis {axis} does not move")
     return idle
-
-
-def _slower(ratio: float) -> str:
-    return (
-        f"its motions last {ratio:.2f} times as long as the baseline's: of another speed nothing "
-        "can be compared"
-    )
 
 
 def _unfitting(axis: int, rows: pa.Table) -> str:
