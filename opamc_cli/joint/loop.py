@@ -14,7 +14,6 @@ from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_for
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
-from opamc_cli.joint.name.ties import separating_experiment
 from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.signal.motion.smoothing import measurement_noise
 
@@ -34,8 +33,6 @@ class Step:
     """What the same regressors take off a residual whose signs were drawn at random."""
     ties: tuple[str, ...]
     """Effects that explain the data as well."""
-    experiment: str | None
-    """What would tell them apart."""
     fit_of_name: float
     """Share of its domain's curve that the named form holds."""
     rmse_before_a: float
@@ -164,7 +161,6 @@ def _steps(
                 interpretation=term.effect.interpretation(term.parameters, track),
                 decoy_gain=decoy_gain(trial.parent.fit, term, seed),
                 ties=ties,
-                experiment=separating_experiment(term.effect.name, ties),
                 fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,
                 rmse_before_a=chain.fit.rmse(sealed=False),
                 rmse_after_a=following.fit.rmse(sealed=False),

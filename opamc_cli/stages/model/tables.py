@@ -23,6 +23,33 @@ from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 
 MOST_RESIDUALS = 20_000
 MOST_ORDERS = 4_000
+ADVICE = (
+    (
+        {"thermal_viscous", "warmup", "viscous"},
+        "record again with the joint already warm, logging its temperature",
+    ),
+    (
+        {"coulomb", "viscous", "stribeck", "quadratic_friction", "sublinear_friction"},
+        "move at more speeds, from a fiftieth of the top speed up to it",
+    ),
+    (
+        {"ripple", "sensor_offset", "sensor_gain", "dead_time"},
+        "log all three phase currents together with the position",
+    ),
+    (
+        {"ripple", "mains_hum", "elasticity"},
+        "repeat the motion at another speed: what belongs to an angle moves, a line stays",
+    ),
+    (
+        {"inertia", "elasticity", "coupling", "time_delay", "payload_change"},
+        "repeat the motion with other accelerations at equal speeds, without a change of tool",
+    ),
+    (
+        {"offset", "asymmetric_friction", "spring", "gravity", "position_drag", "hysteresis"},
+        "cover more of the travel, through every place in both directions",
+    ),
+)
+"""Effects that are alike, and what tells them apart."""
 
 
 def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[str, Any]]:
@@ -120,6 +147,16 @@ def explained_entry(start: Chain, explained: Chain) -> dict[str, Any]:
     }
 
 
+def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
+    """Say what to record to tell an effect from those that tie with it; None where nothing ties."""
+    if not ties:
+        return None
+    for members, advice in ADVICE:
+        if name in members and any(tie in members for tie in ties):
+            return advice
+    return "move over more of the travel, at more speeds and accelerations, in both directions"
+
+
 def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, Any]:
     """One entry of `steps`; ripples whose orders the travel cannot tell apart are tied."""
     curve = step.curve
@@ -141,7 +178,7 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
         "p_value": step.trial.p_value,
         "decoy_gain": step.decoy_gain,
         "ties": ties,
-        "separating_experiment": step.experiment,
+        "separating_experiment": separating_experiment(step.term.effect.name, step.ties),
         "fit_of_name": step.fit_of_name,
         "approximate": step.approximate,
         "rmse_before_a": step.rmse_before_a,

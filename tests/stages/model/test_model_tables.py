@@ -1,0 +1,36 @@
+"""Words of loop.json: the recording that tells explanations apart."""
+
+import pytest
+
+from opamc_cli.stages.model.tables import ADVICE, separating_experiment
+
+
+@pytest.mark.parametrize(
+    ("name", "tied", "says"),
+    [
+        ("coulomb", ("stribeck",), "at more speeds, from a fiftieth"),
+        ("viscous", ("warmup",), "already warm"),
+        ("viscous", ("coulomb",), "at more speeds, from a fiftieth"),
+        ("ripple", ("sensor_gain",), "all three phase currents"),
+        ("ripple", ("mains_hum",), "at another speed"),
+        ("elasticity", ("inertia",), "other accelerations"),
+        ("spring", ("coulomb", "gravity"), "more of the travel, through every place"),
+        # Neither knows the other: no single quantity tells them apart.
+        ("spring", ("viscous",), "more of the travel, at more speeds"),
+        ("a user's", ("viscous",), "more of the travel, at more speeds"),
+    ],
+)
+def test_an_experiment_belongs_to_what_ties(name, tied, says):
+    assert says in separating_experiment(name, tied)
+
+
+def test_where_nothing_ties_no_experiment_is_asked_for():
+    assert separating_experiment("coulomb", ()) is None
+
+
+@pytest.mark.parametrize(("members", "advice"), ADVICE)
+def test_any_two_of_a_group_have_an_advice_of_a_group(members, advice):
+    for name in members:
+        for tie in members - {name}:
+            given = separating_experiment(name, (tie,))
+            assert given == next(text for group, text in ADVICE if {name, tie} <= group)
