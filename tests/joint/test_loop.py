@@ -20,6 +20,7 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
+from opamc_cli.joint.motion.groups import cycle_length
 from opamc_cli.joint.name.chain import chain_of, extended
 from tests.marks import long
 
@@ -171,6 +172,24 @@ def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
     # A twentieth of a cycle: the refinement ends where a slow stretch tells little.
     found = loop.steps[0].term.parameters["since_s"]
     assert abs(found - start / made.rate_hz) < 0.05 * 7.3
+
+
+@pytest.mark.parametrize(("seed", "cycles"), [(3, 8), *(long(*case) for case in [(6, 8), (9, 80)])])
+def test_a_payload_that_is_gripped_and_put_down_in_every_cycle_is_found(seed, cycles):
+    made = simulate(seed, (), rate=250.0, cycles=cycles, kind="quintic")
+    period = cycle_length(np.gradient(made.position))
+    place = np.arange(made.position.size) % period
+    # Gripped after the first stroke, put down one or more strokes later.
+    rests = np.flatnonzero(np.diff((np.gradient(made.position[:period]) == 0).astype(int)) == -1)
+    held = (place >= rests[0]) & (place < rests[-2])
+    grown = np.sin(made.position + 0.5) + 0.02 * np.gradient(np.gradient(made.position)) * 250**2
+    loop = close_recording(made, made.current + 5 * made.noise_rms * held * grown)[1]
+    assert [step.term.effect.name for step in loop.steps] == ["payload_change"]
+    assert loop.verdict == "closed"
+    found = loop.steps[0].term.parameters
+    assert found["gripped_s"] == pytest.approx(rests[0] / 250, abs=0.4)
+    assert found["released_s"] == pytest.approx(rests[-2] / 250, abs=0.4)
+    assert "of every cycle" in loop.steps[0].interpretation
 
 
 def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():

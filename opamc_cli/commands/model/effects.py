@@ -18,6 +18,8 @@ UNITS = {
     "place_rad": "rad",
     "width_rad": "rad",
     "since_s": "s",
+    "gripped_s": "s",
+    "released_s": "s",
     "delay_s": "s",
 }
 """Units of parameters whose name does not tell; others end in theirs."""

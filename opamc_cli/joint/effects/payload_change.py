@@ -1,5 +1,7 @@
 """A load that is not the same all the time."""
 
+from itertools import combinations
+
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
@@ -9,10 +11,17 @@ GUESSES = 32
 NEAR = 4
 LEAST_SIDE = 0.03
 """Share of the open samples before or after the step."""
+RESTS = 8
+"""Most rests of a cycle between any two of which a payload may be held."""
+REST_S = 0.05
+"""The shortest of them."""
 
 
 class PayloadChange(Effect):
-    """Gravity and inertia that step at some time."""
+    """Gravity and inertia that step at some time, or for the same part of every cycle.
+
+    In a cycle it is held from one rest to another: a payload is seen where it moves.
+    """
 
     name = "payload_change"
     domain = "load"
@@ -20,7 +29,7 @@ class PayloadChange(Effect):
     of_its_recordings = True
     origin = "load"
     changes_in_time = True
-    searches = ("since_s",)
+    searches = ("since_s", "gripped_s", "released_s")
     meaning = "the payload has changed: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
@@ -28,7 +37,9 @@ class PayloadChange(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
         first, last = _judgeable(track)
-        return [{"since_s": float(time)} for time in np.linspace(first, last, GUESSES)]
+        steps = [{"since_s": float(time)} for time in np.linspace(first, last, GUESSES)]
+        pairs = combinations(_rests(track), 2)
+        return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Anywhere in the session, but not so close to its ends that one side tells nothing."""
@@ -36,7 +47,12 @@ class PayloadChange(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Gravity's and inertia's regressors after the step."""
-        after = (track.time_s >= parameters["since_s"]).astype(float)
+        if "gripped_s" in parameters:
+            place = track.in_cycle_s if track.in_cycle_s is not None else np.zeros(track.size)
+            held = (place >= parameters["gripped_s"]) & (place < parameters["released_s"])
+        else:
+            held = track.time_s >= parameters["since_s"]
+        after = held.astype(float)
         return stack(
             after * np.sin(track.position_rad),
             after * np.cos(track.position_rad),
@@ -46,7 +62,7 @@ class PayloadChange(Effect):
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
         """Take the middle of a stretch that nothing open tells the time in."""
         rows = track.open_samples
-        if rows is None:
+        if rows is None or "since_s" not in parameters:
             return parameters
         times = track.time_s[rows]
         after = int(np.searchsorted(times, parameters["since_s"]))
@@ -60,6 +76,26 @@ class PayloadChange(Effect):
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""
         return [(parameters | {"inertia": 0.0}, (0, 1))]
+
+    def interpretation(self, parameters: Parameters, track: Track) -> str:
+        """Say whether it changes in every cycle."""
+        if "gripped_s" not in parameters:
+            return self.meaning
+        return (
+            f"a payload is held from {parameters['gripped_s']:.3g} to "
+            f"{parameters['released_s']:.3g} s of every cycle: that is the program, not the gear"
+        )
+
+
+def _rests(track: Track) -> list[float]:
+    """Beginning of the cycle, and the middles of its longest rests in order, in seconds."""
+    if track.in_cycle_s is None:
+        return []
+    places = np.sort(track.in_cycle_s[track.moving & (track.group >= 0)])
+    gaps = np.diff(places)
+    shortest = max(REST_S, 2 / track.rate_hz)
+    longest = [k for k in np.argsort(-gaps)[:RESTS] if gaps[k] >= shortest]
+    return [0.0, *sorted(float(places[k] + gaps[k] / 2) for k in longest)]
 
 
 def _judgeable(track: Track) -> tuple[float, float]:

@@ -30,7 +30,11 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     if _revisits(track):
         track = replace(track, channels=track.channels | {"revisits"})
     names = tuple(recording.name for recording in recordings)
-    return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+    grouping = group_samples(track.moving, track.bounds, period, track.rate_hz, names)
+    if period is not None and grouping is not None and grouping.kind == "cycles":
+        since = np.concatenate([np.arange(stop - start) for start, stop in track.bounds])
+        track = replace(track, in_cycle_s=since % period / track.rate_hz)
+    return track, grouping
 
 
 def _revisits(track: Track) -> bool:
