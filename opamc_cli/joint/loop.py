@@ -196,9 +196,11 @@ def _opened(
         after, rmse_named = (named, rmse_named) if hold else (before, rmse_before)
         rmse_after = rmse_named
     added = {one.term.effect.name for one in [step.trial for step in steps] + refused}
-    # Where functions without a name explain nothing, all of the error may be there to explain.
-    reach = rmse_before**2 * (found.share or 1.0)
-    reached = (rmse_before**2 - rmse_named**2) / reach if reach > 0 else 1.0
+    # What is above the noise may all be there to explain, where functions tell nothing for certain.
+    noise_a = measurement_noise(after.residual_a[after.dataset.sharp.fit])
+    reach = found.share * rmse_before**2 if found.certain else rmse_before**2 - noise_a**2
+    at_noise = noise_a**2 >= EXACT * rmse_named**2
+    reached = 1.0 if at_noise or reach <= 0 else (rmse_before**2 - rmse_named**2) / reach
     # What predicts no better than the mean, or far worse than it fits, lacks something for certain.
     r2_after = after.sealed_r2
     predicts = r2_after > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
@@ -207,6 +209,8 @@ def _opened(
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
+        # What was found far above the noise and did not hold is not nothing.
+        unknown |= bool(refused) and rmse_before > TWICE * noise_a
         verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None
@@ -229,8 +233,8 @@ def _opened(
         rmse_after_a=rmse_after,
         r2_before=before.sealed_r2,
         r2_after=r2_after,
-        floor_a=rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))),
-        noise_a=measurement_noise(after.residual_a[after.dataset.sharp.fit]),
+        floor_a=min(rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))), rmse_after),
+        noise_a=noise_a,
         explained_share=float(np.clip(reached, 0.0, 1.0)),
         remaining_domain=domain,
         orders_note=(

@@ -102,7 +102,8 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     )
     assert loop["ceiling"]["share"] > 2 * loop["ceiling"]["standard_error"] > 0
     floor = loop["before"]["rmse_a"] * (1 - loop["ceiling"]["share"]) ** 0.5
-    assert loop["floor_a"] == pytest.approx(floor)
+    # Names may leave less than functions do.
+    assert loop["floor_a"] == pytest.approx(min(floor, loop["after"]["rmse_a"]))
     candidates = pq.read_table(folder / "out" / "candidates.parquet").to_pylist()
     assert {"round", "effect", "score", "gain", "t_value", "p_value", "added", "why_not"} <= set(
         candidates[0]

@@ -57,17 +57,19 @@ def _headline(result: Mapping[str, Any]) -> str:
                 what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
             words.append(f"{what} ({name})")
     words = list(dict.fromkeys(words))
+    from opamc_cli.stages.report.wording import ceiling_known, unexplained
+
     error = f"error {before} → {after} {unit}"
     fails = f"; {result['fails']}" if result.get("fails") else ""
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
-    if share is not None and result.get("ceiling", {}).get("share") != 0:
+    if share is not None and ceiling_known(result):
         reached = f"{share:.0%} of what can be explained"
+    elif result.get("verdict") == "closed":
+        reached = "what is left is noise"
     if words:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}{fails}"
     if result.get("verdict") == "nothing-missing":
-        from opamc_cli.stages.report.wording import unexplained
-
         noise = result.get("noise_a")
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
         if unexplained(result):

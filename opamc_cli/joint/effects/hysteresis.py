@@ -19,10 +19,7 @@ class Hysteresis(Effect):
     domain = "joint-angle"
     per = ("",)
     searches = ("length_rad",)
-    meaning = (
-        "torque lags behind after reversals: presliding, which healthy bearings and seals have over "
-        "some 1e-4 rad; over more, check gear preload and backlash"
-    )
+    meaning = "torque lags after reversals: presliding (1e-4 rad is healthy), preload or backlash"
     resists = True
     from_motion = True
 

@@ -79,12 +79,10 @@ class PayloadChange(Effect):
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
-        if "gripped_s" not in parameters:
-            return self.meaning
-        return (
-            f"a payload is held from {parameters['gripped_s']:.3g} to "
-            f"{parameters['released_s']:.3g} s of every cycle: that is the program, not the gear"
+        held = (
+            "held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
         )
+        return held.format(**parameters) if "gripped_s" in parameters else self.meaning
 
 
 def _rests(track: Track) -> list[float]:

@@ -265,6 +265,12 @@ def shared_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, list[int]]
     return {reason: found for reason, found in axes.items() if len(found) > 1}
 
 
+def ceiling_known(entry: Mapping[str, Any]) -> bool:
+    """Return whether functions without a name tell how much of a joint can be explained."""
+    ceiling = entry.get("ceiling") or {}
+    return float(ceiling.get("share", 0.0)) > 2 * float(ceiling.get("standard_error", 0.0))
+
+
 UNEXPLAINED = 3.0
 """Times the noise between samples: a larger error is not said to be all that there is. A measured
 arm's joints leave 1.2 to 3.5 times where one moves alone; 4 to 16 times in programs of two seconds
@@ -371,8 +377,9 @@ def remains(entry: Mapping[str, Any]) -> str:
         parts.append(f"the sealed error is {number(after)} {unit}")
     if isinstance(floor, int | float):
         parts.append(f"functions without a name leave {number(floor)} {unit}")
-    if (entry.get("ceiling") or {}).get("share") == 0 and entry.get("steps"):
-        parts.append("how much can be explained is not known")
+    if entry.get("steps") and not ceiling_known(entry):
+        closed = entry.get("verdict") == "closed"
+        parts.append("it is noise" if closed else "how much can be explained is not known")
     elif isinstance(share, int | float):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
     domains = [
