@@ -19,18 +19,18 @@ class Hysteresis(Effect):
     domain = "joint-angle"
     per = ("",)
     searches = ("length_rad",)
-    meaning = "torque lags after reversals: presliding (1e-4 rad is healthy), preload or backlash"
+    meaning = "torque lags behind after reversals: check gear preload and backlash"
     resists = True
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Lengths from the presliding of bearings, a few 1e-4 rad, to half of the travel."""
+        """Lengths from a hundredth to half of the travel."""
         span = track.travel_rad
-        return [{"length_rad": length} for length in geometric(span / 5000, span / 2, 14)]
+        return [{"length_rad": length} for length in geometric(span / 100, span / 2, 9)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """From a ten-thousandth of the travel to all of it."""
-        return {"length_rad": (track.travel_rad / 10_000, track.travel_rad)}
+        """From a two-hundredth of the travel to all of it."""
+        return {"length_rad": (track.travel_rad / 200, track.travel_rad)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """State of Dahl's model, +-1 where it has settled."""

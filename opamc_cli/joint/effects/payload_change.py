@@ -18,10 +18,7 @@ REST_S = 0.05
 
 
 class PayloadChange(Effect):
-    """Gravity and inertia that step at some time, or for the same part of every cycle.
-
-    In a cycle it is held from one rest to another: a payload is seen where it moves.
-    """
+    """Gravity and inertia that step at some time, or between the same rests of every cycle."""
 
     name = "payload_change"
     domain = "load"
@@ -79,9 +76,7 @@ class PayloadChange(Effect):
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
-        held = (
-            "held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
-        )
+        held = "held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
         return held.format(**parameters) if "gripped_s" in parameters else self.meaning
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.lines import AngleLine, Links, Tone
-from opamc_cli.joint.explain.unnamed import SMOOTH, Response, Shift
+from opamc_cli.joint.explain.unnamed import SMOOTH, Presliding, Response, Shift
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.name.chain import PRICE, Chain
@@ -33,7 +33,7 @@ class Ceiling:
 
 def unnamed_library() -> dict[str, Effect]:
     """Everything that a residual can be explained by without a name."""
-    effects = (*SMOOTH, Response(), Shift(), AngleLine(), Tone())
+    effects = (*SMOOTH, Presliding(), Response(), Shift(), AngleLine(), Tone())
     return {effect.name: effect for effect in effects}
 
 

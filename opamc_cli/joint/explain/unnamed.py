@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
+from opamc_cli.joint.effects.hysteresis import Hysteresis
 from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track
@@ -125,6 +126,23 @@ class Shift(Effect):
         part = columns[rows]
         first = np.gradient(columns @ solve(part.T @ part, part.T @ track.current_a[rows]))
         return stack(first, np.gradient(first))
+
+
+class Presliding(Hysteresis):
+    """Friction that builds up over some 1e-4 rad after a reversal, which healthy bearings have."""
+
+    unnamed = True
+    name = "unnamed_presliding"
+    meaning = "presliding: friction builds up over a short way after reversals, as in any bearing"
+
+    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
+        """Lengths below those that are a fault's."""
+        span = track.travel_rad
+        return [{"length_rad": length} for length in geometric(span / 5000, span / 100, 7)]
+
+    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
+        """Below those of a hysteresis."""
+        return {"length_rad": (track.travel_rad / 10_000, track.travel_rad / 100)}
 
 
 def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) -> Floats:

@@ -1,12 +1,12 @@
 """What a chain keeps when each effect is asked again beside the others."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.chain import Chain, extended, without
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
-from opamc_cli.joint.name.ties import ties_of
 
 EXACT = 0.9
 """Share of its domain's curve from which on a form has the name, and of the ceiling from which on
@@ -52,6 +52,16 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
             told = tuple(other.told for other in others if other.chain.signature != best.signature)
             named.append(Named(_trial(parent, best, term, pool), told, ties))
     return best, named
+
+
+def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
+    """Return the effects that in the place of one leave no surely larger held-out error."""
+    found = []
+    for other in others:
+        difference, error = paired(best.deviation, other.chain.deviation)
+        if other.why_not is None and difference <= LEAST_T * error:
+            found.append(other.term.effect.name)
+    return tuple(other for other in dict.fromkeys(found) if other != name)
 
 
 def worth_their_price(chain: Chain) -> Chain:

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from opamc_cli.joint.name.ties import ties_of
+from opamc_cli.joint.name.settle import ties_of
 
 ERROR = np.array([1.0, 2.0, 3.0, 2.0])
 
