@@ -154,13 +154,12 @@ def _steps(
         following = extended(chain, term)
         known = by_term.get(id(term))
         trial = Trial.of(chain, following) if known is None else known.trial
-        ties = () if known is None else known.ties
         steps.append(
             Step(
                 trial=trial.told,
                 interpretation=term.effect.interpretation(term.parameters, track),
                 decoy_gain=decoy_gain(trial.parent.fit, term, seed),
-                ties=ties,
+                ties=() if known is None else known.ties,
                 fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,
                 rmse_before_a=chain.fit.rmse(sealed=False),
                 rmse_after_a=following.fit.rmse(sealed=False),

@@ -16,6 +16,7 @@ from closing import (
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint import loop as loop_module
+from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
@@ -190,6 +191,17 @@ def test_a_payload_that_is_gripped_and_put_down_in_every_cycle_is_found(seed, cy
     assert found["gripped_s"] == pytest.approx(rests[0] / 250, abs=0.4)
     assert found["released_s"] == pytest.approx(rests[-2] / 250, abs=0.4)
     assert "of every cycle" in loop.steps[0].interpretation
+
+
+@pytest.mark.parametrize("seed", [3, long(6), long(9)])
+def test_presliding_is_no_fault_and_has_no_name(seed):
+    made = simulate(seed, (), rate=250.0, cycles=8, kind="quintic")
+    builds_up = dahl_state(made.position, 3e-4)
+    _, loop = close_recording(made, made.current + 20 * made.noise_rms * builds_up)
+    assert [step.term.effect.name for step in loop.steps] == ["unnamed_presliding"]
+    assert loop.steps[0].term.parameters["length_rad"] == pytest.approx(3e-4, rel=0.3)
+    assert loop.verdict == "not-in-library"
+    assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
 def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():

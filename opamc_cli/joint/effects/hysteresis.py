@@ -23,14 +23,19 @@ class Hysteresis(Effect):
     resists = True
     from_motion = True
 
+    lengths = (1 / 100, 1 / 2, 9)
+    """Shares of the travel: the shortest and the longest that is tried, and how many."""
+
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Lengths from a hundredth to half of the travel."""
+        """Lengths of travel."""
+        shortest, longest, count = self.lengths
         span = track.travel_rad
-        return [{"length_rad": length} for length in geometric(span / 100, span / 2, 9)]
+        return [{"length_rad": one} for one in geometric(shortest * span, longest * span, count)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """From a two-hundredth of the travel to all of it."""
-        return {"length_rad": (track.travel_rad / 200, track.travel_rad)}
+        """From half of the shortest to twice the longest."""
+        span = track.travel_rad
+        return {"length_rad": (self.lengths[0] * span / 2, self.lengths[1] * span * 2)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """State of Dahl's model, +-1 where it has settled."""

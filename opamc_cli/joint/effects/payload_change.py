@@ -13,8 +13,6 @@ LEAST_SIDE = 0.03
 """Share of the open samples before or after the step."""
 RESTS = 8
 """Most rests of a cycle between any two of which a payload may be held."""
-REST_S = 0.05
-"""The shortest of them."""
 
 
 class PayloadChange(Effect):
@@ -44,12 +42,11 @@ class PayloadChange(Effect):
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Gravity's and inertia's regressors after the step."""
+        place, since, until = track.time_s, parameters.get("since_s", 0.0), np.inf
         if "gripped_s" in parameters:
-            place = track.in_cycle_s if track.in_cycle_s is not None else np.zeros(track.size)
-            held = (place >= parameters["gripped_s"]) & (place < parameters["released_s"])
-        else:
-            held = track.time_s >= parameters["since_s"]
-        after = held.astype(float)
+            place = track.run_time_s % track.period_s
+            since, until = parameters["gripped_s"], parameters["released_s"]
+        after = ((place >= since) & (place < until)).astype(float)
         return stack(
             after * np.sin(track.position_rad),
             after * np.cos(track.position_rad),
@@ -82,12 +79,11 @@ class PayloadChange(Effect):
 
 def _rests(track: Track) -> list[float]:
     """Beginning of the cycle, and the middles of its longest rests in order, in seconds."""
-    if track.in_cycle_s is None:
+    if np.isinf(track.period_s):
         return []
-    places = np.sort(track.in_cycle_s[track.moving & (track.group >= 0)])
+    places = np.sort(track.run_time_s[track.moving & (track.group >= 0)] % track.period_s)
     gaps = np.diff(places)
-    shortest = max(REST_S, 2 / track.rate_hz)
-    longest = [k for k in np.argsort(-gaps)[:RESTS] if gaps[k] >= shortest]
+    longest = [k for k in np.argsort(-gaps)[:RESTS] if gaps[k] > 2 / track.rate_hz]
     return [0.0, *sorted(float(places[k] + gaps[k] / 2) for k in longest)]
 
 

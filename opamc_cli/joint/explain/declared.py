@@ -23,7 +23,7 @@ ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
 """At most: with all, which takes twice the time, no ratio of 24 crosses the half."""
-JUDGED = ("moving", "clear", "channels", "in_cycle_s")
+JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count. A longer window has fewer moving samples, none of them near a
 reversal: judged by its own, it is the best wherever friction is wrong."""
 Declared = tuple[tuple[Effect, Term | None], ...]

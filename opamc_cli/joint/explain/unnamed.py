@@ -134,15 +134,7 @@ class Presliding(Hysteresis):
     unnamed = True
     name = "unnamed_presliding"
     meaning = "presliding: friction builds up over a short way after reversals, as in any bearing"
-
-    def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Lengths below those that are a fault's."""
-        span = track.travel_rad
-        return [{"length_rad": length} for length in geometric(span / 5000, span / 100, 7)]
-
-    def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """Below those of a hysteresis."""
-        return {"length_rad": (track.travel_rad / 10_000, track.travel_rad / 100)}
+    lengths = (1 / 5000, 1 / 200, 6)
 
 
 def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) -> Floats:

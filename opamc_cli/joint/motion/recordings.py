@@ -27,14 +27,12 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     lengths = [cycle_length(*_speeds(track, start, stop)) for start, stop in track.bounds]
     known = [length for length in lengths if length is not None]
     period = round(float(np.median(known))) if known else None
+    if period is not None:
+        track = replace(track, period_s=period / track.rate_hz)
     if _revisits(track):
         track = replace(track, channels=track.channels | {"revisits"})
     names = tuple(recording.name for recording in recordings)
-    grouping = group_samples(track.moving, track.bounds, period, track.rate_hz, names)
-    if period is not None and grouping is not None and grouping.kind == "cycles":
-        since = np.concatenate([np.arange(stop - start) for start, stop in track.bounds])
-        track = replace(track, in_cycle_s=since % period / track.rate_hz)
-    return track, grouping
+    return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
 
 
 def _revisits(track: Track) -> bool:

@@ -98,8 +98,8 @@ class Track:
     full: "Track | None" = None
     """What an averaged track is the block means of: the same recordings at the full rate, with
     current, position, speed and direction as smooth as the acceleration."""
-    in_cycle_s: Floats | None = None
-    """Seconds since the own cycle began, where the motion repeats; (n,) or None."""
+    period_s: float = np.inf
+    """Time after which each recording's motion repeats itself, if it does."""
     own_clocks_s: tuple[float, ...] = ()
     """`time_s` at which each recording begins, where recordings have no common clock."""
     reference: "Reference | None" = None
