@@ -208,8 +208,6 @@ def _opened(
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
-        # What was found far above the noise and did not hold is not nothing.
-        unknown |= bool(refused) and rmse_before > TWICE * noise_a
         verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None

@@ -135,7 +135,7 @@ def test_of_no_samples_nothing_is_stretched():
 def test_what_is_fitted_to_its_own_recordings_or_smooths_the_motion_says_so():
     library = unnamed_library()
     own = {name for name, effect in library.items() if effect.of_its_recordings}
-    assert own == set(library) - {"unnamed_response", "unnamed_order"}
+    assert own == set(library) - {"unnamed_response", "unnamed_order", "unnamed_presliding"}
     smooth = {name for name, effect in library.items() if effect.as_smoothing}
     assert smooth == {"unnamed_response", "unnamed_shift"}
 
