@@ -4,7 +4,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from itertools import groupby
 from typing import Any
@@ -17,6 +17,7 @@ from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 from opamc_cli.decision.trend.chart import LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
+from opamc_cli.stages.nightly.baseline_name import condition_in
 from opamc_cli.storage.history import (
     UNJUDGED,
     AlarmRow,
@@ -76,27 +77,27 @@ def settle_robot(
     for (program, axis), group in groupby(series, key=lambda row: (row["program"], row["axis"])):
         joint = list(group)
         name = f"axis {axis}" + (f" in program {program}" if several else "")
-        for _, part in groupby(joint, key=lambda row: row["baseline"]):
-            rows = list(part)
+        for rows, replaced in _courses(joint):
             seen = _nights(rows, rule, baseline_nights)
             for found in episodes(seen, rule.nights, rule.of):
+                raised = rows[found.raised]["night"]
+                if found.cleared is not None:
+                    ended = rows[found.cleared]["night"]
+                else:
+                    # a baseline that was declared is known before a night is judged against it
+                    ended = _after_maintenance(raised, nights, declared) or replaced
                 signal = _first_signal(seen, found.raised, rule.of)
-                alarm, said = _alarm(rows, found, signal, name, declared, rule, fault_effect)
+                alarm, said = _alarm(rows, found, ended, signal, name, declared, rule, fault_effect)
                 alarms.append(alarm)
                 events += said
-                stop = len(rows) if found.cleared is None else found.cleared
-                standing += [(program, axis, row["night"]) for row in rows[found.raised : stop]]
+                standing += [
+                    (program, axis, row["night"])
+                    for row in joint
+                    if raised <= row["night"] < (ended or "9999")
+                ]
         events += _not_judged(joint, name, rule.remind_after)
     events += _failed(robot, nights, rule.remind_after)
-    # an alarm of a baseline that has been replaced does not stand any more
-    left = list(_last_stands(alarms, series))
-    for index, alarm in enumerate(left):
-        night = _after_maintenance(alarm, nights, declared)
-        if night:
-            left[index] = replace(alarm, cleared=night)
-            text = f"axis {alarm.axis}: the alarm of {alarm.raised} is over, by a new baseline"
-            events.append(Event(night, robot, alarm.axis, "cleared", text))
-    return Settled(tuple(left), tuple(standing), tuple(events))
+    return Settled(tuple(alarms), tuple(dict.fromkeys(standing)), tuple(events))
 
 
 def chart_of(rows: Sequence[Mapping[str, Any]], baseline_nights: int) -> NDArray[np.float64]:
@@ -134,6 +135,7 @@ def _first_signal(nights: Sequence[Night], raised: int, among: int) -> int:
 def _alarm(
     rows: Sequence[Mapping[str, Any]],
     found: Episode,
+    ended: str,
     signal: int,
     name: str,
     declared: Sequence[Declared],
@@ -142,7 +144,8 @@ def _alarm(
 ) -> tuple[AlarmRow, list[Event]]:
     first = rows[found.raised]
     robot, axis = first["robot"], first["axis"]
-    last = len(rows) if found.cleared is None else found.cleared
+    until = ended or "9999"
+    last = sum(row["night"] < until for row in rows)
     since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
     lately = rows[max(0, last - MOST_NIGHTS) : last]
     growing = _measured([row for row in lately if row["night"] >= since])
@@ -159,7 +162,6 @@ def _alarm(
         }
     latest = rows[last - 1]
     text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
-    until = "9999" if found.cleared is None else rows[found.cleared]["night"]
     known = _acknowledged(declared, axis, first["night"], until)
     events = [Event(first["night"], robot, axis, "alarm", f"{name}: {text}")]
     nights = [row["night"] for row in rows[found.raised : last]]
@@ -168,24 +170,19 @@ def _alarm(
         for index in said_in(nights, [""] * len(nights), rule.remind_after)[1:]
         if known is None or nights[index] < known.night
     ]
-    if found.cleared is not None:
-        events.append(
-            Event(
-                until,
-                robot,
-                axis,
-                "cleared",
-                f"{name}: the alarm of {first['night']} is over, no sign of it in "
-                f"{rule.of} judged nights",
-            )
-        )
+    if ended:
+        how = f"no sign of it in {rule.of} judged nights"
+        if found.cleared is None:
+            how = "by a new baseline"
+        text_of_end = f"{name}: the alarm of {first['night']} is over, {how}"
+        events.append(Event(ended, robot, axis, "cleared", text_of_end))
     alarm = AlarmRow(
         robot=robot,
         program=first["program"],
         axis=axis,
         raised=first["night"],
         since=since,
-        cleared=None if found.cleared is None else until,
+        cleared=ended or None,
         acknowledged=None if known is None else known.why,
         text=text,
         trend=json.dumps(trend, sort_keys=True),
@@ -234,31 +231,36 @@ def _days(rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
     return np.array([_day(row["night"]) for row in rows], dtype=np.float64)
 
 
-def _last_stands(
-    alarms: Sequence[AlarmRow], series: Sequence[Mapping[str, Any]]
-) -> Iterator[AlarmRow]:
-    """End alarms that stood when another baseline was begun."""
-    begins: dict[tuple[str, int], list[str]] = {}
-    before: dict[tuple[str, int], str] = {}
-    for row in series:
-        place = (row["program"], row["axis"])
-        if before.get(place, row["baseline"]) != row["baseline"]:
-            begins.setdefault(place, []).append(row["night"])
-        before[place] = row["baseline"]
-    for alarm in alarms:
-        later = [n for n in begins.get((alarm.program, alarm.axis), ()) if n > alarm.raised]
-        if alarm.cleared is None and later:
-            yield AlarmRow(**{**vars(alarm), "cleared": later[0]})
-        else:
-            yield alarm
+def _courses(
+    joint: Sequence[Mapping[str, Any]],
+) -> Iterator[tuple[list[Mapping[str, Any]], str]]:
+    """Yield a joint's nights by the baseline that they were compared with.
+
+    Nights of another condition say nothing of what this one's have shown: neither do they clear
+    its alarms, nor does its chart begin anew after them.
+
+    Yields
+    ------
+    rows : list
+        Nights of one condition, one baseline after the other.
+    replaced : str
+        First night of the condition's next baseline; empty without one.
+    """
+    by_condition: dict[str, list[Mapping[str, Any]]] = {}
+    for row in joint:
+        by_condition.setdefault(condition_in(row["baseline"]), []).append(row)
+    for rows in by_condition.values():
+        parts = [list(part) for _, part in groupby(rows, key=lambda row: row["baseline"])]
+        begins = [*(part[0]["night"] for part in parts[1:]), ""]
+        yield from zip(parts, begins, strict=True)
 
 
 def _after_maintenance(
-    alarm: AlarmRow, nights: Sequence[NightRow], declared: Sequence[Declared]
+    raised: str, nights: Sequence[NightRow], declared: Sequence[Declared]
 ) -> str:
     """Return the first night of a baseline that was declared after an alarm; empty without one."""
-    after = [night for _, night in begun_anew(declared) if night > alarm.raised]
-    if alarm.cleared is not None or not after:
+    after = [night for _, night in begun_anew(declared) if night > raised]
+    if not after:
         return ""
     # a date that is still to come, or was mistyped, silences nothing
     return next((row.night for row in nights if row.night >= min(after)), "")

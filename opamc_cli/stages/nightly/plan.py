@@ -9,6 +9,7 @@ from itertools import combinations
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
+from opamc_cli.stages.nightly.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.storage.history import NightRow
 from opamc_cli.storage.logs import Facts
@@ -271,7 +272,7 @@ class _Baselines:
             used = tuple(one for n in left for one in self._there[key][n])
             self._used[key] = used, tuple(self._gone_from(key, left))
         used, lost = self._used[key]
-        name = f"{name}, {condition}"
+        name = baseline_name(name, condition)
         of = tuple(members)
         return Comparison(program, condition, targets, used, name, "", of, bool(gone), lost)
 

@@ -179,9 +179,11 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
     robots
         Robots of the cell that may have no night yet.
     """
-    standing = {
-        (alarm.robot, alarm.program, alarm.axis): alarm for alarm in history.alarms(standing=True)
-    }
+    # of a joint's alarms under several conditions the latest that nobody knows of
+    by_news = sorted(
+        history.alarms(standing=True), key=lambda one: (one.acknowledged is None, one.raised)
+    )
+    standing = {(alarm.robot, alarm.program, alarm.axis): alarm for alarm in by_news}
     last: dict[str, NightRow] = {}
     undated: dict[str, NightRow] = {}
     for night in history.nights().values():

@@ -156,3 +156,39 @@ def test_nights_that_only_changed_are_an_alarm_once_the_chart_says_so():
     lasting = ["healthy"] * 20 + ["changed"] * 10
     assert raised(lasting, [*even[:20], *[0.6] * 10]) == [25]
     assert raised(["healthy"] * 20 + ["fault"] * 10, even) == [22]
+
+
+def settled(series, nights=(), declared=()):
+    return settle_robot("r1", series, nights, declared, AlarmConfig(), 0.4, 6)
+
+
+def test_a_night_of_another_condition_clears_no_alarm():
+    """A worn joint that looks healthy beside nights at another speed, which show the same wear."""
+    series = nights_of(["healthy"] * 5 + ["fault"] * 3 + ["healthy"] * 3 + ["fault"] * 2)
+    for row in series:
+        other = 9 <= int(row["night"][-2:]) <= 11
+        row["baseline"] = "from 2026-02-03, 70 %" if other else "from 2026-02-01, 100 %"
+    found = settled(series)
+    (alarm,) = found.alarms
+    assert (alarm.raised[-2:], alarm.cleared) == ("07", None)
+    # the rule stands in the nights of the other condition as well
+    assert [night[-2:] for _, _, night in found.standing] == [f"{day:02d}" for day in range(7, 14)]
+    assert [one.kind for one in found.events] == ["alarm"]
+
+
+def test_an_alarm_that_a_new_baseline_ends_is_said_to_be_over_and_stays():
+    over = "axis 2: the alarm of 2026-03-04 is over, by a new baseline"
+    series = nights_of(["healthy"] * 2 + ["fault"] * 3 + ["healthy"] * 4)
+    for row in series:
+        old = row["night"] <= "2026-03-05"
+        row["baseline"] = f"from {'2026-02-01' if old else '2026-03-06'}, 100 %"
+    ends = [one for one in settled(series).events if one.kind == "cleared"]
+    assert [(one.time, one.text) for one in ends] == [("2026-03-06", over)]
+    # declared, its first night is one of the baseline, also once later ones are judged against it
+    declared = [Declared("t", "r1", None, "rebaselined", "2026-03-06", "oil")]
+    nights = [NightRow("r1", f"2026-03-{day:02d}", "", "done") for day in range(1, 13)]
+    later = [{**row, "night": f"2026-03-{int(row['night'][-2:]) + 3:02d}"} for row in series[5:]]
+    for known in (series[:5], [*series[:5], *later]):
+        found = settled(known, nights, declared)
+        assert [one.cleared for one in found.alarms] == ["2026-03-06"]
+        assert [one.text for one in found.events if one.kind == "cleared"] == [over]
