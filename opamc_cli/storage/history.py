@@ -202,6 +202,19 @@ class AlarmRow:
     trend: str
 
 
+@dataclass(frozen=True)
+class AlarmSpan:
+    """Nights in which an alarm stands, half-open."""
+
+    program: str
+    axis: int
+    raised: str
+    cleared: str
+    """Later than any night while it stands."""
+    baseline: str
+    """Name of the baseline whose nights raised it."""
+
+
 def begun_anew(declared: Iterable[Declared]) -> list[tuple[str, str]]:
     """Return robot and first night of the baselines that were declared and not taken back."""
     begun: dict[tuple[str, str], None] = {}
@@ -587,6 +600,19 @@ class History:
         where = "WHERE cleared IS NULL" if standing else ""
         query = f"SELECT * FROM alarm {where} ORDER BY robot, axis, raised"
         return self._read(AlarmRow, query)
+
+    def spans(self) -> dict[str, list[AlarmSpan]]:
+        """Return from which night to which each alarm stands, and of what baseline, by robot."""
+        found: dict[str, list[AlarmSpan]] = {}
+        query = (
+            "SELECT a.robot, a.program, a.axis, a.raised, a.cleared, m.baseline FROM alarm a "
+            "JOIN measure m ON (a.robot, a.program, a.axis, a.raised) "
+            "= (m.robot, m.program, m.axis, m.night) ORDER BY a.raised, a.axis, a.program"
+        )
+        for row in self.rows(query):
+            robot, until = row.pop("robot"), row.pop("cleared") or "9999"
+            found.setdefault(robot, []).append(AlarmSpan(**row, cleared=until))
+        return found
 
     def declared(self, robot: str | None = None) -> list[Declared]:
         """Return what users declared, in the order in which they did."""

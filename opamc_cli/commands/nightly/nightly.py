@@ -138,7 +138,7 @@ def run(
 
 
 def _print_plan(output: Output, outcome: Any) -> None:
-    todo = [night for night in outcome.planned if night.why]
+    todo = [night for night in outcome.planned.values() if night.why]
     output.result(
         {
             "nights": [

@@ -166,7 +166,7 @@ def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
             "done": sorted(night for name, night in outcome.done if name == robot.name),
             "skipped": sorted(
                 night.night
-                for night in outcome.planned
+                for night in outcome.planned.values()
                 if night.robot == robot.name and not night.why
             ),
             "failed": [

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -11,7 +11,7 @@ from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
-from opamc_cli.storage.history import NightRow
+from opamc_cli.storage.history import AlarmSpan, NightRow
 from opamc_cli.storage.logs import Facts
 
 LEAST_NIGHTS = 2
@@ -98,6 +98,10 @@ class Situation:
     """Nights whose results somebody has removed."""
     config_hash: str
     """Of the options of its diagnosis."""
+    alarms: Sequence[AlarmSpan] = ()
+    """Its alarms, by the night in which they were raised."""
+    is_to_come: Callable[[str], bool] = bool
+    """Whether this start will judge a night if it has to be."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ class RobotPlan:
     complete: Mapping[tuple[str, str, str], tuple[str, ...]]
     thinned: tuple[tuple[str, str], ...] = ()
     """Of baselines that lost recordings: what is gone, and a sentence."""
+    waiting: bool = False
+    """Whether there is more to do once these nights are judged and alarms are known."""
 
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
@@ -175,7 +181,41 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
-    return RobotPlan(tuple(nights), baselines.complete, baselines.said())
+    plan = RobotPlan(tuple(nights), baselines.complete, baselines.said())
+    return _without_waiting(plan, now)
+
+
+def _without_waiting(plan: RobotPlan, now: Situation) -> RobotPlan:
+    """Put off baselines whose nights may turn out to be under alarm by another condition's nights.
+
+    So that one start over a year finds what a start each morning does.
+    """
+    to_do = [
+        (night.night, (one.program, one.condition))
+        for night in plan.nights
+        if night.why and now.is_to_come(night.night)
+        for one in night.comparisons
+        if one.baseline
+    ]
+    waits = {
+        key: members
+        for key, members in plan.complete.items()
+        if key not in now.pinned
+        and any(night <= members[-1] and of != key[:2] for night, of in to_do)
+    }
+    if not waits:
+        return plan
+    put_off = {(*key[:2], members) for key, members in waits.items()}
+    nights = tuple(
+        night
+        for night in plan.nights
+        if not any(
+            one.baseline and (one.program, one.condition, one.members) in put_off
+            for one in night.comparisons
+        )
+    )
+    complete = {key: members for key, members in plan.complete.items() if key not in waits}
+    return replace(plan, nights=nights, complete=complete, waiting=True)
 
 
 def _without_copies(recordings: Sequence[Recording]) -> list[Recording]:
@@ -223,6 +263,11 @@ class _Baselines:
         self._series = series
         self._usable = usable
         self._nights = nights
+        self._complete_before = {
+            (key[0], baseline_name(f"from {nights[0]}", key[1])): (key, nights[-1])
+            for key, nights in now.pinned.items()
+        }
+        """Baselines and their last nights, by program and name."""
         self.complete: dict[tuple[str, str, str], tuple[str, ...]] = {}
         self._thinned: dict[tuple[str, str, str], tuple[str, str]] = {}
         self._gone: dict[str, str] = {}
@@ -239,6 +284,13 @@ class _Baselines:
         if since or rule.nights is not None:
             key = (program, condition, since)
             members = self._first_nights(key)
+            alarm = None if members else self._alarm_over(key, night)
+            if alarm is not None:
+                why = (
+                    f"the alarm of {alarm.raised} stands on axis {alarm.axis}: no night under it "
+                    f"becomes part of a baseline, and that of {condition} is not complete"
+                )
+                return Comparison(program, condition, targets, missing=why)
             inside = not members or night in members
             name = f"from {members[0]}" if members else ""
         else:
@@ -301,10 +353,34 @@ class _Baselines:
     def _first_nights(self, key: tuple[str, str, str]) -> list[str]:
         """Return the nights of a baseline that begins with the first ones; empty: too few yet."""
         wanted = self._now.baseline.nights or NIGHTS_AGAIN
-        pinned = list(self._now.pinned.get(key, ()))
-        # the file asks for more nights than before: those that follow, as soon as they are there
-        longer = pinned + [n for n in self._nights_there(key) if not pinned or n > pinned[-1]]
-        return pinned if len(longer) < wanted else longer[:wanted]
+        before = self._now.pinned.get(key, ())
+        pinned = [n for n in before if self._alarm_over(key, n) is None]
+        # the file asks for more nights than before, or some are under alarm by nights that came
+        # later: those that follow, as soon as they are there
+        longer = pinned + [
+            n
+            for n in self._nights_there(key)
+            if (not before or n > before[-1]) and self._alarm_over(key, n) is None
+        ]
+        if len(longer) >= wanted:
+            return longer[:wanted]
+        return pinned if len(pinned) == len(before) else []
+
+    def _alarm_over(self, key: tuple[str, str, str], night: str) -> AlarmSpan | None:
+        """Return the alarm that keeps a night out of a baseline; None without one.
+
+        A baseline's own nights raise alarms after it alone; of two others the one that was complete
+        first judges the nights of the second.
+        """
+        for alarm in self._now.alarms:
+            if alarm.raised <= night < alarm.cleared:
+                raised_by = self._complete_before.get((alarm.program, alarm.baseline))
+                if raised_by is None:
+                    continue
+                (*condition, since), last = raised_by
+                if since == key[2] and tuple(condition) != key[:2] and last < night:
+                    return alarm
+        return None
 
     def _nights_there(self, key: tuple[str, str, str]) -> dict[str, list[Recording]]:
         """Return the nights that may belong to a baseline, the same for all its nights."""

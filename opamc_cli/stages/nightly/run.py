@@ -78,8 +78,8 @@ class Wanted:
 class CellOutcome:
     """What a start did."""
 
-    planned: list[PlannedNight] = field(default_factory=list)
-    """Every night that was looked at, with why it was to be done."""
+    planned: dict[tuple[str, str], PlannedNight] = field(default_factory=dict)
+    """Every night that was looked at by robot and night, with why it was to be done."""
     done: list[tuple[str, str]] = field(default_factory=list)
     """Robot and night of those that were judged or taken into a baseline."""
     failed: list[tuple[str, str, str]] = field(default_factory=list)
@@ -97,6 +97,16 @@ class CellOutcome:
     summary: Summary = field(default_factory=lambda: Summary(()))
     """How all robots of the cell stand now."""
 
+    def plan(self, night: PlannedNight) -> None:
+        """Note that a night is looked at, perhaps again in the light of others."""
+        place = (night.robot, night.night)
+        if place in self.planned:
+            if not night.why:
+                return
+            self.done = [one for one in self.done if one != place]
+            self.failed = [one for one in self.failed if one[:2] != place]
+        self.planned[place] = night
+
 
 def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> CellOutcome:
     """Say what would be done, without doing it."""
@@ -105,8 +115,10 @@ def plan(cell: CellConfig, source: str, history: History, wanted: Wanted) -> Cel
     past = _Past(cell, history)
     recordings = _own(recordings, past)
     for robot in recordings.by_robot:
-        planned = _robot_plan(cell, source, past, recordings, robot)
-        outcome.planned += [night for night in planned.nights if wanted.has(night.night)]
+        planned = _robot_plan(cell, source, past, recordings, robot, wanted, None)
+        for night in planned.nights:
+            if wanted.has(night.night):
+                outcome.plan(night)
     _look_for_absent(cell, recordings, past, wanted, outcome)
     return outcome
 
@@ -151,9 +163,7 @@ def run(
     progress("looking for recordings")
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     outcome.strays = _strays(recordings)
-    jobs_of: dict[tuple[str, str], PlannedNight] = {}
-    past = _Past(cell, history)
-    recordings = _own(recordings, past)
+    recordings = _own(recordings, _Past(cell, history))
     outcome.thinned += [
         Event(
             one.night,
@@ -167,47 +177,74 @@ def run(
             recordings.baseline_by_robot, recordings.by_robot
         )
     ]
-    for robot in recordings.by_robot:
-        planned = _robot_plan(cell, source, past, recordings, robot)
-        for key, members in planned.complete.items():
-            if past.pinned.get(robot, {}).get(key) != list(members):
-                history.pin_baseline((robot, *key), members)
-        _forget(history, past, robot, recordings.by_robot[robot], planned)
-        outcome.thinned += [
-            Event(night, robot, None, "thinned", text) for night, text in planned.thinned
-        ]
-        for night in planned.nights:
-            if not wanted.has(night.night):
-                continue
-            outcome.planned.append(night)
-            if not night.why:
-                continue
-            if any(one.baseline for one in night.comparisons):
-                jobs_of[robot, night.night] = night
-            else:
-                _record_unjudged(cell, history, night, outcome)
-    _look_for_absent(cell, recordings, past, wanted, outcome)
-    # the newest night first: it is what the morning asks for
-    todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
-    if todo:
-        works = [_job(cell, source, night) for night in todo]
-        watch = progress("nights")
-        watch(0, len(works))
-        for n_done, (job, answer) in enumerate(
-            _answers(cell, works, jobs, scheduler, outcome), start=1
-        ):
-            night = jobs_of[job.robot, job.night]
-            last = past.recorded.get(job.robot, {}).get(job.night)
-            attempts = last.attempts if last and last.key == night.key else 0
-            _record(cell, history, night, job, answer, attempts, outcome)
-            watch(n_done, len(works))
-    shutil.rmtree(cell.out / WORK, ignore_errors=True)
-    _drop_copies(cell.out / COPIES, outcome.planned)
-    progress("alarms and pages")
     outcome.robots = tuple(sorted(recordings.by_robot))
     whole = wanted == Wanted()
-    outcome.summary = settle_cell(cell, source, history, outcome.robots, whole=whole)
+    _look_for_absent(cell, recordings, _Past(cell, history), wanted, outcome)
+    tried: set[tuple[str, str, str]] = set()
+    robots, n_before = outcome.robots, -1
+    while True:
+        past = _Past(cell, history)
+        # a round that found nothing to do has nothing to wait for
+        known = {key[:2] for key in tried} if len(tried) > n_before else None
+        n_before = len(tried)
+        jobs_of: dict[tuple[str, str], PlannedNight] = {}
+        waiting = []
+        for robot in robots:
+            planned = _robot_plan(cell, source, past, recordings, robot, wanted, known)
+            waiting += [robot] if planned.waiting else []
+            _keep_baselines(history, past, recordings.by_robot[robot], robot, planned, outcome)
+            for night in planned.nights:
+                place = (robot, night.night, night.key)
+                if not wanted.has(night.night) or place in tried:
+                    continue
+                outcome.plan(night)
+                if not night.why:
+                    continue
+                tried.add(place)
+                if any(one.baseline for one in night.comparisons):
+                    jobs_of[robot, night.night] = night
+                else:
+                    _record_unjudged(cell, history, night, outcome)
+        # the newest night first: it is what the morning asks for
+        todo = sorted(jobs_of.values(), key=lambda night: (night.night, night.robot), reverse=True)
+        if todo:
+            works = [_job(cell, source, night) for night in todo]
+            watch = progress("nights")
+            watch(0, len(works))
+            for n_done, (job, answer) in enumerate(
+                _answers(cell, works, jobs, scheduler, outcome), start=1
+            ):
+                night = jobs_of[job.robot, job.night]
+                last = past.recorded.get(job.robot, {}).get(job.night)
+                attempts = last.attempts if last and last.key == night.key else 0
+                _record(cell, history, night, job, answer, attempts, outcome)
+                watch(n_done, len(works))
+        progress("alarms and pages")
+        outcome.summary = settle_cell(cell, source, history, outcome.robots, whole=whole)
+        if not waiting or outcome.ended:
+            break
+        robots = tuple(waiting)
+    shutil.rmtree(cell.out / WORK, ignore_errors=True)
+    _drop_copies(cell.out / COPIES, [*outcome.planned.values()])
     return outcome
+
+
+def _keep_baselines(
+    history: History,
+    past: "_Past",
+    own: Sequence[Recording],
+    robot: str,
+    planned: RobotPlan,
+    outcome: CellOutcome,
+) -> None:
+    """Remember the baselines that are complete, and forget what there is nothing of any more."""
+    for key, members in planned.complete.items():
+        if past.pinned.get(robot, {}).get(key) != list(members):
+            history.pin_baseline((robot, *key), members)
+    if not planned.waiting:
+        _forget(history, past, robot, own, planned)
+    said = [Event(night, robot, None, "thinned", text) for night, text in planned.thinned]
+    outcome.thinned += [one for one in said if one not in outcome.thinned]
 
 
 def open_history(cell: CellConfig, *, read_only: bool = False) -> History:
@@ -245,6 +282,7 @@ class _Past:
         self.begun: dict[str, list[str]] = {}
         for robot, night in begun_anew(history.declared()):
             self.begun.setdefault(robot, []).append(night)
+        self.alarms = history.spans()
         self.removed: dict[str, list[str]] = {}
         for robot, reports in history.reports().items():
             # those of before are pruned, by a start that may have been killed at it
@@ -291,8 +329,15 @@ def _own(recordings: CellRecordings, past: _Past) -> CellRecordings:
 
 
 def _robot_plan(
-    cell: CellConfig, source: str, past: _Past, recordings: CellRecordings, robot: str
+    cell: CellConfig,
+    source: str,
+    past: _Past,
+    recordings: CellRecordings,
+    robot: str,
+    wanted: Wanted,
+    tried: set[tuple[str, str]] | None,
 ) -> RobotPlan:
+    """Say what is to be done of a robot; `tried`: its nights that were, None: wait for none."""
     config = cell.diagnosis_of(robot, source)
     axes = cell.axes_of(robot)
     situation = Situation(
@@ -305,6 +350,10 @@ def _robot_plan(
         recorded=past.recorded.get(robot, {}),
         removed=past.removed.get(robot, ()),
         config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),
+        alarms=past.alarms.get(robot, ()),
+        is_to_come=lambda night: (
+            tried is not None and wanted.has(night) and (robot, night) not in tried
+        ),
     )
     return plan_robot(robot, recordings.by_robot[robot], situation)
 
