@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from opamc_cli.config.cell import CellConfig
@@ -47,7 +48,7 @@ def settle_cell(
     by_robot: dict[str, list[NightRow]] = {}
     for row in sorted(history.nights().values(), key=lambda row: (row.robot, row.night)):
         by_robot.setdefault(row.robot, []).append(row)
-    standing = history.alarms(standing=True)
+    known = history.alarms()
     for robot in history.stale():
         config = cell.diagnosis_of(robot, source)
         settled = settle_robot(
@@ -59,12 +60,16 @@ def settle_cell(
             config.score.fault_effect,
             cell.baseline.nights or NIGHTS_AGAIN,
         )
-        before = [alarm for alarm in standing if alarm.robot == robot]
+        before = [alarm for alarm in known if alarm.robot == robot]
         begun = [night for _, night in begun_anew(history.declared(robot))]
-        ended = _ended(
-            before, settled.alarms, history.series(robot), by_robot.get(robot, []), begun
-        )
-        history.settle(robot, settled.alarms, settled.standing, (*settled.events, *ended))
+        nights = by_robot.get(robot, [])
+        taken = list(_taken_into_baseline(before, settled.alarms, nights, begun))
+        events = [
+            *settled.events,
+            *_events_of(taken, before, history.events() if taken else (), settled.events),
+            *_ended(before, settled.alarms, history.series(robot), nights, begun),
+        ]
+        history.settle(robot, [*settled.alarms, *taken], settled.standing, events)
     if whole:
         gone = {one.robot: one.night for one in history.declared() if one.kind == "gone"}
         history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
@@ -75,6 +80,46 @@ def settle_cell(
     write_page(cell, history, summary)
     write_metrics(cell, summary)
     return summary
+
+
+def _taken_into_baseline(
+    before: Sequence[AlarmRow],
+    after: Sequence[AlarmRow],
+    nights: Sequence[NightRow],
+    begun: Sequence[str],
+) -> Iterator[AlarmRow]:
+    """Keep the alarms of nights that a user has made a new baseline of: over, but not forgotten."""
+    baseline = {row.night for row in nights if row.status == "baseline"}
+    there = {(one.program, one.axis, one.raised) for one in after}
+    for alarm in before:
+        declared = any(night <= alarm.raised for night in begun)
+        again = (alarm.program, alarm.axis, alarm.raised) in there
+        if declared and alarm.raised in baseline and not again:
+            yield replace(alarm, cleared=alarm.cleared or nights[-1].night)
+
+
+def _events_of(
+    taken: Sequence[AlarmRow],
+    before: Sequence[AlarmRow],
+    said: Sequence[Event],
+    anew: Sequence[Event],
+) -> Iterator[Event]:
+    """Keep what was said of alarms whose nights are a baseline's now, and say that they are over.
+
+    But what is said `anew` of the same joint and night.
+    """
+    there = {(one.time, one.axis, one.kind) for one in anew}
+    kinds = ("alarm", "reminder", "cleared")
+    kept: dict[Event, None] = {}
+    for alarm in taken:
+        for event in said:
+            same = (event.robot, event.axis) == (alarm.robot, alarm.axis) and event.kind in kinds
+            if same and alarm.raised <= event.time <= str(alarm.cleared):
+                kept[event] = None
+        if alarm not in before:
+            text = f"axis {alarm.axis}: the alarm of {alarm.raised} is over, by a new baseline"
+            kept[Event(str(alarm.cleared), alarm.robot, alarm.axis, "cleared", text)] = None
+    yield from (one for one in kept if (one.time, one.axis, one.kind) not in there)
 
 
 def _ended(
@@ -91,6 +136,8 @@ def _ended(
     baseline = {row.night for row in nights if row.status == "baseline"} if begun else set()
     watched = {(row["program"], row["axis"]) for row in series}
     for alarm in before:
+        if alarm.cleared is not None:
+            continue
         place = (alarm.program, alarm.axis)
         same = [one for one in after if (one.program, one.axis) == place]
         over = any(one.cleared is None or one.cleared > alarm.raised for one in same)

@@ -199,6 +199,33 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     assert "judged anew" in ended.out
 
 
+def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_history(cell, opamc):
+    at = ("--why", "new gear", "--cell", cell)
+    begin = ("nightly", "rebaseline", "r2", "--from", NIGHTS[3], *at)
+    over = f"axis 2: the alarm of {NIGHTS[4]} is over, by a new baseline"
+    events = (
+        "SELECT time, kind, text FROM event WHERE robot = 'r2' AND kind IN ('alarm', 'cleared') "
+        "ORDER BY kind"
+    )
+    with nightly_kills.with_stand_in():
+        opamc("nightly", cell, "--quiet")
+        ((time_of_alarm, _, text),) = rows(cell, events)
+        opamc(*begin)
+        ended = opamc("nightly", cell, "--quiet")
+        assert (ended.code, ended.out) == (ExitCode.DONE, f"r2 {over}\n")
+        kept = [(time_of_alarm, "alarm", text), (NIGHTS[4], "cleared", over)]
+        alarms = "SELECT raised, cleared FROM alarm WHERE robot = 'r2'"
+        # it stays, and is no news, when alarms are found anew
+        for rule in ("", "alarm: {remind_after: 9}\n"):
+            cell.write_text(cell.read_text() + rule)
+            assert over not in opamc("nightly", cell, "--quiet").out
+            assert rows(cell, events) == kept
+            assert rows(cell, alarms) == [(NIGHTS[4], NIGHTS[4])]
+        opamc(*begin, "--undo")
+        assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+        assert rows(cell, alarms) == [(NIGHTS[4], None)]
+
+
 def test_facts_of_thousands_of_known_files_are_read_at_once():
     text = Facts("cycle", 100.0, 0.0, 2048.0, "2026-03-01T22:00:00+00:00").to_json()
     begun = time.process_time()
