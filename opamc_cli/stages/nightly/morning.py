@@ -136,7 +136,8 @@ def tell(
     alarms = any(robot.alarms for robot in summary.robots)
     broken = any(robot.broken for robot in summary.robots)
     ended = any(event.kind in ("ended", "stray") for event in news)  # of which nothing stays
-    failed = failed_now or broken or ended or outcome.absent or outcome.ended
+    in_part = outcome.unjudged or any(robot.in_part for robot in summary.robots)
+    failed = failed_now or broken or in_part or ended or outcome.absent or outcome.ended
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
     return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
 

@@ -84,6 +84,8 @@ class CellOutcome:
     """Robot and night of those that were judged or taken into a baseline."""
     failed: list[tuple[str, str, str]] = field(default_factory=list)
     """Robot, night and why; of nights that were judged in part as well."""
+    unjudged: set[tuple[str, str]] = field(default_factory=set)
+    """Robot and night of those with a joint that could not be judged."""
     absent: list[str] = field(default_factory=list)
     """Sentences that say of what was asked for that there is no recording of it."""
     thinned: list[Event] = field(default_factory=list)
@@ -488,6 +490,8 @@ def _record(
     row = NightRow(*place, status, 0, "; ".join(why), as_notes(notes))
     verdicts, measures = [], []
     programs = {one.program: one for one in job.programs}
+    if any(axis.state == "insufficient-data" for result in judged for axis in result.axes):
+        outcome.unjudged.add(place[:2])
     for index, result in enumerate(judged):
         wanted = programs[result.program]
         place_of = folder if index == 0 else folder / _safe(result.program)

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from opamc_cli.storage.history import UNJUDGED, AlarmRow, History, NightRow
+from opamc_cli.stages.nightly.inputs.recordings import some
+from opamc_cli.storage.history import UNJUDGED, AlarmRow, History, NightRow, begun_anew
 
 SEVERITY = (
     "alarm",
@@ -28,7 +29,7 @@ class JointSummary:
     axis: int
     program: str
     state: str
-    """Of its last night."""
+    """Of its last night; baseline, where that one's has been replaced since."""
     night: str
     """That night."""
     report: str
@@ -90,6 +91,14 @@ class RobotSummary:
     def broken(self) -> bool:
         """Whether nothing of its last night could be judged, or some of it may be lost."""
         return self.last is None or self.failure is not None
+
+    @property
+    def in_part(self) -> bool:
+        """Whether a joint of its last night could not be judged."""
+        return any(
+            (joint.state, joint.night) == ("insufficient-data", self.last_night)
+            for joint in self.joints
+        )
 
     @property
     def alarms(self) -> list[JointSummary]:
@@ -165,7 +174,10 @@ class Summary:
             ("healthy", "healthy"),
         ):
             if counts[state]:
-                parts.append(f"{_robots(counts[state])} {words}")
+                # where no line of the morning need name them
+                named = state in ("fault", "changed", "insufficient-data")
+                names = some([one.name for one in self.robots if one.shown == state])
+                parts.append(f"{_robots(counts[state])} {words}" + (f": {names}" if named else ""))
         return "; ".join(parts)
 
 
@@ -191,6 +203,11 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
             undated[night.robot] = night
         if night.robot not in last or night.night > last[night.robot].night:
             last[night.robot] = night
+    begun = {
+        robot: night
+        for robot, night in begun_anew(history.declared())
+        if robot in last and night <= last[robot].night
+    }
     joints: dict[str, list[JointSummary]] = {}
     query = (
         "SELECT robot, program, axis, state, max(night) AS night, report, health_index "
@@ -198,6 +215,10 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
     )
     for row in history.rows(query):
         alarm = standing.get((row["robot"], row["program"], row["axis"]))
+        since = begun.get(row["robot"], "")
+        if alarm is None and row["night"] < since:
+            # against a baseline that somebody has replaced
+            row |= {"state": "baseline", "health_index": None}
         joints.setdefault(row["robot"], []).append(_joint(row, alarm))
     names = sorted({*last, *joints, *robots})
     return Summary(

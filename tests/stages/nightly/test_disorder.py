@@ -40,10 +40,10 @@ def states(cell):
         return [status for _, status in db.execute(query).fetchall()]
 
 
-def add_night(logs, index):
-    """Have r1 recorded in one more night."""
-    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(index))
-    set_clock(logs / "r1" / night(index) / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
+def add_night(logs, index, robot="r1"):
+    """Have a robot recorded in one more night."""
+    shutil.copytree(logs / robot / night(4), logs / robot / night(index))
+    set_clock(logs / robot / night(index) / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
 
 
 def set_clock(path, started_at):
@@ -273,6 +273,39 @@ def test_verdicts_that_change_afterwards_are_said(cell, logs, opamc):
         stage.run(loaded, str(cell), history, stage.Wanted())
     assert opamc("nightly", cell, "--quiet").out == f"r1 judged anew: {', '.join(said)}\n"
     assert opamc("nightly", cell, "--quiet").out == ""
+
+
+def test_a_robot_that_the_last_line_counts_is_named_and_judged_by_what_is_in_force(
+    cell, logs, opamc
+):
+    opamc("nightly", cell)
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        db.execute(
+            f"UPDATE verdict SET state = 'fault' WHERE robot = 'r3' AND night = '{night(4)}'"
+        )
+    headline = "1 robot with a fault in the last night, no alarm yet: r3; 1 robot healthy"
+    assert opamc("nightly", cell).out.startswith(headline)
+    add_night(logs, 5, "r3")
+    begin = ("nightly", "rebaseline", "r3", "--from", night(5), "--why", "x", "--cell", cell)
+    assert opamc(*begin).code == ExitCode.DONE
+    ended = opamc("nightly", cell)
+    assert "1 robot recording the baseline; 1 robot healthy" in ended.out
+    assert 'opamc_joint_state{robot="r3"' not in (cell.parent / "nightly/metrics.prom").read_text()
+
+
+def test_joints_that_could_not_be_judged_are_no_good_night(cell, logs, opamc):
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    unjudged = "UPDATE verdict SET state = 'insufficient-data' WHERE robot = 'r1' AND axis = 2"
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        db.execute(f"{unjudged} AND night = '{night(4)}'")
+        db.execute("INSERT INTO stale VALUES ('r1')")
+    first, second = (opamc("nightly", cell, "--quiet") for _ in range(2))
+    assert first.out.startswith(f"r1 axis 2: not judged since {night(4)}:")
+    assert (first.code, second.code, second.out) == (ExitCode.PARTIAL, ExitCode.PARTIAL, "")
+    assert "1 robot with a joint that was not judged: r1" in opamc("nightly", cell).out
+    # until the next night
+    add_night(logs, 5)
+    assert opamc("nightly", cell).code == ExitCode.DONE
 
 
 def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, opamc):

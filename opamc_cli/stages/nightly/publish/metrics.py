@@ -33,7 +33,11 @@ def _lines(summary: Summary) -> Iterator[str]:
     yield from _family(
         "opamc_joint_state", "In the last night, 0 healthy, 1 changed, 2 fault, 3 not judged."
     )
-    yield from (f"opamc_joint_state{of} {STATES.index(one.state)}" for of, one in joints)
+    yield from (
+        f"opamc_joint_state{of} {STATES.index(one.state)}"
+        for of, one in joints
+        if one.state in STATES  # its baseline may be recorded anew
+    )
     yield from _family("opamc_joint_health_index", "Of the last night; 0 healthy, larger is worse.")
     yield from (
         f"opamc_joint_health_index{of} {one.health_index:g}"
