@@ -114,6 +114,7 @@ def run(
             today = datetime.now(UTC).date()
             now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
             now += outcome.strays
+            now += [one for said in outcome.gathering.values() for one in said]
             now += left(history, loaded)
             untold += history.untold(now)
         morning = tell(summary, untold, outcome, loaded.out, cell)

@@ -20,7 +20,7 @@ OVER = {
     for rank, kind in enumerate(
         (
             *("ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
-            *("missing", "cleared"),
+            *("missing", "cleared", "gathering"),
         )
     )
 }

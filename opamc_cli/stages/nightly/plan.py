@@ -112,6 +112,8 @@ class RobotPlan:
     complete: Mapping[tuple[str, str, str], tuple[str, ...]]
     thinned: tuple[tuple[str, str], ...] = ()
     """Of baselines that lost recordings: what is gone, and a sentence."""
+    gathering: tuple[tuple[str, str], ...] = ()
+    """Of conditions without a baseline beside others that have one: first night, and a sentence."""
     waiting: bool = False
     """Whether there is more to do once these nights are judged and alarms are known."""
 
@@ -181,7 +183,8 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         nights.append(
             PlannedNight(robot, night, tuple(comparisons), broken, tuple(notes), key, why)
         )
-    plan = RobotPlan(tuple(nights), baselines.complete, baselines.said())
+    gathering = tuple(baselines.gathering())
+    plan = RobotPlan(tuple(nights), baselines.complete, baselines.said(), gathering)
     return _without_waiting(plan, now)
 
 
@@ -340,6 +343,32 @@ class _Baselines:
             "stays, new nights are judged by the recordings that are left"
         )
         return (*self._thinned.values(), *((name, text) for name in sorted(self._gone)))
+
+    def gathering(self) -> Iterator[tuple[str, str]]:
+        """Say of which conditions no night is judged yet, though the robot is by others.
+
+        Nights of which none is judged are no news: that is how a robot begins, and begins anew.
+        """
+        last = max(self._nights, default="")
+        since = max((begun for begun in self._now.begun if begun <= last), default="")
+        if not since and self._now.baseline.nights is None:
+            return
+        wanted = self._now.baseline.nights or NIGHTS_AGAIN
+        several = len({program for program, _ in self._series}) > 1
+        conditions = {(program, self._series[program, n][0]) for program, n in self._series}
+        keys = [(*one, since) for one in sorted(conditions)]
+        if not any(key in self.complete for key in keys):
+            return
+        for key in keys:
+            program, condition, _ = key
+            nights = [n for n in self._nights_there(key) if self._alarm_over(key, n) is None]
+            if nights and key not in self.complete:
+                of = f" of program {program!r}" if several else ""
+                yield (
+                    nights[0],
+                    f"nights{of} at {condition} are not judged, they have no baseline yet: "
+                    f"{len(nights)} of {wanted} gathered",
+                )
 
     def _gone_from(self, key: tuple[str, str, str], left: Sequence[str]) -> Iterator[Recording]:
         """Yield what nights of a baseline have lost; what was renamed is there."""

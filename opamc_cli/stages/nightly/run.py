@@ -90,6 +90,8 @@ class CellOutcome:
     """Sentences that say of what was asked for that there is no recording of it."""
     thinned: list[Event] = field(default_factory=list)
     """Baselines that have lost recordings."""
+    gathering: dict[str, list[Event]] = field(default_factory=dict)
+    """Conditions of which no night is judged yet, by robot."""
     strays: list[Event] = field(default_factory=list)
     """Recordings that lie in the place of a night and are called otherwise."""
     ended: str = ""
@@ -247,6 +249,9 @@ def _keep_baselines(
         _forget(history, past, robot, own, planned)
     said = [Event(night, robot, None, "thinned", text) for night, text in planned.thinned]
     outcome.thinned += [one for one in said if one not in outcome.thinned]
+    outcome.gathering[robot] = [
+        Event(night, robot, None, "gathering", text) for night, text in planned.gathering
+    ]
 
 
 def open_history(cell: CellConfig, *, read_only: bool = False) -> History:

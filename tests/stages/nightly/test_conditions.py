@@ -52,6 +52,9 @@ def test_nights_under_alarm_are_part_of_no_other_condition_s_baseline(cell, nigh
     for index in range(11):
         add(cell, nights, index)
         said[index] = opamc("nightly", cell, "--quiet").out
+    gathered = "r2 nights at 2048 Hz, 100 %, 2 kg are not judged, they have no baseline yet: "
+    assert f"{gathered}1 of 3 gathered\n" in said[3]
+    assert [index for index, text in said.items() if gathered in text] == [3]
     why = (
         f"r2 {night(6)}: the alarm of {RAISED} stands on axis 2: no night under it becomes part of "
         "a baseline, and that of 2048 Hz, 100 %, 2 kg is not complete"

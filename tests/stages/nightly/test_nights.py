@@ -348,7 +348,13 @@ def test_a_night_that_is_not_judged_is_said_when_quiet(cell, opamc):
     cell_logs.record(logs / "r1" / NIGHTS[3] / "cycle.parquet", 500, 3, program="another")
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.DONE  # the first night of another program's baseline
-    assert ended.out == f"the cell: no recording of any robot since {NIGHTS[3]}\n"
+    gathered = (
+        "r1 nights of program 'another' at 2048 Hz, 100 %, 0 kg are not judged, they have no "
+        "baseline yet: 1 of 3 gathered\n"
+    )
+    silent = f"the cell: no recording of any robot since {NIGHTS[3]}\n"
+    assert ended.out == silent + gathered
+    assert opamc("nightly", cell, "--quiet").out == ""  # once of each condition
     cell.write_text(cell.read_text().replace("nights: 3", f"from: {NIGHTS[0]}, to: {NIGHTS[2]}"))
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.PARTIAL
