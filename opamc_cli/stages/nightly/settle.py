@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from datetime import date, timedelta
 from typing import Any
 
 from opamc_cli.config.cell import CellConfig
@@ -19,6 +20,9 @@ from opamc_cli.storage.schemas import files
 
 OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
 """All that a night's folder holds."""
+
+REST_WEEKS = 4
+"""Weeks in a row after which a weekday without files, such as Sunday, is the robot's habit."""
 
 
 def settle_cell(
@@ -158,7 +162,8 @@ def _missing(
 ) -> Iterator[Event]:
     """Say which robots have no file of nights of which others have, and again while they lack.
 
-    A robot of which somebody has said that it is gone is not reminded of until it has files again.
+    A robot of which somebody has said that it is gone is not reminded of until it has files again;
+    nor is it said of weekdays on which it rests, as long as it has files again after them.
     """
     nights = sorted({night for rows in by_robot.values() for night in _recorded(rows)})
     for robot in sorted(robots | set(by_robot)):
@@ -168,17 +173,35 @@ def _missing(
         if not own:
             yield Event(nights[0] if nights else "", robot, None, "missing", "no file at all")
             continue
+        lacking = {night for night in nights if night > min(own)} - own
         gap: list[str] = []
         for night in [*(n for n in nights if n > min(own)), ""]:
-            if night and night not in own:
+            if night in lacking:
                 gap.append(night)
             elif gap:
                 span = gap[0] if len(gap) == 1 else f"{gap[0]} to {gap[-1]}"
                 text = f"no file of {span}; others have some"
+                weeks = min(_weeks_before(one, lacking, own) for one in gap)
+                if weeks == REST_WEEKS - 1:
+                    text += f", as in the {weeks} weeks before; this weekday is not said again"
                 for index in said_in(gap, [""] * len(gap), remind_after):
-                    if not gap[0] <= gone.get(robot, "") <= gap[index]:
+                    known = gap[0] <= gone.get(robot, "") <= gap[index]
+                    if not known and weeks < REST_WEEKS:
                         yield Event(gap[index], robot, None, "missing", text)
                 gap = []
+
+
+def _weeks_before(night: str, lacking: set[str], own: set[str]) -> int:
+    """Return for how many weeks in a row a robot has rested on a night's weekday until then.
+
+    Weeks in which it has no file at all are none of rest. At most `REST_WEEKS` are counted.
+    """
+    day = date.fromisoformat(night)
+    for n in range(REST_WEEKS):
+        week = [(day - timedelta(7 * n + k)).isoformat() for k in range(1, 8)]
+        if week[-1] not in lacking or own.isdisjoint(week):
+            return n
+    return REST_WEEKS
 
 
 def _recorded(rows: Sequence[NightRow]) -> Iterator[str]:

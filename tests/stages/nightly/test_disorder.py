@@ -5,7 +5,7 @@ import os
 import shutil
 import sqlite3
 from dataclasses import replace
-from datetime import date
+from datetime import date, timedelta
 
 import nightly_kills
 import numpy as np
@@ -17,6 +17,7 @@ from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly import run as stage
 from opamc_cli.stages.nightly.morning import silent
+from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.storage.history import History, NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
 from opamc_cli.storage.runs import Run, save_run
@@ -119,6 +120,38 @@ def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
         said = opamc("nightly", cell, "--quiet").out
         gone = f"r1, r4, r5 no file of {night(4)} to {night(index)}; others have some"
         assert (gone in said) == (index == 11)  # the alarm's remind_after: a week
+
+
+def missing(own, days=70):
+    """Return what is said of a robot with files of some days, beside one that has files of all."""
+
+    def nights(name, of):
+        first = date(2026, 3, 1)  # a Sunday
+        dates = [(first + timedelta(day)).isoformat() for day in of]
+        key = {"version": "1", "config": "", "baseline": ""}
+        return [
+            NightRow(name, one, json.dumps({**key, "files": [f"{name} {one}"]}), "done")
+            for one in dates
+        ]
+
+    rows = {"r1": nights("r1", own), "r2": nights("r2", range(days))}
+    return [(event.time, event.text) for event in _missing(rows, {"r1", "r2"}, {}, 7)]
+
+
+def test_the_weekday_on_which_a_robot_rests_is_not_said_for_ever():
+    rests = [day for day in range(1, 70) if day % 7]
+    said = missing(rests)
+    assert [time for time, _ in said] == [f"2026-03-{day:02d}" for day in (8, 15, 22, 29)]
+    habit = "others have some, as in the 3 weeks before; this weekday is not said again"
+    assert said[-1][1] == f"no file of 2026-03-29; {habit}"
+    # so with weekends, but not with what goes on after them, nor with another day
+    weekends = [day for day in range(1, 70) if day % 7 not in (0, 6)]
+    assert [time for time, _ in missing(weekends)] == [f"2026-03-{n:02d}" for n in (7, 14, 21, 28)]
+    assert len(missing([day for day in rests if day != 57])) == 5
+    assert len(missing([day for day in rests if day != 53])) == 5
+    # weeks without any file are no habit
+    back = [day for day in range(1, 70) if not 7 <= day < 42 and day != 49]
+    assert missing(back)[-1] == ("2026-04-19", "no file of 2026-04-19; others have some")
 
 
 def test_a_renamed_robot_is_reminded_of_until_somebody_says_that_it_is_gone(cell, logs, opamc):
