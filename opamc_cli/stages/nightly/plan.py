@@ -117,6 +117,14 @@ class RobotPlan:
     waiting: bool = False
     """Whether there is more to do once these nights are judged and alarms are known."""
 
+    @property
+    def several_conditions(self) -> bool:
+        """Whether the robot has nights of more than one program or condition."""
+        all_of = (
+            (one.program, one.condition) for night in self.nights for one in night.comparisons
+        )
+        return len(set(all_of)) > 1
+
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
     """Say what is to be done of each night of a robot.

@@ -167,7 +167,8 @@ def run(
     progress("looking for recordings")
     recordings = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     outcome.strays = _strays(recordings)
-    recordings = _own(recordings, _Past(cell, history))
+    past = _Past(cell, history)
+    recordings = _own(recordings, past)
     outcome.thinned += [
         Event(
             one.night,
@@ -183,19 +184,21 @@ def run(
     ]
     outcome.robots = tuple(sorted(recordings.by_robot))
     whole = wanted == Wanted()
-    _look_for_absent(cell, recordings, _Past(cell, history), wanted, outcome)
+    _look_for_absent(cell, recordings, past, wanted, outcome)
     tried: set[tuple[str, str, str]] = set()
     robots, n_before = outcome.robots, -1
     while True:
-        past = _Past(cell, history)
         # a round that found nothing to do has nothing to wait for
         known = {key[:2] for key in tried} if len(tried) > n_before else None
         n_before = len(tried)
         jobs_of: dict[tuple[str, str], PlannedNight] = {}
-        waiting = []
+        waiting, several = set(), set()
         for robot in robots:
             planned = _robot_plan(cell, source, past, recordings, robot, wanted, known)
-            waiting += [robot] if planned.waiting else []
+            if planned.waiting:
+                waiting.add(robot)
+            if planned.several_conditions:
+                several.add(robot)
             _keep_baselines(history, past, recordings.by_robot[robot], robot, planned, outcome)
             for night in planned.nights:
                 place = (robot, night.night, night.key)
@@ -225,9 +228,13 @@ def run(
                 watch(n_done, len(works))
         progress("alarms and pages")
         outcome.summary = settle_cell(cell, source, history, outcome.robots, whole=whole)
+        alarms = history.spans()
+        # an alarm that nights of one condition have raised or cleared may move another's baseline
+        waiting |= {one for one in several if alarms.get(one) != past.alarms.get(one)}
         if not waiting or outcome.ended:
             break
-        robots = tuple(waiting)
+        robots = tuple(sorted(waiting))
+        past = _Past(cell, history)
     shutil.rmtree(cell.out / WORK, ignore_errors=True)
     _drop_copies(cell.out / COPIES, [*outcome.planned.values()])
     return outcome
