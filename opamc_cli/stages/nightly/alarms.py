@@ -17,7 +17,7 @@ from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 from opamc_cli.decision.trend.chart import LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
-from opamc_cli.stages.nightly.baseline_name import condition_in
+from opamc_cli.stages.nightly.inputs.baseline_name import condition_in
 from opamc_cli.storage.history import (
     UNJUDGED,
     AlarmRow,

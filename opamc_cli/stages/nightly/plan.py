@@ -9,7 +9,7 @@ from itertools import combinations
 from opamc_cli import __version__
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.config.models import digest
-from opamc_cli.stages.nightly.baseline_name import baseline_name
+from opamc_cli.stages.nightly.inputs.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.storage.history import AlarmSpan, NightRow
 from opamc_cli.storage.logs import Facts
