@@ -1,5 +1,6 @@
 """Two joints' currents exchanged, told by their courses: where sizes are alike, no rule sees it."""
 
+import math
 from collections.abc import Collection, Mapping
 from itertools import combinations
 from typing import Any
@@ -12,13 +13,19 @@ from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.storage.schemas import files
 
 Courses = dict[int, dict[int, npt.NDArray[np.float64]]]
-"""Mean current in the parts of a motion, by axis and motion."""
+"""Mean current in the parts of a motion, by axis and motion; NaN where a part holds no number."""
 
 NEARER = 0.75
-"""Of its distance from its own baseline: that from the other's, where two are exchanged (0.66 in
-the samples, since motions are synchronised by the wrong reference). A fault takes a joint away from
-its own course, not both to each other's: 0.97 at least of 5000 pairs of two simulators' joints,
-healthy and at fault."""
+"""Of its distance from its own baseline and every third axis's: that from the other's, where two
+are exchanged (0.66 in the samples, since motions are synchronised by the wrong reference). A fault
+takes a joint away from its own course, not both to each other's: 0.97 at least of 5000 pairs of two
+simulators' joints, healthy and at fault."""
+
+FOLLOWED = 0.75
+"""Of the root mean square of the other's course: how far from it a joint that follows it may be."""
+
+FEWEST_PARTS = 0.5
+"""Of a motion's parts that hold numbers on both sides: less of a motion is not compared."""
 
 
 def exchanged_joints(
@@ -45,10 +52,9 @@ def exchanged_joints(
         if not bad & set(pair):
             continue
         # one night alone may have them exchanged
-        new = _courses(tables[1], min((targets[axis] for axis in pair if axis in targets), key=len))
-        ways = [(_away(new, one, known, other), _away(new, one, known, one))
-                for one, other in (pair, pair[::-1])]  # fmt: skip
-        if all(across <= NEARER * own for across, own in ways):
+        runs = min((targets[axis] for axis in pair if axis in targets), key=len)
+        alike = [_exchanged(_courses(tables[1], run), known, pair) for run in runs]
+        if sum(alike) > len(alike) / 2:
             why = (
                 f"The target's currents of axes {pair[0]} and {pair[1]} each follow the other's "
                 "course: are the two exchanged?"
@@ -57,25 +63,53 @@ def exchanged_joints(
     return found
 
 
-def _courses(table: pa.Table, runs: Collection[str] | None = None) -> Courses:
+def _exchanged(new: Courses, known: Courses, pair: tuple[int, int]) -> bool:
+    """Tell whether each of two axes follows the other's course, and no third one's as well."""
+    for one, other in (pair, pair[::-1]):
+        away = {axis: _away(new, one, known, axis) for axis in known}
+        across, own = away.pop(other), away[one]
+        # what is not known is not far: it makes no other course the nearer one
+        if math.isnan(across) or math.isnan(own):
+            return False
+        nearest = np.nanmin(list(away.values()))
+        if across > min(NEARER * nearest, FOLLOWED * _size(known[other])):
+            return False
+    return True
+
+
+def _courses(table: pa.Table, run: str | None = None) -> Courses:
     rows: dict[tuple[int, int], list[npt.NDArray[np.float64]]] = {}
     for row in table.select(["run", "axis", "motion", "current_a"]).to_pylist():
-        if row["motion"] >= 0 and (runs is None or row["run"] in runs):
+        if row["motion"] >= 0 and run in (None, row["run"]):
             course = np.array(row["current_a"], dtype=np.float64)
             rows.setdefault((row["axis"], row["motion"]), []).append(course)
     found: Courses = {}
     for (axis, motion), own in rows.items():
         if len({course.size for course in own}) == 1:
-            found.setdefault(axis, {})[motion] = np.mean(own, axis=0)
+            # a lost sample takes a part of its own cycle away, not of all
+            mean = np.ma.masked_invalid(own).mean(axis=0)
+            found.setdefault(axis, {})[motion] = np.ma.filled(mean, np.nan)
     return found
 
 
+def _size(courses: Mapping[int, npt.NDArray[np.float64]]) -> float:
+    """Return the root mean square of a joint's courses, motions alike."""
+    return _root_mean([course[np.isfinite(course)] for course in courses.values()])
+
+
 def _away(new: Courses, axis: int, known: Courses, other: int) -> float:
-    """Return the mean square by which an axis is away from one's baseline; infinite if unknown."""
-    pairs = [
-        (course, known[other][motion])
-        for motion, course in new.get(axis, {}).items()
-        if motion in known.get(other, {}) and known[other][motion].size == course.size
-    ]
-    squares = [float(np.mean((one - two) ** 2)) for one, two in pairs]
-    return float(np.sqrt(np.mean(squares))) if squares and np.isfinite(squares).all() else np.inf
+    """Return the root mean square by which an axis is away from one's baseline; NaN if unknown."""
+    differences = []
+    for motion, course in new.get(axis, {}).items():
+        their = known.get(other, {}).get(motion)
+        if their is not None and their.size == course.size:
+            difference = course - their
+            heard = np.isfinite(difference)
+            if np.mean(heard) >= FEWEST_PARTS:
+                differences.append(difference[heard])
+    return _root_mean(differences)
+
+
+def _root_mean(motions: Collection[npt.NDArray[np.float64]]) -> float:
+    squares = [float(np.mean(one**2)) for one in motions if one.size]
+    return math.sqrt(np.mean(squares)) if squares else math.nan
