@@ -35,6 +35,9 @@ REPEAT = (
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
+LEAST_SAID = 0.01
+"""Change of all of a current that is told: 0 % beside a place that fell to a seventh is absurd."""
+
 SMALLER_PART = "A smaller part of the change is {}."
 CHECK_FIRST = (
     "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
@@ -169,9 +172,11 @@ def _pattern_change(
         f"{np.mean(entry[side]):.3g}" if entry[side] else "unknown"
         for side in ("jsd_baseline", "jsd_target")
     )
+    effect = judgement.effects[PATTERNS]
+    changed = f", where their probabilities changed by {effect:.0%} (root mean square)"
+    changed *= not effect < LEAST_SAID
     return (
-        f"Patterns of the current differ most in motion {worst.motion}, where their probabilities "
-        f"changed by {judgement.effects[PATTERNS]:.0%} (root mean square): mean divergence "
+        f"Patterns of the current differ most in motion {worst.motion}{changed}: mean divergence "
         f"{target} against {baseline} of the baseline (order {worst.order}, delay {worst.tau} "
         "samples)."
     )
@@ -190,10 +195,15 @@ def _size_change(judgement: Judgement, bundle: Bundle) -> list[str]:
         else f"down to {change.size_ratio:.0%} of what they were"
     )
     return [
-        f"Fluctuations of the current changed in size by {judgement.effects['spectrum']:.0%} (root "
-        f"mean square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"Fluctuations of the current changed in size{_by(judgement.effects['spectrum'])} most "
+        f"clearly in motion {change.motion}, from {change.start:.0%} to "
         f"{change.stop:.0%} of its way, near {change.frequency_hz:.3g} Hz, where they are {how}."
     ]
+
+
+def _by(effect: float) -> str:
+    """Return by how much all of a current changed; nothing beside a change of one place alone."""
+    return f" by {effect:.0%} (root mean square)," if effect >= LEAST_SAID else ""
 
 
 def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
@@ -204,8 +214,8 @@ def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]
     if change is None or not math.isfinite(judgement.effects["profile"]):
         return []
     return [
-        f"The course of the current changed by {judgement.effects['profile']:.0%} (root mean "
-        f"square), most clearly in motion {change.motion}, from {change.start:.0%} to "
+        f"The course of the current changed{_by(judgement.effects['profile'])} most clearly in "
+        f"motion {change.motion}, from {change.start:.0%} to "
         f"{change.stop:.0%} of its way, by {change.change_a:+.3g} {unit}; its size over the "
         f"motion is {change.scale:.3g} times the baseline's."
     ]

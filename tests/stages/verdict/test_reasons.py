@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 
+import pytest
+
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.stages.verdict.reasons import reasons
 from opamc_cli.stages.verdict.verdict import Decided
@@ -63,3 +65,23 @@ def test_what_one_baseline_session_would_have_missed_is_said():
         least = f"{judged[axis].least_effect:.0%}"
         said[axis] = f"changed by less than {least} would not have been called changed" in text
     assert said == {1: True, 2: False}
+
+
+@pytest.mark.parametrize(
+    ("effect", "said"), [(0.0, "size most clearly"), (0.4, "size by 40% (root mean square), most")]
+)
+def test_no_share_is_told_of_a_current_that_changed_at_one_place_alone(effect, said):
+    """Changed by 0 %, where they are down to 14 %: absurd."""
+    bundles = {axis: known_fleet.bundle(axis, 6, 1, (), 0.0) for axis in (1, 2, 3, 4)}
+    one = judge(bundles)[3]
+    one = replace(one, effects={**one.effects, "spectrum": effect, "profile": effect})
+    entries = [
+        {
+            **{"motion": cell.motion, "order": cell.order, "tau": cell.tau},
+            **{"jsd_baseline": [0.02], "jsd_target": [0.03]},
+        }
+        for cell in bundles[3].cells
+    ]
+    text = " ".join(reasons(one, bundles[3], entries, {"baseline": [], "target": []}))
+    assert f"Fluctuations of the current changed in {said}" in text
+    assert "by 0%" not in text

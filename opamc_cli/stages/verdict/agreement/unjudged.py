@@ -16,6 +16,10 @@ from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 from opamc_cli.stages.verdict.evidence import session_names
 
+MUCH_SHORTER = 0.5
+"""Of the baseline's shortest recording: what lasts less may hold no whole cycle, and that is said
+before anything else."""
+
 
 @dataclass(frozen=True)
 class Side:
@@ -78,7 +82,7 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
     at_rest: dict[int, dict[str, InputError]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
-            lost = _lost(axis, side)
+            lost = _lost(axis, side, baseline)
             idle = _idle(axis, side)
             paths = {own.run: own.path for own in side.measured}
             n_lost.update(paths[run] for run in lost)
@@ -148,7 +152,7 @@ def _ended(why: str) -> str:
     return why if why.endswith("?") else f"{why}."
 
 
-def _lost(axis: int, side: Side) -> dict[str, str]:
+def _lost(axis: int, side: Side, baseline: Side) -> dict[str, str]:
     """Return, by run, what is wrong with an axis."""
     own = [f for f in side.findings if f.axis == axis]
     lost = {finding.run: finding.why for finding in own if not finding.at_rest}
@@ -161,7 +165,9 @@ def _lost(axis: int, side: Side) -> dict[str, str]:
         elif pc.max(rows["cycle"]).as_py() < 0:
             ratio = side.slowness.get(measured.run)
             lost[measured.run] = (
-                _unfitting(axis, rows) if ratio is None else of_another_speed(ratio)
+                _unfitting(axis, rows, _shortest(axis, baseline))
+                if ratio is None
+                else of_another_speed(ratio)
             )
     return lost
 
@@ -178,9 +184,28 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
     return idle
 
 
-def _unfitting(axis: int, rows: pa.Table) -> str:
+def _unfitting(axis: int, rows: pa.Table, usual: int) -> str:
     count = f"all {rows.num_rows} segments" if rows.num_rows > 1 else "the only segment"
+    unknown = f"{count} of axis {axis} fit no motion of the baseline's cycle"
+    lasts = _lasts(rows)
+    if lasts < MUCH_SHORTER * usual:
+        return (
+            f"the recording is much shorter than the baseline's: its motions of axis {axis} last "
+            f"{lasts / usual:.0%} as long as those of the shortest one, and {unknown}; record a "
+            "whole cycle"
+        )
     return (
-        f"{count} of axis {axis} fit no motion of the baseline's cycle: another program or speed, "
-        "another joint's channels, no cycle that repeats, or a fault that changes the motion itself"
+        f"{unknown}: another program or speed, another joint's channels, no cycle that repeats, or "
+        "a fault that changes the motion itself"
     )
+
+
+def _shortest(axis: int, side: Side) -> int:
+    """Return how many samples an axis's motions last in the shortest run of which any fits."""
+    tables = [side.rows(axis, own.run) for own in side.measured if own.axis == axis]
+    fitting = [rows for rows in tables if rows.num_rows and pc.max(rows["cycle"]).as_py() >= 0]
+    return min(map(_lasts, fitting), default=0)
+
+
+def _lasts(rows: pa.Table) -> int:
+    return int(pc.max(rows["stop"]).as_py() - pc.min(rows["start"]).as_py())
