@@ -1,6 +1,6 @@
 """All stages in a row: from two sets of runs to a verdict and a report."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -75,6 +75,7 @@ def run(
     progress: Steps = unshown,
     kept: KeptResults | None = None,
     figures_of_healthy: bool = True,
+    worded: Callable[[str], str] = str,
 ) -> DiagnoseOutcome:
     """Compare target runs with baseline runs, joint by joint.
 
@@ -97,6 +98,8 @@ def run(
     figures_of_healthy
         Whether joints that are healthy have their part in the report's figures, which take longer
         than the diagnosis of a short recording.
+    worded
+        How a note is put where recordings lie elsewhere than their user knows.
 
     Raises
     ------
@@ -105,7 +108,8 @@ def run(
     """
     with result(out, *FILES) as staged:
         outcome = _diagnose(
-            baseline, target, config, staged, models, jobs, progress, kept, figures_of_healthy
+            *(baseline, target, config, staged, models, jobs, progress, kept),
+            *(figures_of_healthy, worded),
         )
     return replace(
         outcome,
@@ -125,6 +129,7 @@ def _diagnose(
     progress: Steps,
     kept: KeptResults | None,
     figures_of_healthy: bool,
+    worded: Callable[[str], str],
 ) -> DiagnoseOutcome:
     _check_before(baseline, target)
     if config.joint.library:
@@ -186,7 +191,9 @@ def _diagnose(
     # what both sides give alike is said once
     every_note = tuple(
         dict.fromkeys(
-            (*left_out, *normal.notes, *other.notes, *scored.notes, *decided.notes(), *notes)
+            worded(note)
+            for said in (left_out, normal.notes, other.notes, scored.notes, decided.notes(), notes)
+            for note in said
         )
     )
     sources = (*sides.baseline.sources, *sides.target.sources)

@@ -1,6 +1,7 @@
 """Judges one robot's night: what workers of this machine and of a cluster call."""
 
 import math
+import re
 import shutil
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -91,6 +92,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
                 folder / "out",
                 kept=None if job.kept is None else KeptResults(job.kept),
                 figures_of_healthy=False,
+                worded=lambda note: _plain(note, folder),
             )
         temperatures = _temperatures(folder / "out" / "target" / files.PATTERNS)
         written = {
@@ -121,7 +123,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
         written,
         tuple(failures),
         tuple(of_baseline),
-        tuple(_plain(note, folder) for note in outcome.notes),
+        tuple(outcome.notes),
     )
 
 
@@ -177,7 +179,15 @@ def _log(ratio: float | None) -> float | None:
 
 
 def _plain(text: str, folder: Path) -> str:
-    """Take the folder of the work out of a sentence: it is gone, and has another name each time."""
+    """Take the folder of the work out of a sentence: it is gone, and has another name each time.
+
+    What is kept of a baseline was said in the work of another night, of another machine perhaps:
+    of a path as that night's, too, the recording's place alone is left.
+    """
     for role in ("baseline", "target"):
         text = text.replace(f"{folder / role}/", "").replace(f"{folder / 'out' / role}/", "")
-    return text.replace(f"{folder}/", "").replace(f"{folder.resolve()}/", "")
+    text = text.replace(f"{folder}/", "").replace(f"{folder.resolve()}/", "")
+    root = folder.parent.parent
+    known = "|".join(re.escape(str(one)) for one in (root, root.resolve()))
+    others = rf"\S*/{re.escape(root.name)}"
+    return re.sub(rf"(?:{known}|{others})/[^/]+/\d+/(?:out/)?(?:baseline|target)/", "", text)
