@@ -29,6 +29,11 @@ from opamc_cli.storage.sources import RunSource, current_unit
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
 
+AS_SURE = 2.0
+"""Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
+course and size: 15 degrees that those knew by 1e-10 left the spectrum at 0.1 or above, a cracked
+flexspline beside 8 degrees took it to 1e-110."""
+
 
 @dataclass(frozen=True)
 class VerdictOutcome:
@@ -283,13 +288,20 @@ def is_excused(judgement: Judgement, config: ScoreConfig) -> bool:
 def believed(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Mapping[str, Any] | None:
-    """Drop a harmless cause where the course, which is what it moves, is a healthy session's.
+    """Drop a harmless cause of what it does not move.
 
     Grease, payload and offsets act slowly: they do not excuse what the spectrum alone has found.
+    Nor does grease, where it did move the course, what the spectrum shows far more clearly.
     """
-    course_p = judgement.witnesses.get("profile", 0.0)
-    harmless = cause is not None and cause.get("harmless")
-    return None if harmless and course_p > config.false_alarm_rate else cause
+    if cause is None or not cause.get("harmless"):
+        return cause
+    heard = judgement.witnesses
+    course_p, spectrum_p = heard.get("profile", 0.0), heard.get("spectrum", 1.0)
+    if course_p > config.false_alarm_rate:
+        return None
+    slow_p = min(course_p, heard.get("amplitude", 1.0))
+    sharp = spectrum_p <= config.false_alarm_rate and spectrum_p < slow_p**AS_SURE
+    return None if sharp and cause.get("origin") == "environment" else cause
 
 
 def _with_cause(

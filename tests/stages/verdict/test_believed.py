@@ -7,13 +7,21 @@ import pytest
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.stages.verdict.verdict import believed
 
-GREASE = {"effect": "thermal_viscous", "harmless": True}
+GREASE = {"effect": "thermal_viscous", "harmless": True, "origin": "environment"}
+PAYLOAD = {"effect": "payload_change", "harmless": True, "origin": "load"}
+CRACK = {"spectrum": 4e-110, "profile": 3e-5, "amplitude": 7e-4}
+"""Of a flexspline, on a night 8 degrees warmer."""
 
 
 @pytest.mark.parametrize(
     ("witnesses", "cause", "kept"),
     [
-        ({"profile": 0.001, "spectrum": 1e-30}, GREASE, True),
+        ({"profile": 0.001, "spectrum": 0.2}, GREASE, True),
+        ({"profile": 1e-10, "amplitude": 1e-10, "spectrum": 1e-12}, GREASE, True),
+        ({"profile": 0.009, "spectrum": 0.02}, GREASE, True),
+        (CRACK, GREASE, False),
+        (CRACK, PAYLOAD, True),
+        (CRACK, {"effect": "coulomb", "harmless": False, "origin": "joint"}, True),
         ({"profile": 0.03, "spectrum": 1e-30}, GREASE, False),
         ({"profile": 0.03}, {"effect": "ripple", "harmless": False}, True),
         ({"patterns": 0.001}, GREASE, True),
