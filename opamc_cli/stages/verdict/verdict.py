@@ -31,8 +31,8 @@ MAIN_SHARE = 0.5
 
 AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
-course and size: 15 degrees that those knew by 1e-10 left the spectrum at 0.1 or above, a cracked
-flexspline beside 8 degrees took it to 1e-110."""
+course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
+cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
 
 
 @dataclass(frozen=True)
