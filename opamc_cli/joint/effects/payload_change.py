@@ -73,7 +73,7 @@ class PayloadChange(Effect):
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
-        held = "held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
+        held = "a payload held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
         return held.format(**parameters) if "gripped_s" in parameters else self.meaning
 
 
