@@ -52,6 +52,14 @@ ADVICE = (
 """Effects that are alike, and what tells them apart."""
 
 
+MEANINGS = {
+    "unnamed_response": "a current that goes with the acceleration, its answer or its cause; no "
+    "effect of the library has its form",
+}
+"""Of functions that say too much of themselves: filters of the measured acceleration hold whatever
+shakes the joint, too (a belt's tone was called a response)."""
+
+
 def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[str, Any]]:
     """Rows of fit.parquet, one per regressor."""
     rows = []
@@ -172,7 +180,7 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
         "effect": step.term.effect.name,
         "domain": step.term.effect.domain,
         "parameters": shown_parameters(step.term),
-        "interpretation": step.interpretation,
+        "interpretation": MEANINGS.get(step.term.effect.name, step.interpretation),
         "gain": step.trial.gain,
         "t_value": step.trial.t_value,
         "p_value": step.trial.p_value,

@@ -2,7 +2,8 @@
 
 import pytest
 
-from opamc_cli.stages.model.tables import ADVICE, separating_experiment
+from opamc_cli.joint.explain.saturated import unnamed_library
+from opamc_cli.stages.model.tables import ADVICE, MEANINGS, separating_experiment
 
 
 @pytest.mark.parametrize(
@@ -34,3 +35,14 @@ def test_any_two_of_a_group_have_an_advice_of_a_group(members, advice):
         for tie in members - {name}:
             given = separating_experiment(name, (tie,))
             assert given == next(text for group, text in ADVICE if {name, tie} <= group)
+
+
+def test_a_function_of_the_measured_acceleration_is_no_response_for_certain():
+    # what shakes the joint is in its acceleration, too: a belt's tone was called a response
+    said = MEANINGS[unnamed_library()["unnamed_response"].name]
+    assert "its answer or its cause; no effect of the library" in said
+
+
+@pytest.mark.parametrize("name", MEANINGS)
+def test_a_meaning_belongs_to_a_function_that_there_is(name):
+    assert name in unnamed_library()
