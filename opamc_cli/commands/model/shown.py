@@ -95,6 +95,8 @@ def _axes_beside(steps: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
     """Return all that a closed loop found on an axis, one object of loop.json's `axes`."""
+    from opamc_cli.stages.report.wording import STEP_COLUMNS
+
     before, after, ceiling = result["before"], result["after"], result["ceiling"]
     unit = result["unit"]
     shown: list[RenderableType] = [
@@ -116,7 +118,7 @@ def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
                 f"{step['rmse_before_a']:.4g}",
                 f"{step['rmse_after_a']:.4g}",
             )
-        shown.append(table)
+        shown += [table, STEP_COLUMNS]
     shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
     shown += [
         f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"

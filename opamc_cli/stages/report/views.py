@@ -117,6 +117,7 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
         "steps": [
             {**step, "effect_text": wording.effect_phrase(step)} for step in entry.get("steps", ())
         ],
+        "columns": f"{wording.STEP_COLUMNS.capitalize()}.",
         "experiments": wording.experiments(entry),
         "rejected": [wording.set_aside(item) for item in entry.get("rejected", ())],
         "untestable": [wording.set_aside(item) for item in entry.get("untestable", ())],

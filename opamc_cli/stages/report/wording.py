@@ -344,6 +344,14 @@ def experiments(entry: Mapping[str, Any]) -> list[str]:
     ]
 
 
+STEP_COLUMNS = (
+    "gain: what the effect takes off the squared error of data left out of the fit, beside all "
+    "that had a name when it was judged (a function without a name: beside the steps above it); "
+    "before, after: error of the data that were searched, step by step"
+)
+"""What stands in a table of steps."""
+
+
 def effect_phrase(step: Mapping[str, Any]) -> str:
     """Return a step's effect with its parameters."""
     return cause_phrase(

@@ -129,6 +129,7 @@ def test_the_verdict_comes_first_and_says_where_why_and_what_to_do(page: str) ->
         "order 5: mean divergence 0.31",
         "Divergence of every segment",
         "What the model of axis 3 lacked",
+        "Gain: what the effect takes off the squared error of data left out of the fit",
         "Provenance",
     ]
     places = [

@@ -8,9 +8,9 @@ import pytest
 from rich.console import Console, RenderableType
 
 from opamc_cli import __main__
-from opamc_cli.commands.model.shown import headline
+from opamc_cli.commands.model.shown import headline, loop_tables
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
-from opamc_cli.stages.report.wording import loop_phrase
+from opamc_cli.stages.report.wording import STEP_COLUMNS, loop_phrase
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -117,6 +117,20 @@ def test_an_error_far_above_the_noise_is_not_called_complete() -> None:
     entry["noise_a"] = 0.3
     assert headline(entry).startswith("Axis 2 lacks nothing that the data can show: error 0.69 A")
     assert loop_phrase(entry).startswith("nothing is missing")
+
+
+def test_a_table_of_steps_says_what_its_columns_are() -> None:
+    entry = {
+        "axis": 2, "unit": "A", "verdict": "closed", "ceiling": {"share": 0.9, "standard_error": 0.1}, "floor_a": 0.03,
+        "domain": None, "rejected": [], "untestable": [], "sealed": ["run:3"],
+        "before": {"rmse_a": 0.1, "r2": 0.5}, "after": {"rmse_a": 0.03, "r2": 0.9},
+    }  # fmt: skip
+    added = {
+        "effect": "unnamed_tone", "interpretation": "a line over time", "ties": [], "parameters": {}, "gain": 0.175, "fit_of_name": 0.0, "rmse_before_a": 0.1,
+        "rmse_after_a": 0.03, "separating_experiment": None,
+    }  # fmt: skip
+    assert STEP_COLUMNS in loop_tables(entry | {"steps": [added]})
+    assert STEP_COLUMNS not in loop_tables(entry | {"steps": []})
 
 
 @pytest.mark.usefixtures("undrawn")
