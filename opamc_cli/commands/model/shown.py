@@ -57,28 +57,32 @@ def _headline(result: Mapping[str, Any]) -> str:
                 what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
             words.append(f"{what} ({name})")
     words = list(dict.fromkeys(words))
-    from opamc_cli.stages.report.wording import ceiling_known, unexplained
+    from opamc_cli.stages.report import wording
 
     error = f"error {before} → {after} {unit}"
     fails = f"; {result['fails']}" if result.get("fails") else ""
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
-    if share is not None and ceiling_known(result):
+    if share is not None and wording.ceiling_known(result):
         reached = f"{share:.0%} of what can be explained"
     elif result.get("verdict") == "closed":
         reached = "what is left is noise"
     if words:
         return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}{fails}"
     if result.get("verdict") == "nothing-missing":
-        noise = result.get("noise_a")
+        noise, left = result.get("noise_a"), wording.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
-        if unexplained(result):
-            return (
-                f"Axis {axis} lacks nothing that is known, and is not explained either: error "
-                f"{before} {unit}{of_it}; check how its motion was logged, units and gear ratio, "
-                "or record more motion"
-            )
-        return f"Axis {axis} lacks nothing that the data can show: error {before} {unit}{of_it}"
+        if left is None:
+            said = f"Axis {axis} lacks nothing worth naming: error {before} {unit}{of_it}"
+            return f"{said}{fails}"
+        check = ""
+        if wording.beyond_noise(result, wording.FAR_ABOVE_NOISE) is not None:
+            check = "; check how its motion was logged, units and gear ratio, or record more motion"
+        return (
+            f"Axis {axis}: nothing of the library explains the {left:.2g} {unit} that are left "
+            f"beyond noise: error {before} {unit}{of_it}; the rest is slower noise, or something "
+            f"that no effect describes{check}{fails}"
+        )
     if "verdict" not in result or "steps" not in result:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")
@@ -95,15 +99,13 @@ def _axes_beside(steps: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
     """Return all that a closed loop found on an axis, one object of loop.json's `axes`."""
-    from opamc_cli.stages.report.wording import STEP_COLUMNS
+    from opamc_cli.stages.report import wording
 
-    before, after, ceiling = result["before"], result["after"], result["ceiling"]
-    unit = result["unit"]
+    before, after, unit = result["before"], result["after"], result["unit"]
     shown: list[RenderableType] = [
         headline(result),
-        f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; ceiling "
-        f"{ceiling['share']:.0%} ± {ceiling['standard_error']:.0%} of the mean square, floor "
-        f"{result['floor_a']:.4g} {unit}",
+        f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; "
+        f"{wording.ceiling_phrase(result)}",
     ]
     if result["steps"]:
         errors = (f"{unit} before", f"{unit} after")
@@ -118,7 +120,7 @@ def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
                 f"{step['rmse_before_a']:.4g}",
                 f"{step['rmse_after_a']:.4g}",
             )
-        shown += [table, STEP_COLUMNS]
+        shown += [table, wording.STEP_COLUMNS]
     shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
     shown += [
         f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"

@@ -51,7 +51,6 @@ ADVICE = (
 )
 """Effects that are alike, and what tells them apart."""
 
-
 MEANINGS = {
     "unnamed_response": "a current that goes with the acceleration, its answer or its cause; no "
     "effect of the library has its form",

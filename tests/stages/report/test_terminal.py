@@ -10,7 +10,7 @@ from rich.console import Console, RenderableType
 from opamc_cli import __main__
 from opamc_cli.commands.model.shown import headline, loop_tables
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
-from opamc_cli.stages.report.wording import STEP_COLUMNS, loop_phrase
+from opamc_cli.stages.report.wording import STEP_COLUMNS, ceiling_phrase, loop_phrase, remains
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -107,26 +107,76 @@ def test_joints_that_load_another_are_told_once() -> None:
     assert alone.startswith("Axis 1 lacks torque from the motion of axis 2 (coupling): error")
 
 
-def test_an_error_far_above_the_noise_is_not_called_complete() -> None:
-    entry = {
-        "axis": 2, "unit": "A", "before": {"rmse_a": 0.69}, "after": {"rmse_a": 0.69},
-        "steps": [], "verdict": "nothing-missing", "noise_a": 0.06,
+def left_alone(error: float, noise: float) -> dict[str, Any]:
+    return {
+        "axis": 2, "unit": "A", "before": {"rmse_a": error}, "after": {"rmse_a": error},
+        "steps": [], "verdict": "nothing-missing", "noise_a": noise,
     }  # fmt: skip
-    assert "is not explained either: error 0.69 A, of which 0.06 A is noise" in headline(entry)
-    assert "not explained" in loop_phrase(entry)
-    entry["noise_a"] = 0.3
-    assert headline(entry).startswith("Axis 2 lacks nothing that the data can show: error 0.69 A")
-    assert loop_phrase(entry).startswith("nothing is missing")
+
+
+def test_what_is_left_beyond_the_noise_is_said_first() -> None:
+    entry = left_alone(0.05181, 0.0292)
+    assert headline(entry) == (
+        "Axis 2: nothing of the library explains the 0.043 A that are left beyond noise: "
+        "error 0.05181 A, of which 0.029 A is noise between samples; the rest is slower noise, or "
+        "something that no effect describes"
+    )
+    assert "neither explained nor noise" in loop_phrase(entry)
+    assert "what could be explained" not in remains(entry | {"explained_share": 1.0})
+    far = left_alone(0.69, 0.06)
+    assert headline(far).endswith("; check how its motion was logged, units and gear ratio, "
+                                  "or record more motion")  # fmt: skip
+
+
+@pytest.mark.parametrize("error", [0.0204, 0.0216, 0.028])
+def test_an_error_that_is_mostly_noise_lacks_nothing_worth_naming(error: float) -> None:
+    entry = left_alone(error, 0.02)
+    assert headline(entry).startswith(f"Axis 2 lacks nothing worth naming: error {error:.4g} A")
+    assert loop_phrase(entry) == "nothing worth naming is missing"
+
+
+def step(effect: str, interpretation: str) -> dict[str, Any]:
+    return {"effect": effect, "interpretation": interpretation}
+
+
+TONE = step("unnamed_tone", "a line over time")
+
+
+@pytest.mark.parametrize(
+    ("share", "error", "steps", "known"),
+    [
+        (0.95, 0.07, [TONE], True),
+        (0.0, 0.0, [], True),
+        (0.03, 0.02, [], True),
+        (0.0, 2.77, [], False),
+        (0.0, 2.77, [TONE], False),
+        (0.0, 0.0, [TONE], False),
+        (0.97, 0.58, [TONE], False),
+    ],
+)
+def test_a_ceiling_that_is_not_known_is_said_to_be_none(
+    share: float, error: float, steps: list[dict[str, Any]], known: bool
+) -> None:
+    entry = {
+        "ceiling": {"share": share, "standard_error": error},
+        "steps": steps, "floor_a": 0.016, "unit": "A",
+    }  # fmt: skip
+    told = ceiling_phrase(entry)
+    assert told == (
+        f"ceiling {share:.0%} ± {error:.0%} of the mean square, floor 0.016 A"
+        if known
+        else "ceiling not known"
+    )
 
 
 def test_a_table_of_steps_says_what_its_columns_are() -> None:
-    entry = {
-        "axis": 2, "unit": "A", "verdict": "closed", "ceiling": {"share": 0.9, "standard_error": 0.1}, "floor_a": 0.03,
+    entry = left_alone(0.1, 0.02) | {
+        "verdict": "closed", "ceiling": {"share": 0.9, "standard_error": 0.1}, "floor_a": 0.03,
         "domain": None, "rejected": [], "untestable": [], "sealed": ["run:3"],
         "before": {"rmse_a": 0.1, "r2": 0.5}, "after": {"rmse_a": 0.03, "r2": 0.9},
     }  # fmt: skip
-    added = {
-        "effect": "unnamed_tone", "interpretation": "a line over time", "ties": [], "parameters": {}, "gain": 0.175, "fit_of_name": 0.0, "rmse_before_a": 0.1,
+    added = TONE | {
+        "ties": [], "parameters": {}, "gain": 0.175, "fit_of_name": 0.0, "rmse_before_a": 0.1,
         "rmse_after_a": 0.03, "separating_experiment": None,
     }  # fmt: skip
     assert STEP_COLUMNS in loop_tables(entry | {"steps": [added]})
