@@ -45,22 +45,22 @@ def _headline(result: Mapping[str, Any]) -> str:
         f"{value:.4g}" if (value := result.get(side, {}).get("rmse_a")) is not None else "?"
         for side in ("before", "after")
     )
-    words, curves, axes = [], [], _axes_beside(steps)
+    words, axes = [], _axes_beside(steps)
     for step in steps:
         effect, meaning = step.get("effect", "unnamed"), step.get("interpretation", "")
         if effect.startswith("unnamed"):
-            curves.append(meaning.split(";")[0])
-        else:
-            name = effect + (", approximately" if step.get("approximate") else "")
-            what = meaning.split(":")[0].split(" (")[0]
-            if effect == "coupling" and len(axes) > 1:
-                what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
-            words.append(f"{what} ({name})")
+            continue
+        name = effect + (", approximately" if step.get("approximate") else "")
+        what = meaning.split(":")[0].split(" (")[0]
+        if effect == "coupling" and len(axes) > 1:
+            what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
+        words.append(f"{what} ({name})")
     words = list(dict.fromkeys(words))
     from opamc_cli.stages.report import wording
 
     error = f"error {before} → {after} {unit}"
     fails = f"; {result['fails']}" if result.get("fails") else ""
+    functions = wording.without_name(steps)
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
     if share is not None and wording.ceiling_known(result):
@@ -68,7 +68,8 @@ def _headline(result: Mapping[str, Any]) -> str:
     elif result.get("verdict") == "closed":
         reached = "what is left is noise"
     if words:
-        return f"Axis {axis} lacks {'; '.join(words)}: {error}, {reached}{fails}"
+        beside = f" and, without a name, {functions}" if functions else ""
+        return f"Axis {axis} lacks {'; '.join(words)}{beside}: {error}, {reached}{fails}"
     if result.get("verdict") == "nothing-missing":
         noise, left = result.get("noise_a"), wording.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
@@ -86,7 +87,7 @@ def _headline(result: Mapping[str, Any]) -> str:
     if "verdict" not in result or "steps" not in result:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")
-    what = "; ".join(curves) or "something" + (f" in the {domain} domain" if domain else "")
+    what = functions or "something" + (f" in the {domain} domain" if domain else "")
     return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}{fails}"
 
 

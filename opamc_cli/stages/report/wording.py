@@ -316,6 +316,24 @@ def beyond_noise(entry: Mapping[str, Any], times: float = MORE_THAN_NOISE) -> fl
     return math.sqrt(max(left**2 - noise**2, 0.0)) if left > times * noise else None
 
 
+def without_name(steps: Sequence[Mapping[str, Any]]) -> str:
+    """Return the functions without a name among a loop's steps, in few words; "" if none is."""
+    said = [
+        str(step.get("interpretation") or "").split(";")[0].split(":")[0]
+        for step in steps
+        if str(step.get("effect")).startswith("unnamed")
+    ]
+    of = [told.removeprefix(FUNCTION) for told in dict.fromkeys(said) if told.startswith(FUNCTION)]
+    rest = [told for told in dict.fromkeys(said) if told and not told.startswith(FUNCTION)]
+    functions = (
+        f"functions of {', of '.join(of)}" if len(of) > 1 else "".join(FUNCTION + x for x in of)
+    )
+    return ", ".join(part for part in (functions, *rest) if part)
+
+
+FUNCTION = "a function of "
+
+
 def loop_phrase(entry: Mapping[str, Any]) -> str:
     """Return the loop's verdict on one joint in plain words."""
     if beyond_noise(entry) is not None:

@@ -139,7 +139,30 @@ def step(effect: str, interpretation: str) -> dict[str, Any]:
     return {"effect": effect, "interpretation": interpretation}
 
 
+SPEED = step("unnamed_speed", "a function of speed; no effect of the library has its form")
+LOAD = step("unnamed_load", "a function of load; no effect of the library has its form")
 TONE = step("unnamed_tone", "a line over time")
+PRESLIDING = step("unnamed_presliding", "presliding: friction builds up over a short way")
+
+
+@pytest.mark.parametrize(
+    ("steps", "told"),
+    [
+        ([SPEED], "a function of speed"),
+        ([TONE, PRESLIDING], "a line over time, presliding"),
+        ([SPEED, TONE, LOAD, SPEED], "functions of speed, of load, a line over time"),
+    ],
+)
+def test_the_first_line_names_functions_without_a_name(
+    steps: list[dict[str, Any]], told: str
+) -> None:
+    entry = left_alone(0.1, 0.02) | {"verdict": "closed", "after": {"rmse_a": 0.03}}
+    ripple = step("ripple", "kinematic error: look")
+    named = headline(entry | {"steps": [ripple, *steps]})
+    assert named.startswith(f"Axis 2 lacks kinematic error (ripple) and, without a name, {told}: ")
+    alone = headline(entry | {"steps": steps, "verdict": "not-in-library"})
+    assert alone.startswith(f"Axis 2 lacks {told}, which no effect of the library describes: ")
+    assert "without a name" not in headline(entry | {"steps": [ripple]})
 
 
 @pytest.mark.parametrize(
