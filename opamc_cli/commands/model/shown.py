@@ -59,7 +59,9 @@ def _headline(result: Mapping[str, Any]) -> str:
     from opamc_cli.stages.report import wording
 
     error = f"error {before} → {after} {unit}"
-    fails = f"; {result['fails']}" if result.get("fails") else ""
+    fails = "".join(
+        f"; {why}" for why in (result.get("fails"), wording.sealed_apart(result)) if why
+    )
     functions = wording.without_name(steps)
     share = result.get("explained_share")
     reached = "how much can be explained is not known"

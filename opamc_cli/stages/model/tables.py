@@ -210,7 +210,11 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "sealed": [grouping.names[g] for g in grouping.sealed],
         "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
         "steps": [step_entry(step, loop.steps, laid.dataset.fine.track) for step in loop.steps],
-        "after": {"rmse_a": loop.rmse_after_a, "r2": loop.r2_after},
+        "after": {
+            "rmse_a": loop.rmse_after_a,
+            "r2": loop.r2_after,
+            "searched_rmse_a": loop.after.rmse(sealed=False),
+        },
         "floor_a": loop.floor_a,
         "noise_a": loop.noise_a,
         "explained_share": loop.explained_share,

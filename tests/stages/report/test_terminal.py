@@ -165,6 +165,18 @@ def test_the_first_line_names_functions_without_a_name(
     assert "without a name" not in headline(entry | {"steps": [ripple]})
 
 
+@pytest.mark.parametrize(("sealed", "said"), [(0.0639, False), (0.107, True)])
+def test_sealed_data_that_are_explained_far_worse_are_told(sealed: float, said: bool) -> None:
+    entry = left_alone(0.17, 0.05) | {"verdict": "not-in-library", "steps": [SPEED]}
+    entry["after"] = {"rmse_a": sealed, "searched_rmse_a": 0.059}
+    told = "the sealed data are left with 1.8 times the error of those searched: something changes"
+    assert (told in headline(entry)) is said
+    assert (told in remains(entry)) is said
+    # it is said once
+    fails = headline(entry | {"fails": "the sealed part's error is 2.1 times that of the rest"})
+    assert fails.count("the sealed") == 1
+
+
 @pytest.mark.parametrize(
     ("share", "error", "steps", "known"),
     [
