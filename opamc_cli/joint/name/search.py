@@ -1,6 +1,6 @@
 """Follow several chains of effects side by side, and keep the one that is worth its price."""
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Callable, Collection, Hashable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -116,15 +116,6 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         return pool.asked[asked]
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms if not term.effect.several}
-    found: dict[tuple[str, float], Candidate] = {}
-
-    def note(candidate: Candidate) -> None:
-        # Two lines of one kind are two candidates.
-        key = candidate.term.effect.name, line_of(candidate.term, dataset.fine.track)
-        known = found.get(key)
-        if known is None or candidate.score < known.score:
-            found[key] = candidate
-
     slow = Beside(chain, fine=False)
     free = [effect for effect in pool.library.values() if effect.name not in present]
     following = [
@@ -136,23 +127,24 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         for term in guessed(effect, dataset)
     ]
     names = {effect.name for effect in free}
-    for candidate in slow.candidates((*pool.slow, *batches_of(dataset, following, fine=False))):
-        if candidate.term.effect.name in names:
-            note(candidate)
+    guesses = slow.candidates((*pool.slow, *batches_of(dataset, following, fine=False)))
+    found = [candidate for candidate in guesses if candidate.term.effect.name in names]
     among_fast = any(term.effect.fast for term in chain.fit.terms)
     fast = Beside(chain, fine=True) if among_fast or any(one.fast for one in free) else slow
     if among_fast:
         # What a drive makes of a ripple takes up friction, too: beside it as it was fitted without
-        # a slow effect, that may show as little.
-        again = [candidate.term for candidate in found.values()]
-        for candidate in fast.candidates(batches_of(dataset, again, fine=True)):
-            note(candidate)
+        # a slow effect, that may show as little, or best in a form that it has not.
+        forms = _best_of_each(found, lambda term: (term.effect.name, term.keep))
+        again = [candidate.term for candidate in forms]
+        found += fast.candidates(batches_of(dataset, again, fine=True))
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
     for effect in free:
         if effect.fast and not effect.untestable(dataset.fine.track):
             for parameters in effect.guesses(dataset.fine.track, residual):
-                note(best_form(dataset, fast, Term(effect, parameters)))
-    ordered = sorted(found.values(), key=lambda candidate: candidate.score)
+                found.append(best_form(dataset, fast, Term(effect, parameters)))
+    # Two lines of one kind are two candidates.
+    track = dataset.fine.track
+    ordered = _best_of_each(found, lambda term: (term.effect.name, line_of(term, track)))
     least = np.inf if every else 0.0
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
@@ -165,6 +157,14 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     chain.fit.forget()
     pool.asked[asked] = sorted(better, key=lambda candidate: candidate.score)
     return pool.asked[asked]
+
+
+def _best_of_each(found: list[Candidate], kind: Callable[[Term], Hashable]) -> list[Candidate]:
+    """Return the best candidate of each kind, best first."""
+    best: dict[Hashable, Candidate] = {}
+    for candidate in sorted(found, key=lambda one: one.score):
+        best.setdefault(kind(candidate.term), candidate)
+    return list(best.values())
 
 
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:

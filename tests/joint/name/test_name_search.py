@@ -120,7 +120,7 @@ def test_slow_noise_is_no_payload():
     assert "slow noise" in why_not(chain, found.terms[0])
 
 
-def moving(waves, load=lambda q, t: np.sin(q), quantum=0.0):
+def moving(waves, load=lambda q, t: np.sin(q), quantum=0.0, **logged):
     """A joint whose motion is a sum of waves (amplitude in rad, times in 10 s, phase)."""
     t, w = np.arange(6000) / 100.0, 2 * np.pi / 10
     q = sum(a * np.sin(k * w * t + p) for a, k, p in waves)
@@ -129,7 +129,8 @@ def moving(waves, load=lambda q, t: np.sin(q), quantum=0.0):
     current = 0.4 * acceleration + load(q, t) + 0.5 * np.sign(v) + 0.3 * v
     current += np.random.default_rng(1).normal(0, 0.005, t.size)
     seen = np.round(q / quantum) * quantum if quantum else q
-    return chain_of(plain_fit(Recording("run", 100.0, current_a=current, position_rad=seen)), 0)
+    recording = Recording("run", 100.0, current_a=current, position_rad=seen, **logged)
+    return chain_of(plain_fit(recording), 0)
 
 
 def test_a_payload_over_a_stroke_too_short_to_change_its_torque_is_no_slow_noise():
@@ -225,3 +226,26 @@ def test_a_slow_effect_is_judged_beside_a_ripple_that_is_fitted_with_it():
     assert found.gain > 0.98
     # As it was fitted without the friction, it leaves little to explain.
     assert Beside(chain, fine=False).candidate(found.term).gain < 0.6
+
+
+def test_every_form_of_a_slow_effect_is_judged_beside_what_is_fitted_with_it():
+    """Another joint's torques hold a constant: the slope alone was asked, and an offset added."""
+    time_s = np.arange(6000) / 100.0
+    other = 0.2 * np.sin(0.37 * time_s) + 0.1 * np.sin(1.73 * time_s)
+
+    def load(q, t):
+        v = np.gradient(q, t)
+        return np.sin(q) + 0.3 * np.cos(q + other) + 0.1 * (v > 0) * (0.3 + v)
+
+    waves = (0.7, 1, 0.3), (0.3, 2.37, 1.0), (0.1, 5.3, 2.0)
+    rigid = moving(waves, load, others_rad={2: other})
+    chain = extended(rigid, Term(LIBRARY["coupling"], {"axis": 2.0}))
+    pool = pool_of(chain, "asymmetric_friction", "offset")
+    asked = [Term(LIBRARY["asymmetric_friction"], *form) for form in (({},), ({"dry": 0.0}, (1,)))]
+    (whole, slope), fitted = (
+        [Beside(chain, fine).candidate(term) for term in asked] for fine in (False, True)
+    )
+    assert slope.score < whole.score
+    assert fitted[0].score < fitted[1].score
+    assert candidates(chain, pool)[0].term.keep is None
+    assert names_of(beam(chain, pool)) == ["coupling", "asymmetric_friction"]
