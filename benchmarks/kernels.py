@@ -28,6 +28,7 @@ import ssqueezepy
 from opamc_cli.signal.motion.motion_signal import MotionBand, MotionStream, join_frames
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.signal.transform.analytic import clarke, temporal_fine_structure
+from opamc_cli.signal.transform.products import products_over
 
 FS_HZ = 2048.0
 STEP = 16
@@ -125,6 +126,28 @@ def motion_rows(n: int, n_slow: int, repetitions: int) -> list[Row]:
     ]
 
 
+def product_rows(repetitions: int) -> list[Row]:
+    rng, count, samples = np.random.default_rng(0), 36, 1000
+    edges = np.arange(0, (count + 1) * samples, samples)
+    ranges = np.stack([edges[:-1], edges[1:]], axis=1)
+    rows = []
+    for (k, m), target in {(1, 1): 3, (8, 8): 1.5, (70, 8): 1}.items():
+        left, right = (
+            np.asfortranarray(rng.standard_normal((count * samples, one))) for one in (k, m)
+        )
+
+        def by_blas(left: np.ndarray = left, right: np.ndarray = right) -> Any:
+            return [left[start:stop].T @ right[start:stop] for start, stop in ranges]
+
+        def by_loops(left: np.ndarray = left, right: np.ndarray = right) -> Any:
+            return products_over(ranges, left, right)
+
+        faster = best_time(by_blas, repetitions) / best_time(by_loops, repetitions)
+        what = f"products of {k} by {m} signals over ranges, beside BLAS"
+        rows.append(Row(what, faster, "x faster", target, False))
+    return rows
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="shorter arrays")
@@ -133,6 +156,7 @@ def main() -> None:
     print(f"python {platform.python_version()}, " + ", ".join(f"{t} {version(t)}" for t in tools))
     rows = ordinal_rows(5_000_000 if quick else 50_000_000, 200_000, 30 if quick else 10)
     rows += motion_rows(2_000_000 if quick else 10_000_000, 60_000 if quick else 200_000, 8)
+    rows += product_rows(30)
     print("| what | reached | target | |\n|---|---|---|---|")
     print(*rows, sep="\n")
 

@@ -122,7 +122,7 @@ class Effect:
         """Regressors at some samples, shape (rows, m)."""
         if type(self).columns is Effect.columns:
             raise NotImplementedError
-        return np.asarray(self.columns(track, parameters)[rows])
+        return np.asarray(np.take(self.columns(track, parameters).T, rows, axis=-1).T)
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

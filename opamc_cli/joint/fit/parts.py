@@ -8,6 +8,7 @@ import numpy as np
 
 from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, ranges
+from opamc_cli.signal.transform.products import products_over
 
 FEWEST_UNITS = 8
 """Units that are left out in turn: fewer groups than that are halved until they suffice."""
@@ -38,7 +39,10 @@ class Parts:
 
     def taken(self, block: Floats) -> Floats:
         """Return the parts' rows of a block."""
-        return block[: self.rows.size] if block.shape[0] < self.size else block[self.rows]
+        if block.shape[0] < self.size:
+            return block[: self.rows.size]
+        # Each regressor stays contiguous.
+        return np.asarray(np.take(block.T, self.rows, axis=-1).T)
 
     @property
     def units(self) -> int:
@@ -97,14 +101,9 @@ class Parts:
         return self.products_of([left], right)[0]
 
     def products_of(self, lefts: Sequence[Floats], right: Floats) -> list[Floats]:
-        """Likewise for several, while the processor's cache holds a part of the right one."""
-        count, width = len(self.slices), right.shape[1]
-        sums = [np.empty((count, left.shape[1], width)) for left in lefts]
-        for i, (start, stop) in enumerate(self.slices):
-            part = right[start:stop]
-            for left, found in zip(lefts, sums, strict=True):
-                found[i] = left[start:stop].T @ part
-        return sums
+        """Likewise for several."""
+        edges = np.array(self.slices, dtype=np.int64).reshape(-1, 2)
+        return [products_over(edges, left, right) for left in lefts]
 
 
 def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
