@@ -196,7 +196,10 @@ def _opened(
         rmse_after = rmse_named
     added = {one.term.effect.name for one in [step.trial for step in steps] + refused}
     # What is above the noise may all be there to explain, where functions tell nothing for certain.
-    noise_a = measurement_noise(after.residual_a[after.dataset.sharp.fit])
+    final = after.residual_a[after.dataset.sharp.fit]
+    # A line near half the rate is none: in every second sample it hardly changes.
+    halves = max(measurement_noise(final[start::2]) for start in (0, 1))
+    noise_a = min(measurement_noise(final), halves)
     reach = found.share * rmse_before**2 if found.certain else rmse_before**2 - noise_a**2
     at_noise = noise_a**2 >= EXACT * rmse_named**2
     reached = 1.0 if at_noise or reach <= 0 else (rmse_before**2 - rmse_named**2) / reach

@@ -54,6 +54,16 @@ def test_nothing_is_added_where_nothing_is_missing(motion):
     assert loop.noise_a == pytest.approx(0.02, rel=0.1)
 
 
+@pytest.mark.parametrize("share", [0.44, 0.49])
+def test_a_line_near_half_the_sampling_rate_is_no_noise(share):
+    # It was all of the noise, and twice as much: what is left was said to be noise.
+    recording = joint_of("cyclic", None)
+    samples = np.arange(recording.current_a.size)
+    line = 0.1 * np.sqrt(2) * np.cos(2 * np.pi * share * samples)
+    loop = close(replace(recording, current_a=recording.current_a + line))
+    assert loop.noise_a == pytest.approx(0.02, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("seed", "quantum"), [(4, 1e-5), *(long(*case) for case in [(9, None), (32, 1e-4), (53, 5e-4)])]
 )
