@@ -265,10 +265,15 @@ def shared_reasons(entries: Sequence[Mapping[str, Any]]) -> dict[str, list[int]]
     return {reason: found for reason, found in axes.items() if len(found) > 1}
 
 
+LEAST_CEILING = 0.02
+"""Share of the mean square below which the verdict takes a ceiling for none, and words do."""
+
+
 def ceiling_known(entry: Mapping[str, Any]) -> bool:
     """Return whether functions without a name tell how much of a joint can be explained."""
     ceiling = entry.get("ceiling") or {}
-    return float(ceiling.get("share", 0.0)) > 2 * float(ceiling.get("standard_error", 0.0))
+    error = float(ceiling.get("standard_error", 0.0))
+    return float(ceiling.get("share", 0.0)) > max(2 * error, LEAST_CEILING)
 
 
 def ceiling_phrase(entry: Mapping[str, Any]) -> str:

@@ -10,7 +10,15 @@ from rich.console import Console, RenderableType
 from opamc_cli import __main__
 from opamc_cli.commands.model.shown import headline, loop_tables
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
-from opamc_cli.stages.report.wording import STEP_COLUMNS, ceiling_phrase, loop_phrase, remains
+from opamc_cli.joint.explain.saturated import Ceiling
+from opamc_cli.joint.name.chain import PRICE
+from opamc_cli.stages.report.wording import (
+    LEAST_CEILING,
+    STEP_COLUMNS,
+    ceiling_phrase,
+    loop_phrase,
+    remains,
+)
 
 
 def shown(item: RenderableType, width: int = 120) -> str:
@@ -216,6 +224,26 @@ def test_a_table_of_steps_says_what_its_columns_are() -> None:
     }  # fmt: skip
     assert STEP_COLUMNS in loop_tables(entry | {"steps": [added]})
     assert STEP_COLUMNS not in loop_tables(entry | {"steps": []})
+
+
+@pytest.mark.parametrize(("share", "error", "known"), [(0.03, 0.01, True), (0.03, 0.02, False),
+                                                       (0.015, 0.001, False)])  # fmt: skip
+def test_words_know_a_ceiling_where_the_verdict_does(
+    share: float, error: float, known: bool
+) -> None:
+    assert Ceiling(share, error).certain == known
+    entry = {
+        "axis": 2, "unit": "A", "before": {"rmse_a": 0.2}, "after": {"rmse_a": 0.1},
+        "steps": [{"effect": "ripple", "interpretation": "kinematic error (order 2): look"}],
+        "ceiling": {"share": share, "standard_error": error}, "explained_share": 1.0,
+        "verdict": "closed",
+    }  # fmt: skip
+    assert ("100% of what can be explained" in headline(entry)) == known
+    assert ("what is left is noise" in headline(entry)) != known
+
+
+def test_words_take_the_verdict_s_limit_of_a_ceiling() -> None:
+    assert LEAST_CEILING == PRICE
 
 
 @pytest.mark.usefixtures("undrawn")
