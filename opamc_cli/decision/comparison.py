@@ -44,6 +44,12 @@ Patterns are not linear in what moves them: of 200 healthy nights four standard 
 colder than the others 55 alarm without it, 22 with it. Spectra and courses need none.
 """
 
+FOREIGN_CONDITIONS = 1.0
+"""Spreads by which every distance beyond may lie further out for each e-fold by which the siblings
+lie further along than healthy sessions do: joints bend by different amounts. In a hall that warms
+by 14 and cools by 10 degrees (docs/decision.md) 4 % of healthy joint-nights are called changed
+without it, 1.1, 0.2, 0 and 0 % with 0.25, 0.5, 1 and 2; a joint's own fault does not move it."""
+
 MAD_EFFICIENCY = 0.37
 """Share of the values that a median absolute deviation is worth (Huber, 1981)."""
 
@@ -131,11 +137,14 @@ def compare_sessions(
         shifts[voice] = _shifts(own, voice)
     scales = scales_of(joints.values())
     exchange = Exchange(permutations, seed)
+    unusual = {axis: joint.unusual() for axis, joint in joints.items()}
     found = {}
     for axis, joint in joints.items():
         own_shifts = {voice: shifts[voice][axis] for voice in joint.voices}
+        foreign = FOREIGN_CONDITIONS * of_siblings(unusual, axis)
         taken_off = {
             voice: common_log_ratio(shifts[voice], axis, largest=voice[1] == "score")
+            + (foreign * own_shifts[voice].spread.scale if voice[1] == "orthogonal" else 0.0)
             for voice in joint.voices
         }
         tails = joint.tails(own_shifts, {})
@@ -154,7 +163,7 @@ def compare_sessions(
                 name: joint.combined({v: p for v, p in tails.items() if v[0] == name})
                 for name in evidence[axis]
             },
-            unusual_log_ratio=joint.unusual(),
+            unusual_log_ratio=unusual[axis],
         )
     return found
 
@@ -184,10 +193,15 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     if largest:
         return max(0.0, *(shift.log_ratio for shift in others))
     # of two siblings the one that moved less: else one that fails would excuse the others
-    plain = float(np.quantile([shift.log_ratio for shift in others], 0.5, method="lower"))
-    moved = [shift.log_ratio / shift.spread.scale for shift in others]
-    scaled = float(np.quantile(moved, 0.5, method="lower"))
-    return max(0.0, plain, scaled * shifts[axis].spread.scale)
+    plain = of_siblings({key: shift.log_ratio for key, shift in shifts.items()}, axis)
+    moved = {key: shift.log_ratio / shift.spread.scale for key, shift in shifts.items()}
+    return max(plain, of_siblings(moved, axis) * shifts[axis].spread.scale)
+
+
+def of_siblings(values: Mapping[int, float], axis: int) -> float:
+    """Return the siblings' median, the lower one of an even number; 0 if negative, or of one."""
+    others = [value for key, value in values.items() if key != axis]
+    return max(0.0, float(np.quantile(others, 0.5, method="lower"))) if len(others) > 1 else 0.0
 
 
 class Joint:

@@ -60,6 +60,23 @@ def test_a_night_of_unusual_weather_is_excused_and_a_change_is_not():
     assert np.median(p["changed"]) < 1e-3
 
 
+def test_conditions_that_siblings_tell_of_excuse_what_bends_and_no_fault():
+    def p_alone(siblings_colder: float, spectrum: float) -> list[float]:
+        return [
+            compared(
+                {
+                    1: joint(100 * seed + 1, colder=-5.0, spectrum=spectrum),
+                    **{axis: joint(100 * seed + axis, colder=siblings_colder) for axis in (2, 3)},
+                }
+            )[1].p_alone
+            for seed in range(6)
+        ]
+
+    assert np.median(p_alone(siblings_colder=0.0, spectrum=0.3)) < 0.01
+    assert np.median(p_alone(siblings_colder=-5.0, spectrum=0.3)) > 0.05
+    assert np.median(p_alone(siblings_colder=-5.0, spectrum=2.0)) < 1e-4
+
+
 def test_unusual_weather_is_told():
     told = {
         c: [compared({1: joint(s, colder=c)})[1].unusual_log_ratio for s in range(9)]
