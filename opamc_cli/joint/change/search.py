@@ -92,7 +92,7 @@ class Grease:
         changes = {"coulomb": 0.0, "viscous": 0.0}
         for name, before, after in zip(population.names, population.mean, mean, strict=True):
             if name in changes and before != 0:
-                changes[name] = float(after / before - 1)
+                changes[name] = float((after - before) / abs(before))
         return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"])
 
     @property
@@ -115,15 +115,14 @@ class Grease:
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
         """Name it."""
         parameters: Parameters = {} if self.warmer_c is None else {"warmer_c": self.warmer_c}
+        word = f"{'warmer' if (self.warmer_c or -self.wet) > 0 else 'colder'} grease"
         meaning = (
-            "colder or warmer grease: friction that grows with the speed has changed (no "
-            "temperature was logged: compare at equal temperature, and look at the grease if it "
-            "remains)"
+            f"{word}: friction that grows with the speed {grown(self.wet)} (no temperature was "
+            "logged: compare at equal temperature, and look at the grease if it remains)"
         )
         if self.warmer_c is not None:
-            word = f"{'warmer' if self.warmer_c > 0 else 'colder'} grease"
-            degrees = f"by {abs(self.warmer_c):.0f} °C"
-            meaning = f"{word} ({degrees}; it is stiffer when cold), not a fault"
+            by = f"by {abs(self.warmer_c):.0f} °C; it is stiffer when cold"
+            meaning = f"{word} ({by}), not a fault"
         return SlowCause(
             effect="thermal_viscous",
             parameters=parameters,
@@ -132,6 +131,13 @@ class Grease:
             p_value=p_value,
             ties=ties,
         )
+
+
+def grown(change: float) -> str:
+    """Say a relative change in words."""
+    if not -1 < change < 9:  # of a baseline that has hardly any
+        return "has grown much" if change > 0 else "is gone"
+    return f"{'has grown' if change > 0 else 'has fallen'} by {abs(change):.0%}"
 
 
 def find_slow_causes(
@@ -246,6 +252,8 @@ def _next(
     meaning = library[first].interpretation(parameters, compared.track)
     if first == "payload_change":
         parameters, meaning = {}, "another payload (check the tool, not the gear)"
+    elif first in ("coulomb", "viscous"):
+        meaning = f"{meaning} (it {grown(grease.dry if first == 'coulomb' else grease.wet)})"
     names = (first, *ties)
     if not GREASE.isdisjoint(names) and "thermal_viscous" in library and grease.plausible:
         return grease.cause(shift, p_value, names)
