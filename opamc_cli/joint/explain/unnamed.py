@@ -124,8 +124,9 @@ class Shift(Effect):
             return np.zeros((track.size, 2))
         columns = track.static_means
         part = columns[rows]
-        first = np.gradient(columns @ solve(part.T @ part, part.T @ track.current_a[rows]))
-        return stack(first, np.gradient(first))
+        model = columns @ solve(part.T @ part, part.T @ track.current_a[rows])
+        first = np.gradient(model) * track.rate_hz  # by time: grids differ in their steps
+        return stack(first, np.gradient(first) * track.rate_hz)
 
 
 class Presliding(Hysteresis):

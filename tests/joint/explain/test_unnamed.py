@@ -122,8 +122,18 @@ def test_a_shift_is_the_rates_of_change_of_the_open_samples_fit(track):
     columns = track.static_means
     rows = track.open_samples
     model = columns @ np.linalg.lstsq(columns[rows], track.current_a[rows])[0]
-    expected = np.stack([np.gradient(model), np.gradient(np.gradient(model))], axis=1)
-    np.testing.assert_allclose(Shift().columns(track, {}), expected, atol=1e-9)
+    rate = track.rate_hz
+    expected = np.stack([rate * np.gradient(model), rate**2 * np.gradient(np.gradient(model))], 1)
+    np.testing.assert_allclose(Shift().columns(track, {}), expected, rtol=1e-9, atol=1e-6)
+
+
+def test_a_shift_is_as_large_on_a_coarse_grid(track):
+    """By samples it was as many times larger there as the grid is coarser, and judged so."""
+    coarse = coarsen(track, 3)
+    opened = track.open_samples[: 3 * coarse.size].reshape(-1, 3).all(axis=1)
+    coarse = replace(coarse, open_samples=opened)
+    sizes = [Shift().columns(grid, {})[:, 0].std() for grid in (track, coarse)]
+    assert sizes[1] == pytest.approx(sizes[0], rel=0.2)
 
 
 def test_of_no_samples_nothing_is_stretched():
