@@ -55,11 +55,12 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
 
 
 def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
-    """Return the effects that in the place of one leave no surely larger held-out error."""
+    """Return the effects that in the place of one leave no surely, or no much, larger error."""
     found = []
     for other in others:
         difference, error = paired(best.deviation, other.chain.deviation)
-        if other.why_not is None and difference <= LEAST_T * error:
+        near = difference <= LEAST_T * error or other.chain.score < best.score + LEAST_SHARE
+        if other.why_not is None and near:
             found.append(other.term.effect.name)
     return tuple(other for other in dict.fromkeys(found) if other != name)
 
