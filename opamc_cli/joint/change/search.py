@@ -115,14 +115,13 @@ class Grease:
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
         """Name it."""
         parameters: Parameters = {} if self.warmer_c is None else {"warmer_c": self.warmer_c}
-        word = f"{'warmer' if (self.warmer_c or -self.wet) > 0 else 'colder'} grease"
         meaning = (
-            f"{word}: friction that grows with the speed {grown(self.wet)} (no temperature was "
-            "logged: compare at equal temperature, and look at the grease if it remains)"
+            "colder or warmer grease: friction that grows with speed has changed (no temperature "
+            "was logged: compare at equal temperature, and look at the grease if it remains)"
         )
         if self.warmer_c is not None:
-            by = f"by {abs(self.warmer_c):.0f} °C; it is stiffer when cold"
-            meaning = f"{word} ({by}), not a fault"
+            word = f"{'warmer' if self.warmer_c > 0 else 'colder'} grease"
+            meaning = f"{word} (by {abs(self.warmer_c):.0f} °C; stiffer when cold), not a fault"
         return SlowCause(
             effect="thermal_viscous",
             parameters=parameters,
@@ -130,14 +129,8 @@ class Grease:
             shift=shift,
             p_value=p_value,
             ties=ties,
+            evidence={"relative_change": self.wet},
         )
-
-
-def grown(change: float) -> str:
-    """Say a relative change in words."""
-    if not -1 < change < 9:  # of a baseline that has hardly any
-        return "has grown much" if change > 0 else "is gone"
-    return f"{'has grown' if change > 0 else 'has fallen'} by {abs(change):.0%}"
 
 
 def find_slow_causes(
@@ -252,13 +245,13 @@ def _next(
     meaning = library[first].interpretation(parameters, compared.track)
     if first == "payload_change":
         parameters, meaning = {}, "another payload (check the tool, not the gear)"
-    elif first in ("coulomb", "viscous"):
-        meaning = f"{meaning} (it {grown(grease.dry if first == 'coulomb' else grease.wet)})"
     names = (first, *ties)
     if not GREASE.isdisjoint(names) and "thermal_viscous" in library and grease.plausible:
         return grease.cause(shift, p_value, names)
+    change = {"coulomb": grease.dry, "viscous": grease.wet}.get(first)
     return SlowCause(
         effect=first,
+        evidence={} if change is None else {"relative_change": change},
         parameters=parameters,
         interpretation=meaning,
         shift=shift,

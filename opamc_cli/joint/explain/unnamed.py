@@ -118,15 +118,14 @@ class Shift(Effect):
     from_terms = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """First and second rate of change of the static terms' current."""
+        """First and second rate of change, by time, of the static terms' current."""
         rows = track.open_samples
         if rows is None:
             return np.zeros((track.size, 2))
         columns = track.static_means
-        part = columns[rows]
-        model = columns @ solve(part.T @ part, part.T @ track.current_a[rows])
-        first = np.gradient(model) * track.rate_hz  # by time: grids differ in their steps
-        return stack(first, np.gradient(first) * track.rate_hz)
+        part, known = columns[rows], track.current_a[rows]
+        first = track.rate_hz * np.gradient(columns @ solve(part.T @ part, part.T @ known))
+        return stack(first, track.rate_hz * np.gradient(first))
 
 
 class Presliding(Hysteresis):

@@ -38,6 +38,9 @@ LEAST_HZ = 100.0
 
 OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
 
+MUCH = 9.0
+"""Times as much again: of a baseline that has hardly any of it, a factor says nothing."""
+
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
@@ -159,7 +162,7 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "effect": first.effect,
         "domain": first.domain,
         "parameters": dict(first.parameters),
-        "interpretation": first.interpretation,
+        "interpretation": _interpretation(first),
         "share": first.share,
         "p_value": first.p_value,
         "ties": list(first.ties),
@@ -171,6 +174,17 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "why": _why(first, change),
         "others": [{key: getattr(cause, key) for key in OF_OTHERS} for cause in others],
     }
+
+
+def _interpretation(cause: Cause) -> str:
+    """Say what a cause means, and of friction whether it has grown, and by how much."""
+    change = cause.evidence.get("relative_change")
+    if change is None:
+        return cause.interpretation
+    if not -1 < change < MUCH:
+        return f"{cause.interpretation}; it {'has grown much' if change > 0 else 'is gone'}"
+    way = "grown" if change > 0 else "fallen"
+    return f"{cause.interpretation}; it has {way} by {abs(change):.0%}"
 
 
 def _why(cause: Cause, change: Change) -> list[str]:

@@ -8,6 +8,8 @@ import pytest
 
 from opamc_cli.config.models import JointConfig
 from opamc_cli.errors import ConfigError
+from opamc_cli.joint.change.explain import Change
+from opamc_cli.joint.change.reading import Cause
 from opamc_cli.stages.verdict import cause
 from opamc_cli.storage.runs import Run, RunInfo, find_runs, save_run
 from opamc_cli.storage.sources import RunSource
@@ -43,6 +45,26 @@ def test_a_ground_flexspline_is_a_ripple_near_its_passage():
     said = " ".join(found["why"])
     assert "8 sessions against 3" in said
     assert "cannot tell it from" in said
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (0.5, "meaning; it has grown by 50%"),
+        (-0.3, "meaning; it has fallen by 30%"),
+        (30.0, "meaning; it has grown much"),
+        (-1.5, "meaning; it is gone"),
+        (None, "meaning"),
+    ],
+)
+def test_of_friction_it_is_said_whether_it_has_grown(change, said):
+    evidence = {} if change is None else {"relative_change": change}
+    found = Cause(
+        effect="coulomb", parameters={}, interpretation="meaning", p_value=0.0, ties=(),
+        evidence=evidence,
+    )  # fmt: skip
+    told = cause._entry(Change((found,), 1.0, False))
+    assert told["interpretation"] == said
 
 
 @pytest.mark.long
