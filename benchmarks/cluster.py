@@ -22,7 +22,7 @@ import nightly_kills
 import nightly_share
 
 from opamc_cli.config.cell import load_cell
-from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.start import run as stage
 
 
 def nightly(cell: Path, scheduler: str | None) -> float:

@@ -31,7 +31,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 import cell_logs
 
 from opamc_cli.__main__ import main
-from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.storage.history import DERIVED, History
 
 STAND_IN = "night_stand_in:stand_in"

@@ -17,7 +17,7 @@ import nightly_kills
 import numpy as np
 
 from opamc_cli.config.cell import load_cell
-from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.storage.runs import RunInfo, save_run
 
 RUNS = 4

@@ -49,7 +49,7 @@ def main() -> None:
         recorder.join()
         before = time.process_time()
         with one_thread_each():  # as `opamc nightly` does
-            from opamc_cli.stages.nightly import run as stage
+            from opamc_cli.stages.nightly.start import run as stage
         times = Path(name) / "times"
         times.mkdir()
         os.environ["OPAMC_NIGHT_TIMES"] = str(times)

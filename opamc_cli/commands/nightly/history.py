@@ -35,7 +35,7 @@ def history(
     """Show or export the history of a cell; the whole table is history.sqlite below its `out`."""
     from opamc_cli.config.cell import load_cell
     from opamc_cli.stages.nightly.inputs.recordings import some
-    from opamc_cli.stages.nightly.run import open_history
+    from opamc_cli.stages.nightly.start.run import open_history
 
     if out is not None and out.suffix not in (".csv", ".parquet", ".json"):
         msg = f"--out {out}: the ending tells the format: .csv, .parquet or .json"

@@ -83,7 +83,7 @@ def run(
 
     # numpy with threads of its own could not be copied into the workers
     with one_thread_each():
-        from opamc_cli.stages.nightly import run as stage
+        from opamc_cli.stages.nightly.start import run as stage
     from opamc_cli.commands.nightly.claim import check_apart, claim
     from opamc_cli.config.cell import load_cell
     from opamc_cli.stages.nightly.morning import left, silent, tell
@@ -257,8 +257,8 @@ def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:
     """Keep what a user declares, and bring alarms and pages up to date where nobody else does."""
     from opamc_cli.config.cell import load_cell
     from opamc_cli.errors import LockedError
-    from opamc_cli.stages.nightly.run import open_history
     from opamc_cli.stages.nightly.settle import settle_cell
+    from opamc_cli.stages.nightly.start.run import open_history
     from opamc_cli.storage.files.lock import output_lock
 
     loaded = load_cell(path)

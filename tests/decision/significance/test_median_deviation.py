@@ -16,5 +16,5 @@ def test_half_of_a_normal_variable_lies_within_the_median_absolute_deviation():
 
 
 def test_what_takes_a_second_to_load_is_not_loaded_where_it_is_not_needed():
-    code = "import sys, opamc_cli.stages.nightly.run; sys.exit('scipy' in sys.modules)"
+    code = "import sys, opamc_cli.stages.nightly.start.run; sys.exit('scipy' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -16,7 +16,7 @@ import pytest
 
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.stages.nightly.workers.cluster import SchedulerLostError, run_all
 
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: opamc[cluster]")

@@ -14,7 +14,7 @@ import nightly_kills
 import pytest
 
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly import run as stage
+from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.stages.nightly.workers.workers import run_all
 from opamc_cli.storage.logs import Facts
 
