@@ -87,6 +87,7 @@ def run(
     from opamc_cli.commands.nightly.claim import check_apart, claim
     from opamc_cli.config.cell import load_cell
     from opamc_cli.stages.nightly.morning import left, silent, tell
+    from opamc_cli.stages.nightly.start.outcome import Wanted
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.schemas import files
@@ -94,7 +95,7 @@ def run(
     forgo_pandas()
     output = Output(as_json, quiet)
     loaded = load_cell(cell)
-    wanted = stage.Wanted(as_night(night), as_night(since), tuple(robot) if robot else None)
+    wanted = Wanted(as_night(night), as_night(since), tuple(robot) if robot else None)
     if wanted.night and wanted.since and wanted.night < wanted.since:
         msg = f"--night {wanted.night} is before --since {wanted.since}; give one of them"
         raise UsageError(msg)
@@ -110,7 +111,7 @@ def run(
             )
         summary = outcome.summary.only(outcome.robots)
         untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
-        if wanted == stage.Wanted():
+        if wanted == Wanted():
             today = datetime.now(UTC).date()
             now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
             now += outcome.strays

@@ -10,7 +10,7 @@ from typing import Any
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
-from opamc_cli.stages.nightly.start.run import CellOutcome
+from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history import Event, History
 from opamc_cli.storage.schemas import files
