@@ -17,6 +17,7 @@ import json
 import shutil
 import tempfile
 import time
+from collections import Counter
 from dataclasses import asdict, dataclass, field, replace
 from datetime import date, timedelta
 from functools import cache
@@ -271,7 +272,7 @@ def history_of(life: Life, rows: list[Measured], *, chart: bool) -> list[dict[st
             **{"night": day(one.night), "effect": one.effect},
             "state": "fault" if one.state == "changed" and not chart else one.state,
             **{"distance": one.distance if chart else None, "common": one.common},
-            **{"harmless": 0, "cause": None, "reason": ""},
+            **{"harmless": 0, "cause": None, "reason": "", "temperature_c": one.temperature_c},
             "baseline": f"{one.payload_kg} {one.night >= life.exchanged_at}"
             if life.exchanged_axis
             else str(one.payload_kg),
@@ -298,6 +299,8 @@ class Score:
     alarmed: list[tuple[int, float, int, int]] = field(default_factory=list)
     missed: list[int] = field(default_factory=list)
     forecasts: list[tuple[int, bool]] = field(default_factory=list)
+    trends: list[str] = field(default_factory=list)
+    """What was said of the trend at each alarm of a wearing joint."""
 
 
 def evaluate(cell: Cell, rule: AlarmConfig, *, chart: bool) -> Score:
@@ -315,13 +318,24 @@ def evaluate(cell: Cell, rule: AlarmConfig, *, chart: bool) -> Score:
             elif not found:
                 found = True
                 until_half = life.wear_starts + life.wear_nights / 2 - raised
-                since = number(as_first_told(life, series, alarm.raised, rule).since)
+                told = as_first_told(life, series, alarm.raised, rule)
+                since = number(told.since)
+                score.trends.append(kind_of(json.loads(told.trend)))
                 score.alarmed.append((life.seed, severity, round(until_half), since))
         if life.wearing_axis and not found:
             score.missed.append(life.seed)
         if life.wearing_axis and chart:
             score.forecasts += forecasts(life, rows, series)
     return score
+
+
+def kind_of(trend: dict[str, object]) -> str:
+    """Return what a trend comes to."""
+    if not trend:
+        return "too few nights"
+    if trend["reach"] is not None:
+        return "forecast" if trend["reach"] != [0, 0] else "at fault level"
+    return "grows" if trend["distance"][1] > 0 else "no trend"
 
 
 def as_first_told(
@@ -393,6 +407,7 @@ def report(cell: Cell) -> str:
     off = [a[3] - begun[a[0]] for a in scores[0].alarmed]
     right = sum(abs(o) <= 5 for o in off)
     lines.append(f"\n'since when' off by (nights): {off}; within 5 nights: {right} of {len(off)}")
+    lines.append(f"the trend as it was told at the alarm: {dict(Counter(scores[0].trends))}")
     told = scores[0].forecasts
     inside = sum(ok for _, ok in told)
     lines.append(

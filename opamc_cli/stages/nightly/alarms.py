@@ -17,6 +17,7 @@ from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 from opamc_cli.decision.trend.chart import LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
+from opamc_cli.decision.trend.temperature import without_temperature
 from opamc_cli.stages.nightly.inputs.baseline_name import condition_in
 from opamc_cli.storage.history import (
     UNJUDGED,
@@ -148,18 +149,7 @@ def _alarm(
     last = sum(row["night"] < until for row in rows)
     since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
     lately = rows[max(0, last - MOST_NIGHTS) : last]
-    growing = _measured([row for row in lately if row["night"] >= since])
-    slope = robust_slope(_days(growing), np.array([row["effect"] or 0.0 for row in growing]))
-    trend: dict[str, Any] = {}
-    if slope is not None and math.isfinite(slope.low) and math.isfinite(slope.high):
-        reach = nights_until(slope, fault_effect)
-        trend = {
-            "per_night": round(slope.per_night, 6),
-            "low": round(slope.low, 6),
-            "high": round(slope.high, 6),
-            "level": round(slope.level, 6),
-            "reach": None if reach is None else [math.floor(reach[0]), math.ceil(reach[1])],
-        }
+    trend = _trend(_measured(lately), since, fault_effect)
     latest = rows[last - 1]
     text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
     known = _acknowledged(declared, axis, first["night"], until)
@@ -190,6 +180,35 @@ def _alarm(
     return alarm, events
 
 
+def _trend(rows: Sequence[Mapping[str, Any]], since: str, fault_effect: float) -> dict[str, Any]:
+    """Return how fast a joint's effect and distance grow since a night, and when it is at fault.
+
+    Whether it grows is the distance's to say: the effect is the largest of what several witnesses
+    see, and moves with each of them. Empty with too few nights.
+    """
+    changed = np.array([row["night"] >= since for row in rows], dtype=np.bool_)
+    warmth = np.array([row["temperature_c"] for row in rows], dtype=np.float64)
+    logged = warmth[np.isfinite(warmth)]
+    usual = float(np.median(logged)) if logged.size else math.nan
+    effects = np.array([row["effect"] or 0.0 for row in rows])
+    nights = _days(rows)[changed]
+    effect, distance = (
+        robust_slope(nights, without_temperature(nights, course[changed], warmth[changed], usual))
+        for course in (effects, _distances(rows))
+    )
+    if effect is None or distance is None or not math.isfinite(effect.low + distance.low):
+        return {}
+    reach = nights_until(effect, fault_effect)
+    return {
+        "per_night": round(effect.per_night, 6),
+        "low": round(effect.low, 6),
+        "high": round(effect.high, 6),
+        "level": round(effect.level, 6),
+        "distance": [round(one, 6) for one in (distance.per_night, distance.low, distance.high)],
+        "reach": None if reach is None else [math.floor(reach[0]), math.ceil(reach[1])],
+    }
+
+
 def _acknowledged(
     declared: Sequence[Declared], axis: int, raised: str, until: str
 ) -> Declared | None:
@@ -218,13 +237,17 @@ def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any])
     seen = _measured(until_raised)
     if not seen:
         return str(signal["night"])
-    begun = onset(_days(seen), np.array([row["distance"] - (row["common"] or 0.0) for row in seen]))
+    begun = onset(_days(seen), _distances(seen))
     # a change that was there from the first night on has no before
     return str(min(seen[begun]["night"], signal["night"]))
 
 
 def _measured(rows: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
     return [row for row in rows if row["state"] in JUDGED and row["distance"] is not None]
+
+
+def _distances(rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
+    return np.array([row["distance"] - (row["common"] or 0.0) for row in rows], dtype=np.float64)
 
 
 def _days(rows: Sequence[Mapping[str, Any]]) -> NDArray[np.float64]:
@@ -362,15 +385,21 @@ def _state_phrase(row: Mapping[str, Any]) -> str:
 
 
 def _trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
+    """Say where a joint is heading: its effect may move with the weather, its distance less."""
     if not trend:
         return "too few nights for a trend"
-    reach = trend["reach"]
+    reach, level = trend["reach"], f"fault level ({limit:g})"
+    farther = "no trend"
+    if trend["distance"][1] > 0:
+        usual, least, most = (f"{100 * math.expm1(one):.1f}" for one in trend["distance"])
+        farther = f"distance from the baseline grows by {usual} % ({least} to {most}) a night"
     if reach == [0, 0]:
-        grows = f"grows by {trend['per_night']:.3f} a night" if trend["low"] > 0 else "no trend"
-        return f"at fault level ({limit:g}), {grows}"
+        grows = f"grows by {trend['per_night']:.3f} a night" if trend["low"] > 0 else farther
+        return f"at {level}, {grows}"
     if reach is None:
-        return "no trend"
+        unsure = f", the effect too unevenly to say when it reaches {level}"
+        return farther + (unsure if trend["distance"][1] > 0 else "")
     return (
         f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
-        f"night, reaches fault level ({limit:g}) in {reach[0]} to {reach[1]} nights"
+        f"night, reaches {level} in {reach[0]} to {reach[1]} nights"
     )

@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import date, timedelta
 from typing import Any
 
+from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
 from opamc_cli.decision.trend.chart import LIMIT
@@ -48,7 +49,9 @@ def settle_cell(
     Summary
         How all robots of the cell stand now.
     """
-    history.apply_rule(digest({**cell.alarm.model_dump(), "limit": LIMIT}))
+    # another version may tell other alarms, or tell them otherwise, of nights it cannot judge anew
+    rule = {**cell.alarm.model_dump(), "limit": LIMIT, "version": __version__}
+    history.apply_rule(digest(rule))
     by_robot: dict[str, list[NightRow]] = {}
     for row in sorted(history.nights().values(), key=lambda row: (row.robot, row.night)):
         by_robot.setdefault(row.robot, []).append(row)

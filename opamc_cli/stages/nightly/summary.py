@@ -1,6 +1,5 @@
 """How a cell stands: robots and joints with their alarms, for terminal, page and metrics."""
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -50,13 +49,6 @@ class JointSummary:
     def since(self) -> str:
         """Night from which on it is not as it was."""
         return "" if self.alarm is None else self.alarm.since
-
-    @property
-    def reach(self) -> list[int] | None:
-        """In how many nights it reaches the fault level, if that can be told."""
-        trend: dict[str, Any] = json.loads(self.alarm.trend) if self.alarm else {}
-        reach: list[int] | None = trend.get("reach")
-        return reach
 
 
 @dataclass(frozen=True)
