@@ -12,6 +12,8 @@ class Night:
     """The joint is at fault by the night's own verdict, or not as it was by the chart."""
     gross: bool = False
     """So much so that one night is enough."""
+    calm: bool = True
+    """Whether it may end an alarm: not while what is left of it lies near the limit."""
     judged: bool = True
     """False: nothing is known of the night, which neither raises nor clears."""
 
@@ -33,7 +35,7 @@ def episodes(nights: Sequence[Night], needed: int, among: int) -> list[Episode]:
         In time order.
     needed, among
         An alarm is raised in the night in which `needed` of the last `among` judged nights have a
-        signal; it is cleared in the first night in which none of the last `among` has.
+        signal; it is cleared in the first calm night in which none of the last `among` has.
     """
     found: list[Episode] = []
     recent: list[bool] = []
@@ -45,7 +47,7 @@ def episodes(nights: Sequence[Night], needed: int, among: int) -> list[Episode]:
         if raised is None:
             if night.gross or (night.signal and sum(recent) >= needed):
                 raised = index
-        elif not any(recent) and len(recent) == among:
+        elif night.calm and not any(recent) and len(recent) == among:
             found.append(Episode(raised, index))
             raised = None
     if raised is not None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import Episode, Night, episodes
-from opamc_cli.decision.trend.chart import LIMIT, control_chart
+from opamc_cli.decision.trend.chart import CALM, LIMIT, control_chart
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.decision.trend.slope import nights_until, robust_slope
 from opamc_cli.decision.trend.temperature import without_temperature
@@ -123,7 +123,8 @@ def _nights(
         # left to the chart: by chance a baseline is so even that every tenth night of it differs
         fault = row["state"] == "fault" and not row["harmless"]
         gross = fault and (row["effect"] or 0.0) > rule.gross
-        found.append(Night(fault or average > LIMIT, gross, judged=row["state"] in JUDGED))
+        signal, calm = fault or average > LIMIT, not average > CALM
+        found.append(Night(signal, gross, calm, judged=row["state"] in JUDGED))
     return found
 
 

@@ -5,6 +5,7 @@ import pytest
 from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 
 S, N, U = Night(True), Night(False), Night(False, judged=False)
+NEAR = Night(False, calm=False)
 
 
 @pytest.mark.parametrize(
@@ -23,6 +24,10 @@ S, N, U = Night(True), Night(False), Night(False, judged=False)
         ([Night(False, gross=True), N], [Episode(0, None)]),
         ([Night(False, gross=True), N, N], [Episode(0, 2)]),
         ([S, S, N, N, N, S, S], [Episode(1, 4), Episode(6, None)]),
+        # what is still near the limit ends nothing, and raises nothing
+        ([S, S, N, N, NEAR, NEAR, S, N, N], [Episode(1, None)]),
+        ([S, S, NEAR, NEAR, N], [Episode(1, 4)]),
+        ([NEAR, NEAR, NEAR], []),
     ],
 )
 def test_two_of_three_nights_make_an_alarm(nights, expected):

@@ -164,6 +164,16 @@ def test_nights_that_only_changed_are_an_alarm_once_the_chart_says_so():
     assert raised(["healthy"] * 20 + ["fault"] * 10, even) == [22]
 
 
+def test_an_alarm_does_not_end_while_the_chart_is_near_its_limit():
+    def cleared(left):
+        distances = [0.1 * (-1) ** day for day in range(16)] + [2.0] * 3 + [left] * 6
+        states = ["healthy"] * 16 + ["fault"] * 3 + ["changed"] * 6
+        (alarm,) = settled(nights_of(states, distances)).alarms
+        return alarm.cleared and int(alarm.cleared[-2:])
+
+    assert [cleared(left) for left in (0.0, 0.1, 0.3)] == [22, 22, None]
+
+
 def settled(series, nights=(), declared=()):
     return settle_robot("r1", series, nights, declared, AlarmConfig(), 0.4, 6)
 

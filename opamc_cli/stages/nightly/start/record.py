@@ -96,10 +96,17 @@ def record_judged(
 
 def _places(folder: Path, judged: Sequence[ProgramResult]) -> list[Path]:
     """Return where each program's results go: the worst one's on top, where scripts look."""
-    return [
-        folder if index == 0 else folder / _safe(result.program)
-        for index, result in enumerate(judged)
-    ]
+    places = [folder] * len(judged)
+    # by name, so that a night's folders are called the same whichever program is the worst
+    taken = set(OF_NIGHT)
+    for index, result in sorted(enumerate(judged), key=lambda one: one[1].program):
+        name = _safe(result.program)
+        while name in taken:  # "lift/a" beside "lift_a"
+            name += "_"
+        taken.add(name)
+        if index:
+            places[index] = folder / name
+    return places
 
 
 def _replace_results(
