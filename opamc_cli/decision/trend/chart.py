@@ -73,7 +73,7 @@ def control_chart(values: FloatArray, healthy: BoolArray, n_baseline: int) -> Fl
         if not np.isfinite(value):
             continue
         reference = np.array(usual)
-        centre, spread = _usual(reference, n_baseline)
+        centre, spread = usual_nights(reference, n_baseline)
         shift = float(np.clip((value - centre) / spread, -MOST, MOST))
         smoothed = (1 - WEIGHT) * smoothed + WEIGHT * shift
         share = (1 - WEIGHT) ** 2 * share + WEIGHT**2
@@ -85,8 +85,16 @@ def control_chart(values: FloatArray, healthy: BoolArray, n_baseline: int) -> Fl
     return average
 
 
-def _usual(reference: FloatArray, n_baseline: int) -> tuple[float, float]:
-    """Return where healthy nights lie, and their standard deviation."""
+def usual_nights(reference: FloatArray, n_baseline: int) -> tuple[float, float]:
+    """Return where healthy nights lie, and their standard deviation.
+
+    Parameters
+    ----------
+    reference : ndarray, shape (N,)
+        Log distances of healthy nights.
+    n_baseline : int
+        Nights of the baseline: they count as nights at 0.
+    """
     n = len(reference)
     if not n:
         return 0.0, USUAL_SPREAD

@@ -10,6 +10,10 @@ FloatArray = NDArray[np.float64]
 LEAST_NIGHTS = 6
 """Fewer nights have slopes of either sign by chance in every tenth series."""
 
+LEAST_NIGHTS_OF_SPREAD = 3
+"""Nights from which there is a slope where it is known how much nights differ. Of 300 joints with a
+step of 0.6, nights of a spread of 0.13, 10 % seemed to grow for sure with fewer than six nights."""
+
 NORMAL_90 = 1.6449
 """Two-sided 90 % of the normal distribution."""
 
@@ -72,6 +76,38 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
         float(slopes[low]) if low >= 0 else -np.inf,
         float(slopes[high]) if high < len(slopes) else np.inf,
         float(np.median(values - slope * (nights - middle))),
+        float(nights[-1] - middle),
+    )
+
+
+def slope_of_spread(nights: FloatArray, values: FloatArray, spread: float) -> Slope | None:
+    """Return the slope of few nights, of which it is known how much nights differ.
+
+    Parameters
+    ----------
+    nights : ndarray, shape (T,)
+        Times in nights, ascending.
+    values : ndarray, shape (T,)
+        Finite.
+    spread : float
+        Standard deviation of nights that do not grow.
+
+    Returns
+    -------
+    Slope or None
+        By least squares; None with fewer than `LEAST_NIGHTS_OF_SPREAD`.
+    """
+    if len(values) < LEAST_NIGHTS_OF_SPREAD:
+        return None
+    middle = float(nights.mean())
+    square = float(((nights - middle) ** 2).sum())
+    slope = float((nights - middle) @ values) / square
+    reach = NORMAL_90 * spread / np.sqrt(square)
+    return Slope(
+        slope,
+        slope - reach,
+        slope + reach,
+        float(values.mean()),
         float(nights[-1] - middle),
     )
 

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import Episode, Night, episodes
-from opamc_cli.decision.trend.chart import CALM, LIMIT, control_chart
+from opamc_cli.decision.trend.chart import CALM, LIMIT, control_chart, usual_nights
 from opamc_cli.decision.trend.onset import onset
-from opamc_cli.decision.trend.slope import nights_until, robust_slope
+from opamc_cli.decision.trend.slope import Slope, nights_until, robust_slope, slope_of_spread
 from opamc_cli.decision.trend.temperature import without_temperature
 from opamc_cli.stages.nightly.inputs.baseline_name import condition_in
 from opamc_cli.storage.history import (
@@ -88,7 +88,17 @@ def settle_robot(
                     # a baseline that was declared is known before a night is judged against it
                     ended = _after_maintenance(raised, nights, declared) or replaced
                 signal = _first_signal(seen, found.raised, rule.of)
-                alarm, said = _alarm(rows, found, ended, signal, name, declared, rule, fault_effect)
+                alarm, said = _alarm(
+                    rows,
+                    found,
+                    ended,
+                    signal,
+                    name,
+                    declared,
+                    rule,
+                    fault_effect,
+                    baseline_nights,
+                )
                 alarms.append(alarm)
                 events += said
                 standing += [
@@ -143,6 +153,7 @@ def _alarm(
     declared: Sequence[Declared],
     rule: AlarmConfig,
     fault_effect: float,
+    baseline_nights: int,
 ) -> tuple[AlarmRow, list[Event]]:
     first = rows[found.raised]
     robot, axis = first["robot"], first["axis"]
@@ -150,7 +161,7 @@ def _alarm(
     last = sum(row["night"] < until for row in rows)
     since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
     lately = rows[max(0, last - MOST_NIGHTS) : last]
-    trend = _trend(_measured(lately), since, fault_effect)
+    trend = _trend(_measured(lately), since, fault_effect, baseline_nights)
     latest = rows[last - 1]
     text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
     known = _acknowledged(declared, axis, first["night"], until)
@@ -181,33 +192,42 @@ def _alarm(
     return alarm, events
 
 
-def _trend(rows: Sequence[Mapping[str, Any]], since: str, fault_effect: float) -> dict[str, Any]:
+def _trend(
+    rows: Sequence[Mapping[str, Any]], since: str, fault_effect: float, baseline_nights: int
+) -> dict[str, Any]:
     """Return how fast a joint's effect and distance grow since a night, and when it is at fault.
 
     Whether it grows is the distance's to say: the effect is the largest of what several witnesses
     see, and moves with each of them. Empty with too few nights.
     """
     changed = np.array([row["night"] >= since for row in rows], dtype=np.bool_)
+    healthy = np.array([row["state"] == "healthy" for row in rows], dtype=np.bool_)
     warmth = np.array([row["temperature_c"] for row in rows], dtype=np.float64)
     logged = warmth[np.isfinite(warmth)]
     usual = float(np.median(logged)) if logged.size else math.nan
-    effects = np.array([row["effect"] or 0.0 for row in rows])
+    effects, distances = np.array([row["effect"] or 0.0 for row in rows]), _distances(rows)
     nights = _days(rows)[changed]
     effect, distance = (
         robust_slope(nights, without_temperature(nights, course[changed], warmth[changed], usual))
-        for course in (effects, _distances(rows))
+        for course in (effects, distances)
     )
     if effect is None or distance is None or not math.isfinite(effect.low + distance.low):
-        return {}
+        _, spread = usual_nights(distances[healthy & ~changed], baseline_nights)
+        few = slope_of_spread(nights, distances[changed], spread)
+        return {"distance": _rounded(few), "reach": None} if few and few.clear else {}
     reach = nights_until(effect, fault_effect)
     return {
         "per_night": round(effect.per_night, 6),
         "low": round(effect.low, 6),
         "high": round(effect.high, 6),
         "level": round(effect.level, 6),
-        "distance": [round(one, 6) for one in (distance.per_night, distance.low, distance.high)],
+        "distance": _rounded(distance),
         "reach": None if reach is None else [math.floor(reach[0]), math.ceil(reach[1])],
     }
+
+
+def _rounded(slope: Slope) -> list[float]:
+    return [round(one, 6) for one in (slope.per_night, slope.low, slope.high)]
 
 
 def _acknowledged(
@@ -398,7 +418,8 @@ def _trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
         grows = f"grows by {trend['per_night']:.3f} a night" if trend["low"] > 0 else farther
         return f"at {level}, {grows}"
     if reach is None:
-        unsure = f", the effect too unevenly to say when it reaches {level}"
+        why = "the effect too unevenly" if "level" in trend else "too few nights"
+        unsure = f", {why} to say when it reaches {level}"
         return farther + (unsure if trend["distance"][1] > 0 else "")
     return (
         f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "

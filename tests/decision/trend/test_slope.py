@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from scipy.stats import theilslopes
 
-from opamc_cli.decision.trend.slope import LEAST_NIGHTS, nights_until, robust_slope
+from opamc_cli.decision.trend.slope import (
+    LEAST_NIGHTS,
+    nights_until,
+    robust_slope,
+    slope_of_spread,
+)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -63,3 +68,18 @@ def test_a_slope_and_its_interval_by_hand():
     assert not still.clear
     assert nights_until(still, 9.0) is None
     assert nights_until(found, found.level) == (0.0, 0.0)
+
+
+def test_few_nights_have_a_slope_where_it_is_known_how_much_nights_differ():
+    rng = np.random.default_rng(2)
+    nights = np.array([0.0, 1.0, 3.0, 4.0])
+    inside = 0
+    for _ in range(400):
+        values = 0.1 * nights + rng.normal(0, 0.05, 4)
+        found = slope_of_spread(nights, values, 0.05)
+        assert (found.per_night, found.level) == pytest.approx(
+            (np.polyfit(nights, values, 1)[0], np.polyval(np.polyfit(nights, values, 1), 4.0))
+        )
+        inside += found.low <= 0.1 <= found.high
+    assert 0.86 <= inside / 400 <= 0.94
+    assert slope_of_spread(nights[:2], nights[:2], 0.05) is None
