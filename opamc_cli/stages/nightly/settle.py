@@ -57,26 +57,8 @@ def settle_cell(
         by_robot.setdefault(row.robot, []).append(row)
     known = history.alarms()
     for robot in history.stale():
-        config = cell.diagnosis_of(robot, source)
-        settled = settle_robot(
-            robot,
-            history.series(robot),
-            by_robot.get(robot, []),
-            history.declared(robot),
-            cell.alarm,
-            config.score.fault_effect,
-            cell.baseline.nights or NIGHTS_AGAIN,
-        )
         before = [alarm for alarm in known if alarm.robot == robot]
-        begun = [night for _, night in begun_anew(history.declared(robot))]
-        nights = by_robot.get(robot, [])
-        taken = list(_taken_into_baseline(before, settled.alarms, nights, begun))
-        events = [
-            *settled.events,
-            *_events_of(taken, before, history.events() if taken else (), settled.events),
-            *_ended(before, settled.alarms, history.series(robot), nights, begun),
-        ]
-        history.settle(robot, [*settled.alarms, *taken], settled.standing, events)
+        _settle(cell, source, history, robot, by_robot.get(robot, []), before)
     if whole:
         gone = {one.robot: one.night for one in history.declared() if one.kind == "gone"}
         history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
@@ -87,6 +69,35 @@ def settle_cell(
     write_page(cell, history, summary)
     write_metrics(cell, summary)
     return summary
+
+
+def _settle(
+    cell: CellConfig,
+    source: str,
+    history: History,
+    robot: str,
+    nights: Sequence[NightRow],
+    before: Sequence[AlarmRow],
+) -> None:
+    """Find a robot's alarms anew, and say which of those before have ended with their nights."""
+    series, declared = history.series(robot), history.declared(robot)
+    settled = settle_robot(
+        robot,
+        series,
+        nights,
+        declared,
+        cell.alarm,
+        cell.diagnosis_of(robot, source).score.fault_effect,
+        cell.baseline.nights or NIGHTS_AGAIN,
+    )
+    begun = [night for _, night in begun_anew(declared)]
+    taken = list(_taken_into_baseline(before, settled.alarms, nights, begun))
+    events = [
+        *settled.events,
+        *_events_of(taken, before, history.events() if taken else (), settled.events),
+        *_ended(before, settled.alarms, series, nights, begun),
+    ]
+    history.settle(robot, [*settled.alarms, *taken], settled.standing, events)
 
 
 def _taken_into_baseline(
@@ -150,7 +161,7 @@ def _ended(
         over = any(one.cleared is None or one.cleared > alarm.raised for one in same)
         if over or alarm.raised in baseline:
             continue
-        why = "its nights were judged anew, and show none"
+        why = "its nights show none now"
         if place not in watched:
             why = "it is not watched any more (`axes` in the cell's file, or its recordings)"
         text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: {why}"
