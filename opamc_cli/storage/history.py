@@ -578,11 +578,14 @@ class History:
             )
             self._put("alarm", alarms)
             said = list(events)
-            # a joint that is watched again, and then no more, is news
-            self._db.executemany(
-                "DELETE FROM told WHERE robot = ? AND axis = ? AND kind = 'ended' AND time = ?",
-                [(one.robot, one.axis, one.time) for one in said if one.kind == "ended"],
-            )
+            # a joint that is watched again, and then no more, is news; why it ended before is not
+            ended = [(one.robot, one.axis, one.time) for one in said if one.kind == "ended"]
+            for table in ("told", "event"):
+                self._db.executemany(
+                    f"DELETE FROM {table} "
+                    "WHERE robot = ? AND axis = ? AND kind = 'ended' AND time = ?",
+                    ended,
+                )
             self._put("event", said)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 

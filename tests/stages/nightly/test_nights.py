@@ -196,7 +196,8 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 100}\n")
     ended = opamc("nightly", cell, "--quiet")
     assert "r2 axis 2: the alarm of" in ended.out
-    assert "judged anew" in ended.out
+    assert "its nights show none now" in ended.out
+    assert "not watched" not in ended.out  # which was so before
 
 
 def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_history(cell, opamc):
