@@ -214,7 +214,10 @@ def _trend(
     if effect is None or distance is None or not math.isfinite(effect.low + distance.low):
         _, spread = usual_nights(distances[healthy & ~changed], baseline_nights)
         few = slope_of_spread(nights, distances[changed], spread)
-        return {"distance": _rounded(few), "reach": None} if few and few.clear else {}
+        if few is None or not few.clear:
+            return {}
+        reached = float(np.median(effects[changed][-3:])) >= fault_effect
+        return {"distance": _rounded(few), "reach": [0, 0] if reached else None}
     reach = nights_until(effect, fault_effect)
     return {
         "per_night": round(effect.per_night, 6),
@@ -412,10 +415,12 @@ def _trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
     reach, level = trend["reach"], f"fault level ({limit:g})"
     farther = "no trend"
     if trend["distance"][1] > 0:
-        usual, least, most = (f"{100 * math.expm1(one):.1f}" for one in trend["distance"])
+        usual, least, most = (_percent(one) for one in trend["distance"])
         farther = f"distance from the baseline grows by {usual} % ({least} to {most}) a night"
     if reach == [0, 0]:
-        grows = f"grows by {trend['per_night']:.3f} a night" if trend["low"] > 0 else farther
+        grows = farther
+        if trend.get("low", 0) > 0:
+            grows = f"grows by {trend['per_night']:.3f} a night"
         return f"at {level}, {grows}"
     if reach is None:
         why = "the effect too unevenly" if "level" in trend else "too few nights"
@@ -425,3 +430,8 @@ def _trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
         f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
         f"night, reaches {level} in {reach[0]} to {reach[1]} nights"
     )
+
+
+def _percent(log_ratio: float) -> str:
+    percent = 100 * math.expm1(log_ratio)
+    return f"{percent:.{1 if abs(percent) < 10 else 0}f}"

@@ -237,15 +237,22 @@ def test_wear_that_the_weather_hides_from_the_effect_is_no_lack_of_a_trend():
 
 
 def test_few_nights_that_grow_by_more_than_nights_differ_grow():
-    def said(*rise):
+    def said(*rise, effect=0.0):
         distances = [0.1 * (-1) ** day for day in range(16)] + list(rise)
-        (alarm,) = settled(nights_of(["healthy"] * 17 + ["fault"] * 3, distances)).alarms
+        series = nights_of(["healthy"] * 17 + ["fault"] * 3, distances)
+        for row in series[16:]:
+            row["effect"] = effect
+        (alarm,) = settled(series).alarms
         return alarm.text, json.loads(alarm.trend)
 
     text, trend = said(0.4, 0.9, 1.4, 1.9)
     assert trend["distance"][0] == pytest.approx(0.5, abs=0.05)
     assert "distance from the baseline grows by 6" in text
     assert text.endswith(" a night, too few nights to say when it reaches fault level (0.4)")
+    # where the effect is there already there is nothing to reach
+    text, trend = said(0.4, 0.9, 1.4, 1.9, effect=0.5)
+    start = "at fault, effect 0.50; at fault level (0.4), distance from the baseline grows by 6"
+    assert (text.startswith(start), trend["reach"]) == (True, [0, 0])
     assert said(0.0, 2.0, 2.1, 2.0) == (
         "at fault, effect 0.00; too few nights for a trend",
         {},
