@@ -160,18 +160,23 @@ def _alarm(
     until = ended or "9999"
     last = sum(row["night"] < until for row in rows)
     since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
-    lately = rows[max(0, last - MOST_NIGHTS) : last]
-    trend = _trend(_measured(lately), since, fault_effect, baseline_nights)
-    latest = rows[last - 1]
-    text = f"{_state_phrase(latest)}; {_trend_phrase(trend, fault_effect)}"
+
+    def told(night: int) -> tuple[dict[str, Any], str]:
+        """Return the trend by what was known in a night, and the words of it."""
+        lately = _measured(rows[max(0, night + 1 - MOST_NIGHTS) : night + 1])
+        trend = _trend(lately, since, fault_effect, baseline_nights)
+        return trend, f"{_state_phrase(rows[night])}; {_trend_phrase(trend, fault_effect)}"
+
+    trend, text = told(last - 1)
     known = _acknowledged(declared, axis, first["night"], until)
-    events = [Event(first["night"], robot, axis, "alarm", f"{name}: {text}")]
+    # later nights do not change what was said in earlier ones
+    said = told(found.raised)[1]
+    events = [Event(first["night"], robot, axis, "alarm", f"{name}: {said}")]
     nights = [row["night"] for row in rows[found.raised : last]]
-    events += [
-        Event(nights[index], robot, axis, "reminder", f"{name}: alarm since {since}; {text}")
-        for index in said_in(nights, [""] * len(nights), rule.remind_after)[1:]
-        if known is None or nights[index] < known.night
-    ]
+    for index in said_in(nights, [""] * len(nights), rule.remind_after)[1:]:
+        if known is None or nights[index] < known.night:
+            said = f"{name}: alarm since {since}; {told(found.raised + index)[1]}"
+            events.append(Event(nights[index], robot, axis, "reminder", said))
     if ended:
         how = f"no sign of it in {rule.of} judged nights"
         if found.cleared is None:

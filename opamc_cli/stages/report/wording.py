@@ -9,7 +9,7 @@ from opamc_cli.stages.verdict.reasons import (
     CHECK_FIRST,
     FOUND,
     INSPECT,
-    explains_little,
+    excuses_little,
     lies_outside,
 )
 
@@ -156,7 +156,7 @@ def inspection(entry: Mapping[str, Any]) -> str | None:
     meaning, told, action = _meaning(cause)
     first = action[:1].upper() + action[1:] if told else f"Look for {meaning}"
     if lies_outside(cause):
-        if explains_little(cause):
+        if excuses_little(cause):
             return INSPECT
         return f"{first}; do that before opening the gear."
     return (

@@ -9,7 +9,12 @@ from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
-from opamc_cli.stages.verdict.reasons import SMALLER_PART, explains_little, lies_outside
+from opamc_cli.stages.verdict.reasons import (
+    SMALLER_PART,
+    excuses_little,
+    explains_little,
+    lies_outside,
+)
 
 MOST_EVIDENCE = 2
 FEW_SESSIONS = 4
@@ -62,7 +67,7 @@ def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bund
         return GEAR
     meaning = cause.get("interpretation") or cause.get("effect")
     if lies_outside(cause):
-        if explains_little(cause):
+        if excuses_little(cause):
             return f"{GEAR} {SMALLER_PART.format(meaning)}"
         return f"Check before the gear: {meaning}."
     return f"Inspect the joint for {meaning}."

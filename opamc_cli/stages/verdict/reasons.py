@@ -95,7 +95,7 @@ def reasons(
         meaning = cause.get("interpretation") or cause.get("effect")
         outside = lies_outside(cause)
         known = [CHECK_FIRST] if outside else [FOUND, REPEAT]
-        if outside and explains_little(cause):
+        if outside and excuses_little(cause):
             known = [SMALLER_PART]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
         if outside and judgement.state == "fault":
@@ -108,6 +108,14 @@ def reasons(
 def lies_outside(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause of verdict.json is no fault of the joint: load, environment, sensors."""
     return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"
+
+
+def excuses_little(cause: Mapping[str, Any]) -> bool:
+    """Tell whether a cause outside the joint holds too little to look there before the gear.
+
+    With a fault beside it, or less than half of the change by harmless causes, it is not harmless.
+    """
+    return explains_little(cause) or not cause.get("harmless")
 
 
 def explains_little(cause: Mapping[str, Any]) -> bool:

@@ -51,6 +51,25 @@ def test_a_joint_that_was_judged_again_is_not_said_to_be_unjudged_since():
     ]
 
 
+def test_what_was_said_in_a_night_is_not_changed_by_later_ones():
+    """An alarm of effect 0.08 was in the history with the effect of a month later."""
+    rng = np.random.default_rng(3)
+    distances = [*0.1 * rng.normal(size=8), *np.linspace(1.0, 4.0, 20)]
+    states = ["healthy"] * 8 + ["fault"] * 20
+    series = nights_of(states, distances)
+    for row, effect in zip(series, [0.0] * 8 + [0.05 * k for k in range(20)], strict=True):
+        row["effect"] = effect
+    early, late = (
+        settle_robot("r1", series[:stop], (), (), AlarmConfig(remind_after=7), 0.4, 6)
+        for stop in (18, 28)
+    )
+    assert [one.kind for one in early.events] == ["alarm", "reminder"]
+    assert late.events[:2] == early.events
+    assert late.alarms[0].text != early.alarms[0].text
+    assert "effect 0.05" in late.events[0].text
+    assert "effect 0.95" in late.alarms[0].text
+
+
 def failures(*reasons):
     """Return when and how it is said of a robot that its nights failed for these reasons."""
     nights = [

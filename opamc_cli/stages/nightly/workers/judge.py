@@ -22,6 +22,7 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramResult,
 )
 from opamc_cli.stages.report.wording import axes_phrase
+from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
@@ -157,6 +158,8 @@ def _temperatures(patterns: Path) -> dict[int, float]:
 
 def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
     cause = entry.get("cause") or {}
+    if cause and lies_outside(cause) and excuses_little(cause):
+        cause = {}  # beside it stands what nobody should look away from
     distance = entry.get("distance") or {}
     reasons = entry.get("reasons") or [""]
     return AxisResult(
