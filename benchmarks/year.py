@@ -231,7 +231,7 @@ def judged(folder: Path, config, life: Life, night: int) -> list[Measured]:
             one.state,
             one.p_value,
             float(np.log(one.distance_ratio)),
-            one.common_log_ratio,
+            one.allowed_log_ratio,
             one.effect,
             float(np.median(warm[axis])),
             PAYLOAD_KG if loaded else 0.0,

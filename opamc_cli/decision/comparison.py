@@ -93,12 +93,15 @@ class Compared:
     p_alone: float
     """The same after what the siblings have in common is taken off."""
     common_log_ratio: float
-    """What was taken off, not negative."""
+    """What they have in common, not negative."""
     witnesses: Mapping[str, float]
     """p-value by each witness alone."""
     unusual_log_ratio: float = 0.0
     """Log of how many times further the target lies along what sessions differ by than a healthy
     one: what it has beyond is allowed for by as much."""
+    allowed_log_ratio: float = 0.0
+    """What was taken off: what the siblings have in common, and what conditions as unusual as
+    theirs may move one joint by."""
 
 
 def compare_sessions(
@@ -142,8 +145,12 @@ def compare_sessions(
     for axis, joint in joints.items():
         own_shifts = {voice: shifts[voice][axis] for voice in joint.voices}
         foreign = FOREIGN_CONDITIONS * of_siblings(unusual, axis)
-        taken_off = {
+        shared = {
             voice: common_log_ratio(shifts[voice], axis, largest=voice[1] == "score")
+            for voice in joint.voices
+        }
+        taken_off = {
+            voice: shared[voice]
             + (foreign * own_shifts[voice].spread.scale if voice[1] == "orthogonal" else 0.0)
             for voice in joint.voices
         }
@@ -153,17 +160,21 @@ def compare_sessions(
         if any(taken_off.values()):
             p_alone = max(p_value, joint.p_value(own_shifts, taken_off, scales, exchange))
         together = joint.together(own_shifts, {})
-        common = together.log_ratio - joint.together(own_shifts, taken_off).log_ratio
+        common, allowed = (
+            max(together.log_ratio - joint.together(own_shifts, off).log_ratio, 0.0)
+            for off in (shared, taken_off)
+        )
         found[axis] = Compared(
             shift=together,
             p_value=p_value,
             p_alone=p_alone,
-            common_log_ratio=max(common, 0.0),
+            common_log_ratio=common,
             witnesses={
                 name: joint.combined({v: p for v, p in tails.items() if v[0] == name})
                 for name in evidence[axis]
             },
             unusual_log_ratio=unusual[axis],
+            allowed_log_ratio=allowed,
         )
     return found
 

@@ -126,9 +126,11 @@ class Judgement:
     p_adjusted: float
     """Corrected for the number of joints (Holm)."""
     p_alone: float
-    """As `p_adjusted`, after what the siblings have in common is taken off."""
+    """As `p_adjusted`, after what the siblings tell of is taken off."""
     common_log_ratio: float
-    """What was taken off, not negative."""
+    """What they have in common, not negative."""
+    allowed_log_ratio: float
+    """What was taken off: that, and what conditions as unusual as theirs may move one joint by."""
     distance_ratio: float
     """Target's distance from the baseline over that of a healthy session."""
     effects: Mapping[str, float]
@@ -216,6 +218,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             p_adjusted=adjusted[axis],
             p_alone=alone[axis],
             common_log_ratio=compared[axis].common_log_ratio,
+            allowed_log_ratio=compared[axis].allowed_log_ratio,
             distance_ratio=math.exp(min(compared[axis].shift.log_ratio, 100.0)),
             effects=effects,
             witnesses=witnesses[axis],

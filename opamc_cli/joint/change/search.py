@@ -52,8 +52,7 @@ MOST_CAUSES = 3
 STEEPEST_PER_C = 0.06
 """Viscosity halves over 12 degrees at most."""
 
-SMALLEST_WARMTH_C = 2.0
-LARGEST_COLD_FACTOR = 2.0
+SMALLEST_WARMTH_C, LARGEST_COLD_FACTOR = 2.0, 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +91,7 @@ class Grease:
         changes = {"coulomb": 0.0, "viscous": 0.0}
         for name, before, after in zip(population.names, population.mean, mean, strict=True):
             if name in changes and before != 0:
-                changes[name] = float((after - before) / abs(before))
+                changes[name] = float(after / before - 1)
         return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"])
 
     @property
@@ -129,7 +128,6 @@ class Grease:
             shift=shift,
             p_value=p_value,
             ties=ties,
-            evidence={"relative_change": self.wet},
         )
 
 
@@ -162,6 +160,10 @@ def find_slow_causes(
         cause = _next(compared, population, before, candidates, library, grease)
         if cause is None:
             break
+        last = cause.shift.terms[-1].effect.name
+        own = dict(zip(population.names, population.mean, strict=True)).get(last, 0.0)
+        if last in FRICTION and own > 0:  # of a negative friction a share says nothing
+            cause = replace(cause, evidence={"relative_change": cause.shift.coefficients[-1] / own})
         found.append(cause)
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         if cause.effect == "thermal_viscous":
@@ -233,9 +235,8 @@ def _next(
     rank = dict(zip(EXPECTED, range(len(EXPECTED)), strict=True))
     ordered = sorted(gains, key=lambda one: (sure[one][1].width, rank.get(one, 9), sure[one][0]))
     first = next(name for name in ordered if gains[name] >= AS_GOOD * most)
-    ties = tuple(
-        name for name in gains if name != first and gains[name] >= NEARLY_AS_GOOD * gains[first]
-    )
+    near = NEARLY_AS_GOOD * gains[first]
+    ties = tuple(name for name in gains if name != first and gains[name] >= near)
     if first == "spring" and "payload_change" in ties:
         # Over a short travel another weight looks like a spring, and is what changes.
         ties = ("spring", *(tie for tie in ties if tie != "payload_change"))
@@ -248,10 +249,8 @@ def _next(
     names = (first, *ties)
     if not GREASE.isdisjoint(names) and "thermal_viscous" in library and grease.plausible:
         return grease.cause(shift, p_value, names)
-    change = {"coulomb": grease.dry, "viscous": grease.wet}.get(first)
     return SlowCause(
         effect=first,
-        evidence={} if change is None else {"relative_change": change},
         parameters=parameters,
         interpretation=meaning,
         shift=shift,

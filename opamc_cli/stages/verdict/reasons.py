@@ -282,11 +282,18 @@ def _rest(judgement: Judgement, sources: Mapping[str, Sequence[RunSource]]) -> s
 
 
 def _siblings(judgement: Judgement) -> list[str]:
+    excused = judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted
     factor = math.exp(judgement.common_log_ratio)
     if factor < 1.5:
-        return []
+        allowed = math.exp(judgement.allowed_log_ratio)
+        if allowed < 1.1 or not excused:
+            return []
+        return [
+            "The other joints' conditions are unusual (temperature, say): in such a joint may lie "
+            f"{allowed:.2g} times as far out, and is not called changed by less."
+        ]
     text = f"The other joints have moved too, {factor:.3g} times as far as usual in the middle"
-    if judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted:
+    if excused:
         return [
             f"{text}: what moves all joints together (temperature, supply, logger, payload) is "
             "not taken for a fault of one."

@@ -232,6 +232,7 @@ def content(
                 "distance": {
                     "ratio": _finite(final.distance_ratio),
                     "common": _finite(math.exp(final.common_log_ratio)),
+                    "allowed": _finite(math.exp(final.allowed_log_ratio)),
                     "effect": _finite(final.effect),
                 },
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),

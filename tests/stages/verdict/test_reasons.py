@@ -31,6 +31,28 @@ def test_a_joint_that_unusual_conditions_excuse_is_told_so():
     assert said == {("healthy", 0.2): False, ("healthy", 2.0): True, ("fault", 2.0): False}
 
 
+@pytest.mark.parametrize(
+    ("state", "p_alone", "said"), [("healthy", 0.2, True), ("healthy", 1e-4, False),
+                                   ("fault", 0.2, False)],
+)  # fmt: skip
+def test_a_joint_that_the_weather_of_its_siblings_excuses_is_told_so(state, p_alone, said):
+    bundle = known_fleet.bundle(4, 6, 1, (), 0.0)
+    judged = judge({4: bundle})[4]
+    one = replace(
+        judged, state=state, p_adjusted=1e-3, p_alone=p_alone, common_log_ratio=0.1,
+        allowed_log_ratio=1.0,
+    )  # fmt: skip
+    entries = [
+        {
+            **{"motion": cell.motion, "order": cell.order, "tau": cell.tau},
+            **{"jsd_baseline": [0.02], "jsd_target": [0.03]},
+        }
+        for cell in bundle.cells
+    ]
+    text = " ".join(reasons(one, bundle, entries, {"baseline": [], "target": []}))
+    assert ("may lie 2.7 times as far out" in text) is said
+
+
 def test_a_witness_that_could_not_be_heard_is_said():
     own = cells(Fleet(n_axes=1), 0)[1]
     whole = judge({1: Bundle(own)})[1]

@@ -170,7 +170,7 @@ def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
         cause=cause.get("effect"),
         harmless=bool(cause.get("harmless")),
         log_distance=_log(distance.get("ratio")),
-        log_common=_log(distance.get("common")),
+        log_common=_log(distance.get("allowed")),
         effect=distance.get("effect"),
         temperature_c=temperature_c,
         reason=str(reasons[0]),
