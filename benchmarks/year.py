@@ -233,7 +233,7 @@ def judged(folder: Path, config, life: Life, night: int) -> list[Measured]:
             float(np.log(one.distance_ratio)),
             one.allowed_log_ratio,
             one.effect,
-            float(np.median(warm[axis])),
+            float(np.median(warm.get(axis, [np.nan]))),  # a night may lack an axis
             PAYLOAD_KG if loaded else 0.0,
             life.severity(night) if axis == life.wearing_axis else 0.0,
         )
