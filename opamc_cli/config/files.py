@@ -33,7 +33,7 @@ def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Conf
         If the file cannot be read, or a key or value is not allowed.
     """
     values = read_values(shipped_file(path, "configs") if path else None, overrides)
-    return validate(Config, values, str(path) if path else "--set")
+    return validate(Config, values, str(path) if path else "--set", overrides)
 
 
 def read_values(
@@ -98,8 +98,12 @@ def read_yaml(path: Path, prepare: Callable[[str], str] = str) -> dict[str, Any]
     return values
 
 
-def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
+def validate(
+    model: type[Model], values: dict[str, Any], source: str, overrides: Sequence[str] = ()
+) -> Model:
     """Return `values` as a `model`, or name the first key that is wrong.
+
+    It is the source's, or that of ``--set`` where one of the overrides gave it.
 
     Raises
     ------
@@ -112,6 +116,8 @@ def validate(model: type[Model], values: dict[str, Any], source: str) -> Model:
         first = min(error.errors(), key=_helps_little)
         place = [_part(part) for part in _keys_of(first["loc"])]
         key = ".".join(place)
+        if key in {override.partition("=")[0] for override in overrides}:
+            source = "--set"
         if first["type"] == "extra_forbidden":
             known = _known_keys(model, first["loc"][:-1])
             if len(place) == 1:

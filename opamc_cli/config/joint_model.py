@@ -110,7 +110,7 @@ def load_joint_model(path: Path, overrides: Sequence[str] = ()) -> JointModelCon
     """
     file = shipped_file(path, "configs")
     values: dict[str, Any] = read_values(file, overrides)
-    model = validate(JointModelConfig, values, str(path))
+    model = validate(JointModelConfig, values, str(path), overrides)
     folder = file.parent
     return model.model_copy(
         update={"library": tuple((folder / file).resolve() for file in model.library)}

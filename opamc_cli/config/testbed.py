@@ -69,7 +69,7 @@ def load_testbed(path: Path, overrides: Sequence[str] = ()) -> TestbedConfig:
         if isinstance(joints, list):
             robot["joints"] = [_merged(common, own or {}) for own in joints]
     _refuse_unknown(TestbedConfig, values, str(path), "")
-    config = validate(TestbedConfig, values, str(path))
+    config = validate(TestbedConfig, values, str(path), overrides)
     _check(config, path)
     return config
 

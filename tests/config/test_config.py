@@ -106,3 +106,13 @@ def test_a_changed_key_changes_the_hash_and_order_does_not():
     one = load_config(None, ["patterns.gamma=1", "score.base=10"])
     other = load_config(None, ["score.base=10", "patterns.gamma=1"])
     assert one.digest() == other.digest()
+
+
+def test_an_override_that_is_wrong_is_not_the_file_s_fault(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("joint: {pole_pairs: 5}\n")
+    with pytest.raises(ConfigError, match=r"^--set: joint\.gear_ratio is -3; "):
+        load_config(file, ["joint.gear_ratio=-3"])
+    file.write_text("joint: {pole_pairs: 0}\n")
+    with pytest.raises(ConfigError, match=r"mine\.yaml: joint\.pole_pairs is 0; "):
+        load_config(file, ["joint.gear_ratio=100"])

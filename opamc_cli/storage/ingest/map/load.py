@@ -29,7 +29,7 @@ def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
         If it cannot be read, or a key, column name, unit or combination is not allowed.
     """
     file = shipped_file(path, "maps")
-    channels = validate(IngestMap, read_values(file, overrides, protect), str(path))
+    channels = validate(IngestMap, read_values(file, overrides, protect), str(path), overrides)
     check_map(path, channels)
     return channels
 
