@@ -286,7 +286,7 @@ def _siblings(judgement: Judgement) -> list[str]:
     factor = math.exp(judgement.common_log_ratio)
     if factor < 1.5:
         allowed = math.exp(judgement.allowed_log_ratio)
-        if allowed < 1.1 or not excused:
+        if not excused or judgement.p_adjusted > SUSPICION:
             return []
         return [
             "The other joints' conditions are unusual (temperature, say): in such a joint may lie "
