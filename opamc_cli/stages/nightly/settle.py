@@ -10,7 +10,8 @@ from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
 from opamc_cli.decision.trend.chart import LIMIT
-from opamc_cli.stages.nightly.alarms import said_in, settle_robot
+from opamc_cli.stages.nightly.alarms.not_judged import said_in
+from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.plan import NIGHTS_AGAIN
 from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.config.cell import AlarmConfig
-from opamc_cli.stages.nightly.alarms import settle_robot
+from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
 from opamc_cli.storage.history import AlarmRow, Declared, NightRow
 

@@ -1,0 +1,128 @@
+"""One alarm of a joint: since when, what is said of it, and how it ends."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.decision.trend.alarm import Episode
+from opamc_cli.decision.trend.onset import onset
+from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
+from opamc_cli.stages.nightly.alarms.not_judged import said_in
+from opamc_cli.stages.nightly.alarms.trend import trend_of, trend_phrase
+from opamc_cli.storage.history import AlarmRow, Declared, Event, begun_anew
+
+MOST_NIGHTS = 365
+"""Nights that the beginning of a change is sought in."""
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A joint whose nights are watched, and by which rules."""
+
+    name: str
+    """As it is told: its axis, and the program where there are several."""
+    declared: Sequence[Declared]
+    """What users declared of its robot."""
+    rule: AlarmConfig
+    fault_effect: float
+    baseline_nights: int
+    """With `rule`, `fault_effect`: as of `settle_robot`."""
+
+
+def alarm_of(
+    joint: Watched, rows: Sequence[Mapping[str, Any]], found: Episode, signal: int, ended: str
+) -> tuple[AlarmRow, list[Event]]:
+    """Tell an episode of a joint's nights, what is said of it night by night included.
+
+    Its first `signal` came in one of the nights that raised it; it is over in the night `ended`,
+    which is empty where it is not.
+    """
+    first = rows[found.raised]
+    robot, axis = first["robot"], first["axis"]
+    until = ended or "9999"
+    last = sum(row["night"] < until for row in rows)
+    since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
+
+    def told(night: int) -> tuple[dict[str, Any], str]:
+        """Return the trend by what was known in a night, and the words of it."""
+        lately = measured(rows[max(0, night + 1 - MOST_NIGHTS) : night + 1])
+        trend = trend_of(lately, since, joint.fault_effect, joint.baseline_nights)
+        return trend, f"{_state_phrase(rows[night])}; {trend_phrase(trend, joint.fault_effect)}"
+
+    trend, text = told(last - 1)
+    known = _acknowledged(joint.declared, axis, first["night"], until)
+    # later nights do not change what was said in earlier ones
+    said = told(found.raised)[1]
+    events = [Event(first["night"], robot, axis, "alarm", f"{joint.name}: {said}")]
+    nights = [row["night"] for row in rows[found.raised : last]]
+    for index in said_in(nights, [""] * len(nights), joint.rule.remind_after)[1:]:
+        if known is None or nights[index] < known.night:
+            said = f"{joint.name}: alarm since {since}; {told(found.raised + index)[1]}"
+            events.append(Event(nights[index], robot, axis, "reminder", said))
+    if ended:
+        how = f"no sign of it in {joint.rule.of} judged nights"
+        if found.cleared is None:
+            how = "by a new baseline"
+        text_of_end = f"{joint.name}: the alarm of {first['night']} is over, {how}"
+        events.append(Event(ended, robot, axis, "cleared", text_of_end))
+    alarm = AlarmRow(
+        robot=robot,
+        program=first["program"],
+        axis=axis,
+        raised=first["night"],
+        since=since,
+        cleared=ended or None,
+        acknowledged=None if known is None else known.why,
+        text=text,
+        trend=json.dumps(trend, sort_keys=True),
+    )
+    return alarm, events
+
+
+def _acknowledged(
+    declared: Sequence[Declared], axis: int, raised: str, until: str
+) -> Declared | None:
+    """Return what silences an alarm: of another baseline it is another alarm."""
+
+    def in_force(said: Sequence[Declared]) -> str:
+        return max((night for _, night in begun_anew(said) if night <= raised), default="")
+
+    return next(
+        (
+            one
+            for n, one in enumerate(declared)
+            if (one.kind, one.axis) == ("acknowledged", axis)
+            and raised <= one.night < until
+            and in_force(declared[:n]) == in_force(declared)
+        ),
+        None,
+    )
+
+
+def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any]) -> str:
+    """Return the night in which a change began.
+
+    How it goes on after the alarm does not say: a distance grows ever faster, and then slower.
+    """
+    seen = measured(until_raised)
+    if not seen:
+        return str(signal["night"])
+    begun = onset(days(seen), distances(seen))
+    # a change that was there from the first night on has no before
+    return str(min(seen[begun]["night"], signal["night"]))
+
+
+def _state_phrase(row: Mapping[str, Any]) -> str:
+    phrase = {
+        "fault": "at fault",
+        "changed": "changed",
+        "healthy": "each night for itself healthy, all together not",
+        "insufficient-data": "not judged in the last night",
+    }.get(row["state"], row["state"])
+    if row["effect"] is not None and row["state"] in JUDGED:
+        phrase += f", effect {row['effect']:.2f}"
+    if row["cause"]:
+        phrase += f", looks like {row['cause']}"
+    return str(phrase)

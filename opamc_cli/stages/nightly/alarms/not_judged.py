@@ -1,0 +1,88 @@
+"""What to say of nights that could not be judged: not every night the same."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from typing import Any
+
+from opamc_cli.stages.nightly.alarms.course import JUDGED, day
+from opamc_cli.storage.history import UNJUDGED, Event, NightRow
+
+
+def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+    """Say of a joint which of its nights were not judged, and why."""
+    for unjudged, part in groupby(rows, key=lambda row: row["state"] not in JUDGED):
+        streak = list(part)
+        if unjudged:
+            first, last = streak[0], streak[-1]
+            span = f"since {first['night']}"
+            if last is not rows[-1]:  # it was judged again
+                span = f"from {first['night']} to {last['night']}"
+                span = first["night"] if first is last else span
+            nights, reasons = ([row[of] for row in streak] for of in ("night", "reason"))
+            row = f" ({len(streak)} nights in a row)" if len(streak) > 1 else ""
+            text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
+            for index in said_in(nights, reasons, remind_after):
+                yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
+
+
+def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterator[Event]:
+    """Say of a robot which of its nights failed, in whole or in part, and why."""
+    for row in nights:
+        if row.why and not row.night:  # files that do not say of which night they are
+            yield Event("", robot, None, "failed", row.why)
+    dated = [row for row in nights if row.night]
+    for failing, part in groupby(dated, key=lambda row: bool(row.why)):
+        streak = list(part) if failing else []
+        for kind in ("partial", "failed"):
+            rows = [row for row in streak if (row.status in UNJUDGED) == (kind == "failed")]
+            if not rows:
+                continue
+            dates, reasons = [row.night for row in rows], [row.why for row in rows]
+            span = dates[0]
+            if len(dates) > 1:
+                in_a_row = " in a row" if len(rows) == len(streak) else ""
+                span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights{in_a_row})"
+            if kind == "partial":
+                judged = any(row.status != "baseline" for row in rows)
+                span += f": in part not {'judged' if judged else 'used'}"
+            text = f"{span}: {_in_one(dates, reasons)}"
+            for index in said_in(dates, reasons, remind_after):
+                yield Event(dates[index], robot, None, kind, text)
+
+
+def said_in(nights: Sequence[str], reasons: Sequence[str], remind_after: int) -> list[int]:
+    """Return in which of the nights that something lasts it is said.
+
+    In the first, in those with a reason that was not said yet, and after some nights again.
+    """
+    said: list[int] = []
+    known: set[str] = set()
+    for index, (night, reason) in enumerate(zip(nights, reasons, strict=True)):
+        new = _kinds(reason) - known
+        if new or day(night) - day(nights[said[-1]]) >= remind_after:
+            said.append(index)
+        known |= new
+    return said
+
+
+def _in_one(nights: Sequence[str], reasons: Sequence[str]) -> str:
+    """Return the last night's reason, and since when there were others.
+
+    It is the same whenever it is said: who hears of it late hears it once.
+    """
+    text = reasons[-1]
+    known = _kinds(text)
+    for night, reason in zip(nights, reasons, strict=True):
+        if not _kinds(reason) <= known:
+            text += f"; {night}: {reason}"
+            known |= _kinds(reason)
+    return text
+
+
+def _kinds(reason: str) -> set[str]:
+    """Return a reason's sentences without what differs from night to night: paths and numbers."""
+    return {
+        " ".join(word for word in one.split() if not re.search(r"[\d/]", word))
+        for one in reason.split("; ")
+    }

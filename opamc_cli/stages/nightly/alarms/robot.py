@@ -1,0 +1,114 @@
+"""From a robot's history to its alarms and what is worth saying: a pure function of the nights."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from typing import Any
+
+from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.decision.trend.alarm import Night, episodes
+from opamc_cli.decision.trend.chart import CALM, LIMIT
+from opamc_cli.stages.nightly.alarms.alarm import Watched, alarm_of
+from opamc_cli.stages.nightly.alarms.course import JUDGED, chart_of, courses
+from opamc_cli.stages.nightly.alarms.not_judged import failed, not_judged
+from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow, begun_anew
+
+
+@dataclass(frozen=True)
+class Settled:
+    """What follows from a robot's nights; see `History.settle`."""
+
+    alarms: tuple[AlarmRow, ...]
+    standing: tuple[tuple[str, int, str], ...]
+    events: tuple[Event, ...]
+
+
+def settle_robot(
+    robot: str,
+    series: Sequence[Mapping[str, Any]],
+    nights: Sequence[NightRow],
+    declared: Sequence[Declared],
+    rule: AlarmConfig,
+    fault_effect: float,
+    baseline_nights: int,
+) -> Settled:
+    """Find a robot's alarms, and what is worth saying of it.
+
+    Parameters
+    ----------
+    robot
+        Its name.
+    series
+        Its verdicts and measures by program, axis and night, as `History.series` returns them.
+    nights
+        What became of its nights, in time order.
+    declared
+        What users declared of it.
+    rule
+        When nights make an alarm.
+    fault_effect
+        Effect from which a change is a fault.
+    baseline_nights
+        Nights of a baseline.
+    """
+    alarms: list[AlarmRow] = []
+    standing: list[tuple[str, int, str]] = []
+    events: list[Event] = []
+    several = len({row["program"] for row in series}) > 1
+    for (program, axis), group in groupby(series, key=lambda row: (row["program"], row["axis"])):
+        joint = list(group)
+        name = f"axis {axis}" + (f" in program {program}" if several else "")
+        watched = Watched(name, declared, rule, fault_effect, baseline_nights)
+        for rows, replaced in courses(joint):
+            seen = _nights(rows, rule, baseline_nights)
+            for found in episodes(seen, rule.nights, rule.of):
+                raised = rows[found.raised]["night"]
+                if found.cleared is not None:
+                    ended = rows[found.cleared]["night"]
+                else:
+                    # a baseline that was declared is known before a night is judged against it
+                    ended = _after_maintenance(raised, nights, declared) or replaced
+                signal = _first_signal(seen, found.raised, rule.of)
+                alarm, said = alarm_of(watched, rows, found, signal, ended)
+                alarms.append(alarm)
+                events += said
+                standing += [
+                    (program, axis, row["night"])
+                    for row in joint
+                    if raised <= row["night"] < (ended or "9999")
+                ]
+        events += not_judged(joint, name, rule.remind_after)
+    events += failed(robot, nights, rule.remind_after)
+    return Settled(tuple(alarms), tuple(dict.fromkeys(standing)), tuple(events))
+
+
+def _nights(
+    rows: Sequence[Mapping[str, Any]], rule: AlarmConfig, baseline_nights: int
+) -> list[Night]:
+    averages = chart_of(rows, baseline_nights)
+    found = []
+    for row, average in zip(rows, averages.tolist(), strict=True):
+        # a fault whose cause lies outside the joint is none of it; nights that only changed are
+        # left to the chart: by chance a baseline is so even that every tenth night of it differs
+        fault = row["state"] == "fault" and not row["harmless"]
+        gross = fault and (row["effect"] or 0.0) > rule.gross
+        signal, calm = fault or average > LIMIT, not average > CALM
+        found.append(Night(signal, gross, calm, judged=row["state"] in JUDGED))
+    return found
+
+
+def _first_signal(nights: Sequence[Night], raised: int, among: int) -> int:
+    """Return the first of the nights that raised an alarm."""
+    judged = [index for index in range(raised + 1) if nights[index].judged][-among:]
+    return next(index for index in judged if nights[index].signal)
+
+
+def _after_maintenance(
+    raised: str, nights: Sequence[NightRow], declared: Sequence[Declared]
+) -> str:
+    """Return the first night of a baseline that was declared after an alarm; empty without one."""
+    after = [night for _, night in begun_anew(declared) if night > raised]
+    if not after:
+        return ""
+    # a date that is still to come, or was mistyped, silences nothing
+    return next((row.night for row in nights if row.night >= min(after)), "")

@@ -1,0 +1,82 @@
+"""Where a joint that has changed is heading, in numbers and in words."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.decision.trend.chart import usual_nights
+from opamc_cli.decision.trend.slope import Slope, nights_until, robust_slope, slope_of_spread
+from opamc_cli.decision.trend.temperature import without_temperature
+from opamc_cli.stages.nightly.alarms.course import days, distances
+
+
+def trend_of(
+    rows: Sequence[Mapping[str, Any]], since: str, fault_effect: float, baseline_nights: int
+) -> dict[str, Any]:
+    """Return how fast a joint's effect and distance grow since a night, and when it is at fault.
+
+    Whether it grows is the distance's to say: the effect is the largest of what several witnesses
+    see, and moves with each of them. Empty with too few nights.
+    """
+    changed = np.array([row["night"] >= since for row in rows], dtype=np.bool_)
+    healthy = np.array([row["state"] == "healthy" for row in rows], dtype=np.bool_)
+    warmth = np.array([row["temperature_c"] for row in rows], dtype=np.float64)
+    logged = warmth[np.isfinite(warmth)]
+    usual = float(np.median(logged)) if logged.size else math.nan
+    effects, log_distances = np.array([row["effect"] or 0.0 for row in rows]), distances(rows)
+    nights = days(rows)[changed]
+    effect, distance = (
+        robust_slope(nights, without_temperature(nights, course[changed], warmth[changed], usual))
+        for course in (effects, log_distances)
+    )
+    if effect is None or distance is None or not math.isfinite(effect.low + distance.low):
+        _, spread = usual_nights(log_distances[healthy & ~changed], baseline_nights)
+        few = slope_of_spread(nights, log_distances[changed], spread)
+        if few is None or not few.clear:
+            return {}
+        reached = float(np.median(effects[changed][-3:])) >= fault_effect
+        return {"distance": _rounded(few), "reach": [0, 0] if reached else None}
+    reach = nights_until(effect, fault_effect)
+    return {
+        "per_night": round(effect.per_night, 6),
+        "low": round(effect.low, 6),
+        "high": round(effect.high, 6),
+        "level": round(effect.level, 6),
+        "distance": _rounded(distance),
+        "reach": None if reach is None else [math.floor(reach[0]), math.ceil(reach[1])],
+    }
+
+
+def _rounded(slope: Slope) -> list[float]:
+    return [round(one, 6) for one in (slope.per_night, slope.low, slope.high)]
+
+
+def trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
+    """Say where a joint is heading: its effect may move with the weather, its distance less."""
+    if not trend:
+        return "too few nights for a trend"
+    reach, level = trend["reach"], f"fault level ({limit:g})"
+    farther = "no trend"
+    if trend["distance"][1] > 0:
+        usual, least, most = (_percent(one) for one in trend["distance"])
+        farther = f"distance from the baseline grows by {usual} % ({least} to {most}) a night"
+    if reach == [0, 0]:
+        grows = farther
+        if trend.get("low", 0) > 0:
+            grows = f"grows by {trend['per_night']:.3f} a night"
+        return f"at {level}, {grows}"
+    if reach is None:
+        why = "the effect too unevenly" if "level" in trend else "too few nights"
+        unsure = f", {why} to say when it reaches {level}"
+        return farther + (unsure if trend["distance"][1] > 0 else "")
+    return (
+        f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
+        f"night, reaches {level} in {reach[0]} to {reach[1]} nights"
+    )
+
+
+def _percent(log_ratio: float) -> str:
+    percent = 100 * math.expm1(log_ratio)
+    return f"{percent:.{1 if abs(percent) < 10 else 0}f}"
