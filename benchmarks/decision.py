@@ -362,6 +362,9 @@ def feature_table(stored, axis: int, run: str, motions: list[int]) -> NDArray[np
 
 def rival_scores(stored, axis: int, baseline: list[str], target: str, seed: int) -> dict:
     runs = (*baseline, target)
+    if not all((run, axis) in stored["rivals"] for run in runs):
+        # Of a known motion nothing was found: whoever looks for it is told so.
+        return dict.fromkeys((*FEATURE_SLICES, "kernel density KL", "isolation forest"), np.inf)
     found = [{m for _, m, _ in stored["rivals"][run, axis]["features"]} for run in runs]
     motions = sorted(set.intersection(*found))
     features = [feature_table(stored, axis, run, motions) for run in runs]
