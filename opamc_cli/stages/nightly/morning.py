@@ -98,10 +98,12 @@ def tell(
     lines = list(outcome.absent)
     standing_lines: list[str] = []
     for robot in summary.needing():
-        fresh = {e.axis for e in news if e.robot == robot.name and e.kind in ("alarm", "reminder")}
+        told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
         for joint in robot.alarms:
-            if joint.axis in fresh:
-                lines += _alarm_lines(robot, joint, out, cell)
+            if (joint.axis, "alarm") in told:
+                lines += _alarm_lines("ALARM", robot, joint, out, cell)
+            elif (joint.axis, "reminder") in told:
+                lines += _alarm_lines("STILL UNDER ALARM", robot, joint, out, cell)
             else:
                 place, text = _place(robot, joint), robot.text_of(joint)
                 standing_lines.append(f"{place}: alarm since {joint.since}, {text}")
@@ -142,10 +144,12 @@ def tell(
     return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
 
 
-def _alarm_lines(robot: RobotSummary, joint: JointSummary, out: Path, cell: Path) -> Iterator[str]:
+def _alarm_lines(
+    how: str, robot: RobotSummary, joint: JointSummary, out: Path, cell: Path
+) -> Iterator[str]:
     alarm = joint.alarm
     assert alarm is not None
-    yield f"{_place(robot, joint)}: ALARM, not as it was since {alarm.since}"
+    yield f"{_place(robot, joint)}: {how}, not as it was since {alarm.since}"
     yield f"  {robot.text_of(joint)}"
     where = out / joint.report if joint.report else out / files.PAGE
     yield (

@@ -170,6 +170,18 @@ def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(
         assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
 
 
+def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
+    cell.write_text(cell.read_text() + "alarm: {nights: 1, of: 1, remind_after: 1}\n")
+    late = cell.parent / "logs" / "r2" / NIGHTS[4]
+    late.rename(cell.parent / "late")
+    with nightly_kills.with_stand_in():
+        assert "r2 axis 2: ALARM, not as it was" in opamc("nightly", cell, "--quiet").out
+        (cell.parent / "late").rename(late)
+        again = opamc("nightly", cell, "--quiet")
+    assert again.code == ExitCode.UNHEALTHY
+    assert again.out.startswith("r2 axis 2: STILL UNDER ALARM, not as it was since ")
+
+
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     plain = cell.read_text()
     watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
