@@ -12,7 +12,7 @@ from opamc_cli.config.models import digest
 from opamc_cli.decision.trend.chart import LIMIT
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
-from opamc_cli.stages.nightly.plan import NIGHTS_AGAIN
+from opamc_cli.stages.nightly.plan.baselines import NIGHTS_AGAIN
 from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page
 from opamc_cli.stages.nightly.summary import Summary, summarise

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.stages.nightly.inputs.recordings import Recording
-from opamc_cli.stages.nightly.plan import PlannedNight
+from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.workers.night import Input, NightJob, ProgramJob
 from opamc_cli.storage.logs import copy_name
 

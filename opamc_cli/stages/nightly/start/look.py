@@ -12,7 +12,8 @@ from opamc_cli.stages.nightly.inputs.recordings import (
     some,
 )
 from opamc_cli.stages.nightly.inputs.strangers import said_of_baselines, without_strangers
-from opamc_cli.stages.nightly.plan import PlannedNight, RobotPlan, Situation, plan_robot
+from opamc_cli.stages.nightly.plan.planned import PlannedNight, RobotPlan, Situation
+from opamc_cli.stages.nightly.plan.robot import plan_robot
 from opamc_cli.stages.nightly.start.jobs import COPIES
 from opamc_cli.stages.nightly.start.outcome import CellOutcome, Wanted
 from opamc_cli.stages.nightly.start.past import Past

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from opamc_cli.stages.nightly.plan import PlannedNight
+from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.storage.history import UNJUDGED, Event, NightRow
 

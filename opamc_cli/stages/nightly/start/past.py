@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from opamc_cli.config.cell import CellConfig
-from opamc_cli.stages.nightly.plan import PlannedNight
+from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.storage.history import History, NightRow, begun_anew
 from opamc_cli.storage.schemas import files
 

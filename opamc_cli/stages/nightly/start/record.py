@@ -7,7 +7,7 @@ from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
 from opamc_cli.stages.nightly.inputs.strangers import several_named
-from opamc_cli.stages.nightly.plan import PlannedNight
+from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.settle import OF_NIGHT
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.workers.night import AxisResult, NightJob, ProgramJob, ProgramResult

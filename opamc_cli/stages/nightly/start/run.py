@@ -9,7 +9,7 @@ import shutil
 from collections.abc import Iterator, Sequence
 
 from opamc_cli.config.cell import CellConfig
-from opamc_cli.stages.nightly.plan import PlannedNight
+from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.settle import settle_cell
 from opamc_cli.stages.nightly.start.jobs import WORK, drop_copies, night_job
 from opamc_cli.stages.nightly.start.look import Look, Scene, arrive, look_at, plan_of
