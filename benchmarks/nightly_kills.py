@@ -32,7 +32,8 @@ import cell_logs
 
 from opamc_cli.__main__ import main
 from opamc_cli.stages.nightly.start import run as stage
-from opamc_cli.storage.history import DERIVED, History
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import DERIVED
 
 STAND_IN = "night_stand_in:stand_in"
 OURS = (".opamc-work", ".kept", ".copies", ".opamc.lock", ".opamc.cell")

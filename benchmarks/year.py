@@ -33,7 +33,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.verdict.verdict import decide
-from opamc_cli.storage.history import AlarmRow
+from opamc_cli.storage.history.rows import AlarmRow
 from opamc_cli.storage.runs import RunInfo, save_run
 from opamc_cli.testbed.robot import simulate
 

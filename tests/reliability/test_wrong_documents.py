@@ -9,7 +9,8 @@ from fuzz import fuzz
 from mutations import ODD_YAML
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.history import History, NightRow
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import NightRow
 
 
 @pytest.mark.parametrize("odd", ODD_YAML, ids=range(len(ODD_YAML)))

@@ -3,7 +3,8 @@
 import sqlite3
 from contextlib import closing
 
-from opamc_cli.storage.history import Event, History
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import Event
 
 
 def test_a_file_tells_the_layout_that_it_has(tmp_path):

@@ -101,7 +101,7 @@ def _export(path: Path, rows: list[dict[str, Any]], table: str) -> None:
     import pyarrow.parquet
 
     from opamc_cli.storage.files.atomic import atomic_path, write_text
-    from opamc_cli.storage.history import arrow_schema
+    from opamc_cli.storage.history.rows import arrow_schema
 
     if path.suffix == ".json":
         write_text(path, json.dumps(rows, indent=1, ensure_ascii=False) + "\n")

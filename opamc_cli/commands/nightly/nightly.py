@@ -180,7 +180,7 @@ def acknowledge(
     quiet: Quiet = False,
 ) -> None:
     """Silence the alarm of a joint until it is over, or of a robot that it has no files."""
-    from opamc_cli.storage.history import Declared
+    from opamc_cli.storage.history.rows import Declared
 
     why = _reason(why)
 
@@ -223,7 +223,7 @@ def rebaseline(
     quiet: Quiet = False,
 ) -> None:
     """Begin a new baseline for a robot, such as after maintenance."""
-    from opamc_cli.storage.history import Declared, begun_anew
+    from opamc_cli.storage.history.rows import Declared, begun_anew
 
     night = as_night(begin)
     assert night is not None

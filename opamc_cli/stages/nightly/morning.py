@@ -12,7 +12,8 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
-from opamc_cli.storage.history import Event, History
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import Event
 from opamc_cli.storage.schemas import files
 
 OVER = {

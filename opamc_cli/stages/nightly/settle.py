@@ -17,7 +17,8 @@ from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page
 from opamc_cli.stages.nightly.summary import Summary, summarise
 from opamc_cli.storage.files.folders import remove_folder
-from opamc_cli.storage.history import AlarmRow, Event, History, NightRow, begun_anew
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import AlarmRow, Event, NightRow, begun_anew
 from opamc_cli.storage.schemas import files
 
 OF_NIGHT = frozenset({files.VERDICT, files.REPORT})

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from opamc_cli.stages.nightly.inputs.recordings import some
-from opamc_cli.storage.history import UNJUDGED, AlarmRow, History, NightRow, begun_anew
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import UNJUDGED, AlarmRow, NightRow, begun_anew
 
 SEVERITY = (
     "alarm",

@@ -8,7 +8,7 @@ import pytest
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
-from opamc_cli.storage.history import AlarmRow, Declared, NightRow
+from opamc_cli.storage.history.rows import AlarmRow, Declared, NightRow
 
 
 def nights_of(states, distances=None):

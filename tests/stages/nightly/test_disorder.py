@@ -18,7 +18,8 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.morning import silent
 from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.stages.nightly.start import run as stage
-from opamc_cli.storage.history import History, NightRow
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
 from opamc_cli.storage.runs import Run, save_run
 

@@ -10,7 +10,8 @@ from browser import browse, needs_browser
 
 from opamc_cli.stages.nightly.publish.page import render
 from opamc_cli.stages.nightly.summary import summarise
-from opamc_cli.storage.history import AlarmRow, History, MeasureRow, NightRow, VerdictRow
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import AlarmRow, MeasureRow, NightRow, VerdictRow
 
 NIGHTS = [cell_logs.night(index) for index in range(30)]
 NASTY = '</script><b>"r&1'

@@ -12,7 +12,8 @@ from cell_logs import night
 from opamc_cli.commands.nightly.claim import claim
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode, UsageError
-from opamc_cli.storage.history import Event, History, NightRow
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import Event, NightRow
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
 

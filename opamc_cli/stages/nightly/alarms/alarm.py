@@ -11,7 +11,7 @@ from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
 from opamc_cli.stages.nightly.alarms.trend import trend_of, trend_phrase
-from opamc_cli.storage.history import AlarmRow, Declared, Event, begun_anew
+from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, begun_anew
 
 MOST_NIGHTS = 365
 """Nights that the beginning of a change is sought in."""

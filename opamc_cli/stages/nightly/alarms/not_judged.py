@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
-from opamc_cli.storage.history import UNJUDGED, Event, NightRow
+from opamc_cli.storage.history.rows import UNJUDGED, Event, NightRow
 
 
 def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:

@@ -11,7 +11,7 @@ from opamc_cli.decision.trend.chart import CALM, LIMIT
 from opamc_cli.stages.nightly.alarms.alarm import Watched, alarm_of
 from opamc_cli.stages.nightly.alarms.course import JUDGED, chart_of, courses
 from opamc_cli.stages.nightly.alarms.not_judged import failed, not_judged
-from opamc_cli.storage.history import AlarmRow, Declared, Event, NightRow, begun_anew
+from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, NightRow, begun_anew
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,8 @@ from pathlib import Path
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings.sessions import night_of
-from opamc_cli.storage.history import FileRow, History
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import FileRow
 from opamc_cli.storage.logs import (
     Facts,
     LogFile,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from hashlib import sha256
 
 from opamc_cli.stages.nightly.inputs.recordings import Recording
-from opamc_cli.storage.history import NightRow
+from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.logs import Facts
 
 ByRobot = Mapping[str, Sequence[Recording]]

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from opamc_cli.stages.nightly.inputs.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.stages.nightly.plan.planned import Comparison, Situation
-from opamc_cli.storage.history import AlarmSpan
+from opamc_cli.storage.history.rows import AlarmSpan
 
 LEAST_NIGHTS = 2
 """Nights that must be left of a baseline: one says nothing of how much nights differ."""

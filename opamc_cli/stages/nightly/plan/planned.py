@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from opamc_cli.config.cell import BaselineConfig
 from opamc_cli.stages.nightly.inputs.recordings import Recording
-from opamc_cli.storage.history import AlarmSpan, NightRow
+from opamc_cli.storage.history.rows import AlarmSpan, NightRow
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from opamc_cli import __version__
 from opamc_cli.config.models import digest
 from opamc_cli.stages.nightly.inputs.recordings import Recording
 from opamc_cli.stages.nightly.plan.planned import Comparison
-from opamc_cli.storage.history import NightRow
+from opamc_cli.storage.history.rows import NightRow
 
 MOST_ATTEMPTS = 3
 """Starts in which a night may break (time, memory, death of its worker) before it is left alone."""

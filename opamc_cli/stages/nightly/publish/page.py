@@ -13,7 +13,7 @@ from opamc_cli.stages.nightly.summary import Summary
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.templates import environment
 from opamc_cli.storage.files.atomic import write_text
-from opamc_cli.storage.history import History
+from opamc_cli.storage.history.history import History
 from opamc_cli.storage.schemas import files
 
 NIGHTS_SHOWN = 30

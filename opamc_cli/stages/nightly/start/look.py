@@ -17,7 +17,8 @@ from opamc_cli.stages.nightly.plan.robot import plan_robot
 from opamc_cli.stages.nightly.start.jobs import COPIES
 from opamc_cli.stages.nightly.start.outcome import CellOutcome, Wanted
 from opamc_cli.stages.nightly.start.past import Past
-from opamc_cli.storage.history import UNJUDGED, Event, History
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import UNJUDGED, Event
 
 
 @dataclass(frozen=True)

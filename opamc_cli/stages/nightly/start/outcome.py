@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.summary import Summary
-from opamc_cli.storage.history import UNJUDGED, Event, NightRow
+from opamc_cli.storage.history.rows import UNJUDGED, Event, NightRow
 
 
 @dataclass(frozen=True)

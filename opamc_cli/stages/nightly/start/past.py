@@ -4,7 +4,8 @@ from pathlib import Path
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.stages.nightly.plan.planned import PlannedNight
-from opamc_cli.storage.history import History, NightRow, begun_anew
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import NightRow, begun_anew
 from opamc_cli.storage.schemas import files
 
 

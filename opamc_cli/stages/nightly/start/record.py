@@ -13,7 +13,8 @@ from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.workers.night import AxisResult, NightJob, ProgramJob, ProgramResult
 from opamc_cli.stages.nightly.workers.workers import Broken
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
-from opamc_cli.storage.history import Event, History, MeasureRow, NightRow, VerdictRow, as_notes
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import Event, MeasureRow, NightRow, VerdictRow, as_notes
 from opamc_cli.storage.schemas import files
 
 MOST_REASONS = 3

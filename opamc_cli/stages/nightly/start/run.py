@@ -20,7 +20,7 @@ from opamc_cli.stages.nightly.workers import cluster
 from opamc_cli.stages.nightly.workers.night import COMPUTE, NightJob, ProgramResult
 from opamc_cli.stages.nightly.workers.workers import Broken, run_all
 from opamc_cli.stages.processes.parallel import Steps, unshown
-from opamc_cli.storage.history import History
+from opamc_cli.storage.history.history import History
 from opamc_cli.storage.schemas import files
 
 

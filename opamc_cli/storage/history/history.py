@@ -6,277 +6,44 @@ there or it is not. Nothing in the file depends on the order in which nights wer
 the clock, but the times at which a user acknowledged or declared something.
 """
 
-import json
 import os
-import re
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from pathlib import Path
-from typing import Any, NoReturn, Self, TypeVar, get_args, get_type_hints
+from typing import Any, NoReturn, Self, TypeVar
 
-import pyarrow as pa
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import ensure_directory
-from opamc_cli.storage.logs import Facts
+from opamc_cli.storage.history.layout import (
+    ADAPTERS,
+    COLUMNS,
+    DOCUMENTS,
+    NIGHT,
+    SCHEMA,
+    SCHEMA_VERSION,
+    WORDS,
+    layout_of,
+)
+from opamc_cli.storage.history.rows import (
+    OF_ROBOT,
+    AlarmRow,
+    AlarmSpan,
+    Declared,
+    Event,
+    FileRow,
+    MeasureRow,
+    NightRow,
+    VerdictRow,
+)
 
-SCHEMA_VERSION = 1
 BUSY_S = 60.0
 """Another process may be writing: its transactions last milliseconds."""
 
-SCHEMA = """
-CREATE TABLE verdict (
-  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, night TEXT NOT NULL,
-  state TEXT NOT NULL, health_index REAL, p_value REAL, cause TEXT, alarm INTEGER NOT NULL,
-  temperature_c REAL, payload_kg REAL, speed_percent REAL, n_runs INTEGER NOT NULL,
-  report TEXT, config_hash TEXT NOT NULL, version TEXT NOT NULL,
-  PRIMARY KEY (robot, program, axis, night)
-) WITHOUT ROWID;
-CREATE TABLE event (
-  time TEXT NOT NULL, robot TEXT NOT NULL, axis INTEGER, kind TEXT NOT NULL, text TEXT NOT NULL
-);
-CREATE INDEX event_of ON event (robot, kind);
-CREATE TABLE measure (
-  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, night TEXT NOT NULL,
-  baseline TEXT NOT NULL, distance REAL, common REAL, effect REAL, harmless INTEGER NOT NULL,
-  reason TEXT NOT NULL,
-  PRIMARY KEY (robot, program, axis, night)
-) WITHOUT ROWID;
-CREATE TABLE night (
-  robot TEXT NOT NULL, night TEXT NOT NULL, key TEXT NOT NULL, status TEXT NOT NULL,
-  attempts INTEGER NOT NULL, why TEXT NOT NULL, notes TEXT NOT NULL,
-  PRIMARY KEY (robot, night)
-) WITHOUT ROWID;
-CREATE TABLE file (
-  path TEXT NOT NULL PRIMARY KEY, robot TEXT NOT NULL, night TEXT, size INTEGER NOT NULL,
-  mtime_ns INTEGER NOT NULL, sha256 TEXT NOT NULL, facts TEXT NOT NULL
-) WITHOUT ROWID;
-CREATE INDEX file_of ON file (robot);
-CREATE TABLE baseline (
-  robot TEXT NOT NULL, program TEXT NOT NULL, condition TEXT NOT NULL, since TEXT NOT NULL,
-  night TEXT NOT NULL, PRIMARY KEY (robot, program, condition, since, night)
-) WITHOUT ROWID;
-CREATE TABLE declared (
-  time TEXT NOT NULL, robot TEXT NOT NULL, axis INTEGER, kind TEXT NOT NULL, night TEXT NOT NULL,
-  why TEXT NOT NULL
-);
-CREATE TABLE alarm (
-  robot TEXT NOT NULL, program TEXT NOT NULL, axis INTEGER NOT NULL, raised TEXT NOT NULL,
-  since TEXT NOT NULL, cleared TEXT, acknowledged TEXT, text TEXT NOT NULL, trend TEXT NOT NULL,
-  PRIMARY KEY (robot, program, axis, raised)
-) WITHOUT ROWID;
-CREATE TABLE told (
-  robot TEXT NOT NULL, axis INTEGER NOT NULL, kind TEXT NOT NULL, time TEXT NOT NULL,
-  PRIMARY KEY (robot, axis, kind, time)
-) WITHOUT ROWID;
-CREATE TABLE rule (hash TEXT NOT NULL);
-CREATE TABLE stale (robot TEXT NOT NULL PRIMARY KEY) WITHOUT ROWID;
-"""
-
-OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed", "partial")
-"""Kinds of event that follow from the nights of one robot."""
-
-OF_NIGHT = ("judged-anew", "lacking")
-"""Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
-
-UNJUDGED = ("failed", "broken")
-"""What a night's status is if nothing of it could be judged."""
-
-DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
-"""Kinds of event that follow from the nights; the others were declared by a user."""
-
-
-@dataclass(frozen=True)
-class VerdictRow:
-    """One joint in one night; the columns of table `verdict`."""
-
-    robot: str
-    program: str
-    axis: int
-    night: str
-    state: str
-    health_index: float | None
-    p_value: float | None
-    cause: str | None
-    alarm: int
-    temperature_c: float | None
-    payload_kg: float | None
-    speed_percent: float | None
-    n_runs: int
-    report: str | None
-    config_hash: str
-    version: str
-
-
-@dataclass(frozen=True)
-class MeasureRow:
-    """What trend and alarm rest on beside the verdict."""
-
-    robot: str
-    program: str
-    axis: int
-    night: str
-    baseline: str
-    """Name of the baseline that the night was compared with; a series ends where it changes."""
-    distance: float | None
-    """Logarithm of the distance from the baseline in healthy sessions' own."""
-    common: float | None
-    """What of it the robot's joints have in common."""
-    effect: float | None
-    """Relative change behind the state."""
-    harmless: int
-    """Whether the change has a cause outside the joint."""
-    reason: str
-    """First reason of the verdict, for what could not be judged."""
-
-
-@dataclass(frozen=True)
-class NightRow:
-    """What became of one robot's night."""
-
-    robot: str
-    night: str
-    key: str
-    """Hash of its inputs, options and version."""
-    status: str
-    """done, partial, baseline, failed (will fail again) or broken (may be tried again)."""
-    attempts: int = 0
-    """Starts that it broke in."""
-    why: str = ""
-    """One sentence, if anything failed."""
-    notes: str = "[]"
-    """JSON list of what is worth knowing."""
-
-
-@dataclass(frozen=True)
-class FileRow:
-    """A recording as it was when it was last read."""
-
-    path: str
-    robot: str
-    night: str | None
-    size: int
-    mtime_ns: int
-    sha256: str
-    facts: str
-
-
-@dataclass(frozen=True)
-class Event:
-    """Something that happened to a robot or one of its joints."""
-
-    time: str
-    robot: str
-    axis: int | None
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True)
-class Declared:
-    """What a user said: a baseline from a night on, or not after all, or an alarm that is known."""
-
-    time: str
-    robot: str
-    axis: int | None
-    kind: str
-    night: str
-    why: str
-
-
-@dataclass(frozen=True)
-class AlarmRow:
-    """One alarm, standing while `cleared` is None."""
-
-    robot: str
-    program: str
-    axis: int
-    raised: str
-    since: str
-    cleared: str | None
-    acknowledged: str | None
-    text: str
-    trend: str
-
-
-@dataclass(frozen=True)
-class AlarmSpan:
-    """Nights in which an alarm stands, half-open."""
-
-    program: str
-    axis: int
-    raised: str
-    cleared: str
-    """Later than any night while it stands."""
-    baseline: str
-    """Name of the baseline whose nights raised it."""
-
-
-def begun_anew(declared: Iterable[Declared]) -> list[tuple[str, str]]:
-    """Return robot and first night of the baselines that were declared and not taken back."""
-    begun: dict[tuple[str, str], None] = {}
-    for one in declared:
-        if one.kind == "rebaselined":
-            begun[one.robot, one.night] = None
-        elif one.kind == "taken-back":
-            begun.pop((one.robot, one.night), None)
-    return sorted(begun)
-
-
 Row = TypeVar("Row")
-
-
-@dataclass(frozen=True)
-class NightKey:
-    """What a night was judged from."""
-
-    version: str
-    config: str
-    baseline: str
-    files: list[str]
-    members: str = ""
-
-
-@dataclass(frozen=True)
-class Trend:
-    """Where a joint under alarm is heading, as far as it is looked at again."""
-
-    reach: list[int] | None = None
-
-
-DOCUMENTS: Mapping[type, tuple[str, Any]] = {
-    NightRow: ("key", NightKey),
-    FileRow: ("facts", Facts),
-    AlarmRow: ("trend", Trend),
-}
-"""Columns that hold JSON, and what it has to be."""
-
-
-_ADAPTERS = {document: TypeAdapter(document) for _, document in DOCUMENTS.values()}
-
-
-def _columns() -> dict[str, tuple[type, ...]]:
-    """Return what may stand in each column, by its name, in whatever table it is."""
-    found: dict[str, tuple[type, ...]] = {}
-    for row in (VerdictRow, MeasureRow, NightRow, FileRow, Event, Declared, AlarmRow):
-        for name, hint in get_type_hints(row).items():
-            kinds = get_args(hint) or (hint,)
-            found[name] = (*found.get(name, ()), *kinds, *((int,) if float in kinds else ()))
-    return found
-
-
-COLUMNS = _columns()
-
-WORDS = {
-    "state": ("healthy", "changed", "fault", "insufficient-data"),
-    "status": ("done", "partial", "baseline", "failed", "broken"),
-}
-"""All that may stand in a column."""
-
-NIGHT = re.compile(r"\d{4}-\d\d-\d\d|")
 
 
 def _writable(path: Path) -> bool:
@@ -336,7 +103,7 @@ class History:
             with self.transaction():
                 # another process may have been first
                 if self._db.execute("PRAGMA user_version").fetchone()[0] == 0:
-                    if _layout(self._db):
+                    if layout_of(self._db):
                         msg = f"{self.path}: is a database of something else; move it away"
                         raise InputError(msg)
                     for statement in SCHEMA.split(";"):
@@ -351,7 +118,7 @@ class History:
         else:
             with closing(sqlite3.connect(":memory:")) as new:
                 new.executescript(SCHEMA)
-                if _layout(new) != _layout(self._db):
+                if layout_of(new) != layout_of(self._db):
                     msg = (
                         f"{self.path}: its tables are not as opamc makes them; move the file away, "
                         "nights are judged again"
@@ -432,7 +199,7 @@ class History:
             column, document = DOCUMENTS[kind]
             for row in found:
                 try:
-                    _ADAPTERS[document].validate_json(getattr(row, column))
+                    ADAPTERS[document].validate_json(getattr(row, column))
                 except ValidationError as error:
                     first = error.errors(include_url=False)[0]
                     place = ".".join(str(part) for part in first["loc"])
@@ -682,30 +449,6 @@ class History:
             self._db.executemany(
                 f"INSERT OR REPLACE INTO {table} VALUES ({_marks(values[0])})", values
             )
-
-
-def _layout(db: sqlite3.Connection) -> set[tuple[str, str]]:
-    """Return how each table and index was made."""
-    query = "SELECT name, sql FROM sqlite_master WHERE sql IS NOT NULL"
-    return {(str(name), " ".join(str(sql).split())) for name, sql in db.execute(query)}
-
-
-def arrow_schema(table: str) -> pa.Schema:
-    """Return the columns of table `verdict` or `event` as exports have them."""
-    row = {"verdict": VerdictRow, "event": Event}[table]
-    kinds = {str: pa.string(), int: pa.int64(), float: pa.float64()}
-    types = get_type_hints(row)
-    return pa.schema(
-        [
-            (name, next(kinds[t] for t in (*get_args(of), of) if t in kinds))
-            for name, of in types.items()
-        ]
-    )
-
-
-def as_notes(notes: Iterable[str]) -> str:
-    """Return notes as a night keeps them."""
-    return json.dumps(list(notes), ensure_ascii=False)
 
 
 def _marks(values: Sequence[object]) -> str:
