@@ -171,7 +171,7 @@ def test_a_history_of_somebody_else_is_read(tmp_path, monkeypatch, open_elsewher
     writer.record_night(NightRow("r1", "2026-03-01", KEY, "done", 0, "", ""))
     if not open_elsewhere:
         writer._db.close()
-    monkeypatch.setattr("opamc_cli.storage.history._writable", lambda path: False)
+    monkeypatch.setattr("opamc_cli.storage.history.history._writable", lambda path: False)
     with History(path, read_only=True) as opened:
         assert list(opened.nights()) == [("r1", "2026-03-01")]
     writer._db.close()
