@@ -14,7 +14,6 @@ from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_for
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
-from opamc_cli.joint.spectra import highest_order, order_resolution
 from opamc_cli.signal.motion.smoothing import measurement_noise
 
 TWICE = 2.0
@@ -91,8 +90,6 @@ class Loop:
     """Share of the ceiling that named effects reach, 0 to 1."""
     remaining_domain: str | None
     """Where something without a name is left."""
-    orders_note: str
-    """What the recordings can tell of orders."""
 
 
 def close_loop(
@@ -218,7 +215,6 @@ def _opened(
         left = [s for s in steps if not s.named] or [s for s in steps if s.approximate]
         unexplained = [term.effect.domain for term in explained.terms if term.effect.unnamed]
         domain = left[0].term.effect.domain if left else next(iter(unexplained), None)
-    track = after.dataset.fine.track
     return Loop(
         before=before,
         after=after,
@@ -237,11 +233,6 @@ def _opened(
         noise_a=noise_a,
         explained_share=float(np.clip(reached, 0.0, 1.0)),
         remaining_domain=domain,
-        orders_note=(
-            f"orders count per {track.angle_kind} revolution; orders closer than "
-            f"{order_resolution(track):.3g} cannot be told apart, and above "
-            f"{highest_order(track):.4g} they fold at the median speed"
-        ),
     )
 
 

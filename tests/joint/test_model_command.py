@@ -147,6 +147,26 @@ def check_a_closed_model_applied_to_other_runs(folder, extended, capsys):
     assert f"error {errors['other']:.4g} A" in capsys.readouterr().out
 
 
+def test_a_model_is_applied_without_what_its_functions_took_from_its_terms(tmp_path):
+    """Beside friction by the angle dry friction was anything, and was applied alone as it was."""
+    made = simulate(3, (), rate=250.0, cycles=6)
+    uneven = np.sign(np.gradient(made.position)) * np.cos(2.3 * made.position)
+    uneven *= 20 * made.noise_rms
+    current = (made.current + uneven).astype("f4")
+    run, declared = tmp_path / "run.parquet", tmp_path / "declared.yaml"
+    write_run(run, 250.0, axis1_current=current, axis1_position=made.position)
+    terms = "[inertia, gravity, coulomb, viscous, offset]"
+    declared.write_text(f"effects: {terms}\nwithout: [position_drag, ripple, load_friction]\n")
+    out = ("--out", tmp_path / "out")
+    assert opamc("model", "close", run, "--model", declared, *out) == 0
+    (loop,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert "unnamed_angle_and_direction" in [step["effect"] for step in loop["steps"]]
+    opamc("model", "evaluate", run, "--model", tmp_path / "out" / "model.yaml", *out)
+    (axis,) = json.loads((tmp_path / "out" / "evaluation.json").read_text())["axes"]
+    assert "unnamed_angle_and_direction" in [one["effect"] for one in axis["not_applied"]]
+    assert axis["rmse_a"] < 1.1 * loop["before"]["rmse_a"]
+
+
 @pytest.mark.parametrize(
     ("effects", "said"),
     [
@@ -320,7 +340,9 @@ def test_too_little_motion_to_seal_anything_off(folder, capsys):
         axis1_position=made.position[:150],
     )
     assert close(folder, "--axis", "1") == 5
-    assert "too little to seal" in capsys.readouterr().err
+    said = capsys.readouterr().err
+    assert "too little to seal" in said
+    assert "record at least 4 cycles, or 0.96 s of motion (240 samples)" in said
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 MOST_REJECTED = 3
+MOST_MEANINGS = 3
+"""Effects that the first line explains; the table below it has them all."""
 
 
 def parameters(values: Mapping[str, float]) -> str:
@@ -45,7 +47,7 @@ def _headline(result: Mapping[str, Any]) -> str:
         f"{value:.4g}" if (value := result.get(side, {}).get("rmse_a")) is not None else "?"
         for side in ("before", "after")
     )
-    words, axes = [], _axes_beside(steps)
+    words, axes = {}, _axes_beside(steps)
     for step in steps:
         effect, meaning = step.get("effect", "unnamed"), step.get("interpretation", "")
         if effect.startswith("unnamed"):
@@ -54,8 +56,10 @@ def _headline(result: Mapping[str, Any]) -> str:
         what = meaning.split(":")[0].split(" (")[0]
         if effect == "coupling" and len(axes) > 1:
             what = f"torque from the motion of axes {', '.join(axes[:-1])} and {axes[-1]}"
-        words.append(f"{what} ({name})")
-    words = list(dict.fromkeys(words))
+        words[f"{what} ({name})"] = effect
+    explained = [*words][:MOST_MEANINGS]
+    if more := [*words.values()][MOST_MEANINGS:]:
+        explained.append(f"{len(more)} more ({', '.join(dict.fromkeys(more))})")
     from opamc_cli.stages.report import wording
 
     error = f"error {before} → {after} {unit}"
@@ -71,7 +75,9 @@ def _headline(result: Mapping[str, Any]) -> str:
         reached = "what is left is noise"
     if words:
         beside = f" and, without a name, {functions}" if functions else ""
-        return f"Axis {axis} lacks {'; '.join(words)}{beside}: {error}, {reached}{fails}"
+        # of what fails where it was not fitted, the share that it explains says nothing
+        reached = "" if result.get("fails") else f", {reached}"
+        return f"Axis {axis} lacks {'; '.join(explained)}{beside}: {error}{reached}{fails}"
     if result.get("verdict") == "nothing-missing":
         noise, left = result.get("noise_a"), wording.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"

@@ -42,6 +42,7 @@ class MainsHum(Effect):
     of_its_recordings = True
     origin = "measurement"
     searches = ("frequency_hz",)
+    forms = ("turning",)
     meaning = "mains pick-up in the current reading: check shielding and grounding"
     needs = ()
     from_motion = True

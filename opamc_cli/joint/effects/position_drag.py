@@ -19,13 +19,21 @@ class PositionDrag(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Places over the whole travel, widths from a sixtieth to a fifth of it."""
+        """Places that are passed both ways, widths from a sixtieth to a fifth of the travel.
+
+        Where a joint moves both ways, a drag of one way is none: of strokes that never met it was
+        learnt on the one, and its tail added to the other with the sign turned.
+        """
         low, high = self._travel(track)
         span = high - low
+        rows = track.moving if track.open_samples is None else track.open_samples
+        ways = (np.sort(track.position_rad[rows & (track.direction * w > 0)]) for w in (-1, 1))
+        met = [way for way in ways if way.size]
         return [
             {"place_rad": float(place), "width_rad": width, "flatness": 2.0}
             for width in geometric(span / 60, span / 5, 5)
             for place in np.arange(low, high + width / 2, max(0.8 * width, span / 50))
+            if all(np.ptp(np.searchsorted(way, (place - width, place + width))) for way in met)
         ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:

@@ -18,6 +18,7 @@ FEWEST_GROUPS = 4
 """Sealed as wholes: of two, a way there and a way back, one alone would show no friction."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
+FEWEST_MOVING = BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ def _blocks(
     moving: Bools, bounds: tuple[tuple[int, int], ...], run_names: tuple[str, ...]
 ) -> Grouping | None:
     indices = np.flatnonzero(moving)
-    if indices.size < BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK:
+    if indices.size < FEWEST_MOVING:
         return None
     group = np.full(moving.size, -1, dtype=np.int64)
     names: list[str] = []

@@ -1,7 +1,7 @@
 """What the model commands write: tables, loop.json's entries, the extended model."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,13 +11,13 @@ from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.frozen import may_extrapolate
 from opamc_cli.joint.fit.intervals import Certainty
-from opamc_cli.joint.fit.model import Dataset, Fit, Term
+from opamc_cli.joint.fit.model import Dataset, Fit, Term, fit_terms
 from opamc_cli.joint.least_squares import root_of
 from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
-from opamc_cli.joint.spectra import order_resolution, order_spectrum
+from opamc_cli.joint.spectra import highest_order, order_resolution, order_spectrum
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 
@@ -246,10 +246,19 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
             "standard_error": loop.ceiling.standard_error,
         },
         "groups": grouping.kind,
-        "orders": loop.orders_note,
+        "orders": _orders(loop.after.dataset.fine.track),
         "fails": _failure(loop),
         "notes": laid.notes,
     }
+
+
+def _orders(track: Track) -> str:
+    """Say what the recordings can tell of orders."""
+    return (
+        f"orders count per {track.angle_kind} revolution; orders closer than "
+        f"{order_resolution(track):.3g} cannot be told apart, and above "
+        f"{highest_order(track):.4g} they fold at the median speed"
+    )
 
 
 def _failure(loop: Loop) -> str | None:
@@ -268,8 +277,10 @@ def _failure(loop: Loop) -> str | None:
 def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict[str, Any]:
     """Write the extended model as a mapping, with its coefficients."""
     after = loop.after
+    elsewhere = _elsewhere(after)
     effects: list[Any] = []
-    for term, values in zip(after.terms, after.coefficients, strict=True):
+    for term, fitted in zip(after.terms, after.coefficients, strict=True):
+        values = elsewhere.get(term.key, fitted)
         entry: dict[str, Any] = {"effect": term.effect.name}
         if term.parameters or term.keep is not None:
             entry["parameters"] = shown_parameters(term)
@@ -300,6 +311,18 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
             ],
         },
     }
+
+
+def _elsewhere(after: Fit) -> dict[Hashable, Floats]:
+    """Return coefficients as they are without functions that other recordings have to do without.
+
+    Beside these they may be anything: friction by the angle and its direction is dry friction, too.
+    """
+    kept = [t for t in after.terms if not (t.effect.unnamed and t.effect.of_its_recordings)]
+    if len(kept) == len(after.terms):
+        return {}
+    alone = fit_terms(after.dataset, tuple(kept))
+    return {term.key: one for term, one in zip(kept, alone.coefficients, strict=True)}
 
 
 def residual_table(axis: int, loop: Loop) -> pa.Table:

@@ -469,7 +469,7 @@ def remains(entry: Mapping[str, Any]) -> str:
     if unknown:
         closed = entry.get("verdict") == "closed"
         parts.append("it is noise" if closed else "how much can be explained is not known")
-    elif isinstance(share, int | float) and beyond_noise(entry) is None:
+    elif isinstance(share, int | float) and beyond_noise(entry) is None and not entry.get("fails"):
         parts.append(f"{100 * share:.0f} % of what could be explained is explained")
     domains = [
         str(item.get("domain", item)) if isinstance(item, Mapping) else str(item)

@@ -37,6 +37,19 @@ def test_regressors_are_finite_and_as_long_as_the_track(name):
         assert set(effect.limits(track)) <= set(guess)
 
 
+def test_a_place_is_sought_where_it_is_passed_both_ways():
+    """Learnt on strokes one way, its tail was added to the other way's with the sign turned."""
+    _, track = track_of()
+    drag, middle = built_in_library()["position_drag"], float(np.median(track.position_rad))
+    apart = replace(track, direction=np.where(track.position_rad > middle, 1.0, -1.0))
+    met = drag.guesses(apart, None)
+    assert met
+    assert all(abs(guess["place_rad"] - middle) <= guess["width_rad"] for guess in met)
+    # nothing contradicts a recording that has one way alone
+    one_way = replace(track, direction=np.ones(track.size))
+    assert drag.guesses(one_way, None) == drag.guesses(track, None)
+
+
 @pytest.mark.parametrize("name", [*VOCABULARY, *unnamed_library()])
 def test_regressors_at_some_samples_are_those_of_all(name):
     _, track = track_of()

@@ -46,7 +46,7 @@ def test_what_is_no_number_is_refused_by_its_key(entry, sentence, tmp_path):
 
 @pytest.mark.parametrize("name", built_in_library())
 def test_every_form_that_a_closed_model_may_hold_is_read_again(name):
-    """A warm-up of dry friction alone, or a payload's weight, was written and then refused."""
+    """A warm-up of dry friction alone, a payload's weight, or hum, was written and then refused."""
     t = np.arange(4000) / 100.0
     place, beside = np.sin(t), {2: np.cos(0.7 * t), 3: np.sin(1.3 * t)}
     laid = Recording(
@@ -54,7 +54,9 @@ def test_every_form_that_a_closed_model_may_hold_is_read_again(name):
     )
     track = build_track([laid], Joint(100.0, 4))
     effect = built_in_library()[name]
-    for guess in effect.guesses(track, np.sin(30 * place)):
+    guesses = effect.guesses(track, np.sin(30 * place) + np.sin(2 * np.pi * 40 * t))
+    assert guesses
+    for guess in guesses:
         for form, keep in [(guess, None), *effect.variants(guess)]:
             columns = None if effect.flags_choose_columns else keep
             declared = DeclaredEffect(effect=name, parameters=form, columns=columns)

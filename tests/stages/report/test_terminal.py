@@ -173,6 +173,19 @@ def test_the_first_line_names_functions_without_a_name(
     assert "without a name" not in headline(entry | {"steps": [ripple]})
 
 
+def test_the_first_line_explains_three_effects_and_names_the_rest() -> None:
+    lines = [step("ripple", f"source of order {order}: look") for order in (1, 2, 3)]
+    known = {"share": 0.8, "standard_error": 0.05}
+    entry = left_alone(0.1, 0.02) | {"verdict": "partial", "explained_share": 0.9, "ceiling": known}
+    entry["steps"] = [step("mains_hum", "pick-up: check"), *lines, step("offset", "zero: check")]
+    told = headline(entry)
+    assert "pick-up (mains_hum); source of order 1 (ripple); source of order 2 (ripple); " in told
+    assert "; 2 more (ripple, offset): error " in told
+    # a share of what can be explained means nothing where the model fails
+    assert "90% of what" in told
+    assert "%" not in headline(entry | {"fails": "the fit fails there"})
+
+
 @pytest.mark.parametrize(("sealed", "said"), [(0.0639, False), (0.107, True)])
 def test_sealed_data_that_are_explained_far_worse_are_told(sealed: float, said: bool) -> None:
     entry = left_alone(0.17, 0.05) | {"verdict": "not-in-library", "steps": [SPEED]}
