@@ -117,8 +117,8 @@ def document(rows: list[run.Row], names: list[str]) -> None:
     """Put measured joints row by row, and the rest in sums, into docs/validation.md."""
     path = Path(__file__).parents[1] / "docs" / "validation.md"
     before, rest = path.read_text(encoding="utf-8").split(BEGIN)
-    measured_rows = [table.line(row, names) for row in rows if row["source"] in MEASURED]
-    section = [table.head(names), *measured_rows, "", table.totals(rows, names), "",
+    measured_rows = [row for row in rows if row["source"] in MEASURED]
+    section = [table.errors(measured_rows, names), "", table.totals(rows, names), "",
                table.summary(rows, names), "", table.by_size(rows, names)]  # fmt: skip
     path.write_text(
         before + "\n".join([BEGIN, "", *section, "", END]) + rest.split(END)[1], encoding="utf-8"

@@ -43,45 +43,72 @@ def cell(result: dict) -> str:
     )
 
 
+def errors(rows: Sequence[Row], names: Sequence[str]) -> str:
+    """Table of rows' errors before and after, and how many effects were added."""
+    lines = [f"| source | case | {' | '.join(names)} |", "|---" * (2 + len(names)) + "|"]
+    for row in rows:
+        cells = []
+        for name in names:
+            result = row["results"].get(name, {})
+            if "after" in result:
+                text = f"{result['before']:.4f} → {result['after']:.4f} ({len(result['added'])})"
+            else:
+                text = result.get("error", "").replace("|", "/")
+            cells.append(text)
+        lines.append(f"| {row['source']} | {row['name']} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
 def summary(rows: Sequence[Row], names: Sequence[str]) -> str:
-    """Figures of each source, what was logged and contestant."""
+    """Figures of each source and what was logged, the contestants' side by side."""
     lines = [
-        "| source | stroke | logged | contestant | rows | failed | error after / before | named "
-        "| wrong | added where nothing lacks | over 5 % behind: error, share | longest, s "
-        "| peak, MB |",
+        "| source | stroke | logged | rows | failed | error after / before | named | wrong "
+        "| added where nothing lacks | over 5 % behind: error | share | longest, s | peak, MB |",
         "|---" * 13 + "|",
     ]
     groups: dict[tuple[str, ...], list[Row]] = defaultdict(list)
     for row in rows:
         groups[row["source"], row["stroke"], row["sensing"]].append(row)
     for key, group in groups.items():
-        for name in names:
-            lines.append(f"| {' | '.join(key)} | {name} | " + _figures(group, name) + " |")
+        columns = zip(*(_figures(group, name) for name in names), strict=True)
+        cells = [_beside(column) for column in columns]
+        lines.append(f"| {' | '.join(key)} | {len(group)} | {' | '.join(cells)} |")
     return "\n".join(lines)
+
+
+def _beside(cells: Sequence[str]) -> str:
+    """Join the contestants' figures; what all share (`3 of 5, 4 of 5`) is said once."""
+    parts = [each.split(" of ") for each in cells if each != "–"]
+    if not parts:
+        return "–"
+    if len({tuple(part[1:]) for part in parts}) > 1:
+        return ", ".join(cells)
+    counts = ", ".join(each.split(" of ")[0] for each in cells)
+    return " of ".join([counts, *parts[0][1:]])
 
 
 def by_size(rows: Sequence[Row], names: Sequence[str]) -> str:
     """Share of hidden effects that are named, by source and size."""
     sizes = sorted({row["size"] for row in rows if row["size"] is not None})
     lines = [
-        "| source | logged | contestant | "
-        + " | ".join(f"{size:g} × noise" for size in sizes)
-        + " |",
-        "|---" * (3 + len(sizes)) + "|",
+        "| source | logged | " + " | ".join(f"{size:g} × noise" for size in sizes) + " |",
+        "|---" * (2 + len(sizes)) + "|",
     ]
     sized = [row for row in rows if row["hidden"] and row["size"] is not None]
     keys = dict.fromkeys((row["source"], row["sensing"]) for row in sized)
     for source, sensing in keys:
-        for name in names:
-            cells = []
-            for size in sizes:
-                found = [
-                    bool(row["results"].get(name, {}).get("named"))
-                    for row in rows
-                    if (row["source"], row["sensing"], row["size"]) == (source, sensing, size)
-                ]
-                cells.append(f"{sum(found)} of {len(found)}")
-            lines.append(f"| {source} | {sensing} | {name} | " + " | ".join(cells) + " |")
+        cells = []
+        for size in sizes:
+            of_size = [
+                row["results"]
+                for row in rows
+                if (row["source"], row["sensing"], row["size"]) == (source, sensing, size)
+            ]
+            found = [
+                sum(bool(each.get(name, {}).get("named")) for each in of_size) for name in names
+            ]
+            cells.append(_beside([f"{count} of {len(of_size)}" for count in found]))
+        lines.append(f"| {source} | {sensing} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -120,11 +147,11 @@ def behind(row: Row, name: str, *, share: bool) -> bool:
     return bool(own > MARGIN * min(reached.values(), default=np.inf))
 
 
-def _figures(group: Sequence[Row], name: str) -> str:
+def _figures(group: Sequence[Row], name: str) -> list[str]:
     results = [row["results"].get(name, {}) for row in group]
     done = [r for r in results if "after" in r]
     if not done:
-        return " | ".join([str(len(group)), str(len(group)), *["–"] * 7])
+        return [str(len(group)), *["–"] * 8]
     late = [sum(behind(row, name, share=share) for row in group) for share in (False, True)]
     ratios = [max(r["after"], 1e-9) / max(r["before"], 1e-9) for r in done]
     asked = [(row, r) for row, r in zip(group, results, strict=True) if row["hidden"]]
@@ -134,15 +161,14 @@ def _figures(group: Sequence[Row], name: str) -> str:
     ]  # fmt: skip
     wrong = sum(len(r.get("wrong", ())) for r in done)
     named = sum(bool(r.get("named")) for _, r in asked)
-    cells = [
-        str(len(group)),
+    return [
         str(len(group) - len(done)),
         f"{np.exp(np.mean(np.log(ratios))):.2f}",
         f"{named} of {len(asked)}" if asked else "–",
         str(wrong) if group[0]["hidden"] is not None else "–",
         f"{sum(bool(r['added']) for r in empty)} of {len(empty)}" if empty else "–",
-        f"{late[0]}, {late[1]}",
+        str(late[0]),
+        str(late[1]),
         f"{max(r['seconds'] for r in done):.0f}",
         f"{max(r['peak_mb'] for r in done):.0f}",
     ]
-    return " | ".join(cells)
