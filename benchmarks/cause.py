@@ -11,7 +11,6 @@ showed a mistake in the shares, so the default begins after them.
 
 import argparse
 import time
-from collections import defaultdict
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -90,9 +89,9 @@ def main() -> None:
     count = 3 if arguments.quick else arguments.seeds
     seeds = range(arguments.first_seed, arguments.first_seed + count)
     lines = [
-        "| source | logged | change | named | right, or a tie that holds it | said to be harmless "
+        "| source | change | named | right, or a tie that holds it | said to be harmless "
         "| wrong fault | share of the change |",
-        "|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|",
     ]
     print("\n".join(lines))
     spent: list[float] = []
@@ -116,9 +115,8 @@ def main() -> None:
                             for c in change.causes
                         ]
                         print(f"  {name} {seed} {mode}: {said} {change.why_not or ''}", flush=True)
-            for mode, found in outcomes.items():
-                lines.append(_row(source, mode, name, found))
-                print(lines[-1], flush=True)
+            lines.append(_row(source, name, list(outcomes.values())))
+            print(lines[-1], flush=True)
     print(f"{np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most")
     print(f"{time.time() - began:.0f} s in all")
     if arguments.write:
@@ -127,7 +125,8 @@ def main() -> None:
         note = (
             f"Seeds {seeds.start} to {seeds.stop - 1}: six baseline and two target sessions a "
             f"pair; {np.median(spent):.1f} s a pair in the middle, {max(spent):.1f} s at most. "
-            "`python benchmarks/cause.py --write` makes this section."
+            "`python benchmarks/cause.py --write` makes this section. Of each two figures the "
+            "first is with the position logged, the second from phases alone."
         )
         section = "\n".join([BEGIN, "", note, "", *lines, "", END])
         path.write_text(before + section + rest.split(END)[1])
@@ -148,17 +147,16 @@ def _pairs(source: str, name: str, seed: int) -> list[tuple[str, Pair]]:
     return [("position", pair), ("phases", replace(pair, baseline=alone[0], target=alone[1]))]
 
 
-def _row(source: str, mode: str, name: str, outcomes: list[Outcome]) -> str:
-    counts: dict[str, int] = defaultdict(int)
-    for outcome in outcomes:
-        for key in ("named", "right", "harmless", "wrong_fault"):
-            counts[key] += getattr(outcome, key)
-    shares = [outcome.share for outcome in outcomes if np.isfinite(outcome.share)]
-    share = f"{np.median(shares):.0%}" if shares else "–"
-    n = len(outcomes)
-    columns = [f"{counts[key]}/{n}" for key in ("named", "right", "harmless", "wrong_fault")]
-    logged = {"position": "position", "phases": "phases alone"}[mode]
-    return f"| {source} | {logged} | {name} | {' | '.join(columns)} | {share} |"
+def _row(source: str, name: str, logged: list[list[Outcome]]) -> str:
+    """Figures of one change, of everything that may be logged side by side."""
+    cells = [
+        ", ".join(str(sum(getattr(each, key) for each in outcomes)) for outcomes in logged)
+        + f" of {len(logged[0])}"
+        for key in ("named", "right", "harmless", "wrong_fault")
+    ]
+    shares = [[each.share for each in outcomes if np.isfinite(each.share)] for outcomes in logged]
+    cells.append(", ".join(f"{np.median(each):.0%}" if each else "–" for each in shares))
+    return f"| {source} | {name} | {' | '.join(cells)} |"
 
 
 if __name__ == "__main__":
