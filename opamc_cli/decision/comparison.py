@@ -41,7 +41,8 @@ CONDITIONS = 2.0
 """Spreads by which patterns may lie further beyond for each e-fold of a session's distance along.
 
 Patterns are not linear in what moves them: of 200 healthy nights four standard deviations warmer or
-colder than the others (5600 to 5649) 73 alarm without it, 24 with it. Spectra and courses need none.
+colder than the others (5600 to 5649) 73 alarm without it, 24 with it. Spectra and
+courses need none.
 """
 
 FOREIGN_CONDITIONS = 1.0
