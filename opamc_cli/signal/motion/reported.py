@@ -39,6 +39,26 @@ class JointMotion:
     """Largest speed of the joint that lasted, rad/s."""
 
 
+def unwrapped(position_rad: NDArray[np.floating]) -> NDArray[np.float64]:
+    """Undo an angle's jumps by a whole turn.
+
+    Parameters
+    ----------
+    position_rad : array, shape (n,), rad
+        Joint angle; NaN where unknown.
+
+    Returns
+    -------
+    array, shape (n,), rad
+        The same to the last digit where nothing jumps.
+    """
+    angle = np.array(position_rad, dtype=np.float64)
+    # one missing angle would spoil every angle behind it
+    known = np.isfinite(angle)
+    angle[known] = np.unwrap(angle[known])
+    return angle
+
+
 def velocity_from_position(
     position_rad: NDArray[np.floating], fs_hz: float, window_s: float = 0.05
 ) -> NDArray[np.float64]:
@@ -63,12 +83,11 @@ def velocity_from_position(
     Savitzky and Golay, 1964. Edge rule: the first and the last parabola are evaluated up to the
     ends. NaN rule: missing angles are bridged by a straight line.
     """
-    angle = np.asarray(position_rad, dtype=np.float64)
+    angle = unwrapped(position_rad)
     known = np.flatnonzero(np.isfinite(angle))
     if not known.size:
         return np.full(angle.size, np.nan)
-    # one missing angle would spoil every angle behind it when turns are undone
-    angle = np.interp(np.arange(angle.size), known, np.unwrap(angle[known]))
+    angle = np.interp(np.arange(angle.size), known, angle[known])
     wanted = max(LEAST_WINDOW, round(window_s * fs_hz) | 1)
     window = min(wanted, angle.size - 1 + angle.size % 2)
     if window < 3:

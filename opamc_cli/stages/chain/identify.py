@@ -22,7 +22,7 @@ from opamc_cli.signal.identification import (
     identify,
     identify_anywhere,
 )
-from opamc_cli.signal.motion.reported import fluctuation_frequency
+from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
@@ -469,5 +469,6 @@ def _reader(job: _Job, *runs: Run) -> Callable[[Run, int, int], npt.NDArray[np.f
             columns = {getattr(run.channels(axis), kind) for run in runs}
             if len(columns) == 1 and None not in columns:
                 [column] = columns
-                return lambda run, start, stop: run.read([column], start, stop)[column]
+                as_moved = unwrapped if kind == "position" else np.asarray
+                return lambda run, start, stop: as_moved(run.read([column], start, stop)[column])
     return lambda run, start, stop: read_course(run, axis, start, stop, job.envelope)

@@ -10,7 +10,7 @@ import numpy as np
 from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.signal.motion.reported import velocity_from_position
+from opamc_cli.signal.motion.reported import unwrapped, velocity_from_position
 from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed, speed_ratio
 from opamc_cli.signal.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
@@ -84,6 +84,8 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         elif quantity_of(channel) == "position":
             speed = strided_speed(values, run.sampling_rate_hz)
             limited(run.path, f"{channel} (its speed)", speed, LIMITS["position"])
+    if "position_rad" in arrays:
+        arrays["position_rad"] = unwrapped(arrays["position_rad"])
     _check_units(run, axis, arrays.get("position_rad"), arrays.get("velocity_rad_s"))
     recording = Recording(
         name=run.name,
@@ -99,7 +101,7 @@ def positions_beside(run: Run, axis: int) -> dict[int, Array]:
     """Read the logged positions of a run's other axes; those that mostly lack a number are none."""
     names = {other: name for other, name in run.positions.items() if other != axis}
     samples = run.read(list(names.values()))
-    found = {other: np.asarray(samples[name], dtype=np.float64) for other, name in names.items()}
+    found = {other: unwrapped(samples[name]) for other, name in names.items()}
     return {
         other: values
         for other, values in found.items()

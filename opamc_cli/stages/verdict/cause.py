@@ -13,6 +13,7 @@ from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.signal.motion.reported import unwrapped
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.loaded_effects import load_user_effects
@@ -145,7 +146,7 @@ def _moves(run: Run, axis: int) -> tuple[int, int] | None:
     column = run.channels(axis).columns.get("position")
     if column is None:
         return None
-    position = np.asarray(run.read([column])[column], dtype=np.float64)
+    position = unwrapped(run.read([column])[column])
     known = position[np.isfinite(position)]
     if not known.size or not np.ptp(known):
         return None

@@ -11,6 +11,7 @@ from opamc_cli.signal.motion.reported import (
     fluctuation_frequency,
     motor_frequency,
     quiet_velocity,
+    unwrapped,
     velocity_from_position,
 )
 
@@ -206,3 +207,13 @@ def test_a_long_series_is_probed_in_four_places(monkeypatch):
     places = [*range(10), *range(30, 40), *range(60, 70), *range(90, 100)]
     assert _probe(np.arange(100.0)).tolist() == places
     assert _probe(np.arange(40.0)).tolist() == list(range(40))
+
+
+def test_jumps_by_a_whole_turn_are_undone_and_nothing_else():
+    angle = np.cumsum(np.random.default_rng(0).uniform(-0.5, 0.5, 1000))
+    angle[[0, 400, 401, 999]] = np.nan
+    np.testing.assert_array_equal(unwrapped(angle), angle)
+    wrapped = np.mod(angle - angle[1], 2 * np.pi) + angle[1]
+    assert np.nanmax(np.abs(np.diff(wrapped))) > 6
+    np.testing.assert_allclose(unwrapped(wrapped), angle, atol=1e-12)
+    assert np.isnan(unwrapped(np.full(3, np.nan))).all()

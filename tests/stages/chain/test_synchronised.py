@@ -14,7 +14,7 @@ RATE_HZ = 250.0
 CYCLES, MOTION, REST = 4, 400, 150
 
 
-def save(path, delay, seed, back=MOTION):
+def save(path, delay, seed, back=MOTION, turn=np.inf):
     """Two motions there and back; a current whose course comes later than the motion."""
     rng = np.random.default_rng(seed)
     way, home = (0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n) for n in (MOTION, back))
@@ -26,14 +26,15 @@ def save(path, delay, seed, back=MOTION):
     save_run(
         path,
         RunInfo(sampling_rate_hz=RATE_HZ),
-        {"axis1_current": current, "axis1_position": position},
+        {"axis1_current": current, "axis1_position": np.mod(position + 5.5, turn)},
     )
 
 
-@pytest.mark.parametrize("delay", [0, 12])
-def test_a_joint_whose_position_is_logged_is_synchronised_by_it(tmp_path, delay):
+@pytest.mark.parametrize(("delay", "turn"), [(0, np.inf), (12, np.inf), (12, 2 * np.pi)])
+def test_a_joint_whose_position_is_logged_is_synchronised_by_it(tmp_path, delay, turn):
+    """A position that begins anew at a whole turn had motions laid on one another at random."""
     save(tmp_path / "baseline/1.parquet", 0, 1)
-    save(tmp_path / "target/1.parquet", delay, 2)
+    save(tmp_path / "target/1.parquet", delay, 2, turn=turn)
     baseline = run_chain([tmp_path / "baseline"], load_config(), tmp_path / "b")
     target = run_chain(
         [tmp_path / "target"], load_config(), tmp_path / "t", reference=baseline.motions
