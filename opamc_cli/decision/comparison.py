@@ -103,6 +103,9 @@ class Compared:
     allowed_log_ratio: float = 0.0
     """What was taken off: what the siblings have in common, and what conditions as unusual as
     theirs may move one joint by."""
+    apart: tuple[float, ...] = ()
+    """How far each baseline session lies from the others, beyond the middle one, by the voice that
+    places it farthest; in spreads that are expected of healthy ones."""
 
 
 def compare_sessions(
@@ -176,6 +179,7 @@ def compare_sessions(
             },
             unusual_log_ratio=unusual[axis],
             allowed_log_ratio=allowed,
+            apart=joint.apart(),
         )
     return found
 
@@ -279,6 +283,14 @@ class Joint:
         own = self._conditions.own - self._conditions.own.mean()
         target = self._conditions.target - self._conditions.own.mean()
         return float(np.maximum(target, 0.0).mean() - np.maximum(own, 0.0).mean())
+
+    def apart(self) -> tuple[float, ...]:
+        """How far each baseline session lies from the others; see `Compared`."""
+        places = [
+            (one.own - np.median(one.own)) / self.expected(voice).scale
+            for voice, one in self.distances.items()
+        ]
+        return tuple(np.max(places, axis=0).tolist()) if places else ()
 
     def tails(
         self, shifts: Mapping[Voice, Shift], taken_off: Mapping[Voice, float]

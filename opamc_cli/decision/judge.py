@@ -78,14 +78,41 @@ class Bundle:
     """What else tells its sessions apart, by name."""
     target_sessions: Sequence[str] = ()
     """Names of the target's sessions, in the order of the cells' rows."""
+    baseline_sessions: tuple[str, ...] = ()
+    """Names of the baseline's sessions, likewise."""
+
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "Bundle":
+        """Return the same with some sessions, numbered baseline first, on either side."""
+        n_target = len(self.cells[0].target) if self.cells else 0
+        own, other = self.baseline_sessions, self.target_sessions
+        names = [*(own or ("",) * self.n_baseline), *(other or ("",) * n_target)]
+        own, other = (tuple(names[i] for i in side) for side in (baseline, target))
+        return Bundle(
+            [cell.of_sessions(baseline, target) for cell in self.cells],
+            {name: one.of_sessions(baseline, target) for name, one in self.witnesses.items()},
+            other,
+            own,
+        )
 
     def of_target(self, session: int) -> "Bundle":
         """Return the same with one of the target's sessions alone."""
-        return Bundle(
-            [cell.of_target(session) for cell in self.cells],
-            {name: one.of_target(session) for name, one in self.witnesses.items()},
-            self.target_sessions[session : session + 1],
-        )
+        n = self.n_baseline
+        return self.of_sessions(range(n), [n + session])
+
+    def held_out(self, session: int) -> "Bundle":
+        """Return one of the baseline's sessions as the target of the others."""
+        return self.of_sessions([i for i in range(self.n_baseline) if i != session], [session])
+
+    def without(self, name: str) -> "Bundle":
+        """Return the same without one of the baseline's sessions."""
+        n = self.n_baseline
+        kept = [i for i in range(n) if self.baseline_sessions[i] != name]
+        return self.of_sessions(kept, range(n, n + len(self.cells[0].target)))
+
+    @property
+    def n_baseline(self) -> int:
+        """Number of the baseline's sessions."""
+        return len(self.cells[0].baseline) if self.cells else 0
 
     def evidence(self) -> dict[str, Evidence]:
         """Return all that the sessions can be told apart by: the patterns first."""
@@ -151,6 +178,8 @@ class Judgement:
     n_baseline_cycles: int
     n_target_cycles: int
     """With `n_baseline_sessions`, `n_target_sessions`, `n_baseline_cycles`: what it rests on."""
+    apart: tuple[float, ...] = ()
+    """How far each baseline session lies from the others; see `comparison.Compared`."""
 
     @property
     def effect(self) -> float:
@@ -243,6 +272,7 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
             n_target_sessions=_present(cells[axis], "target"),
             n_baseline_cycles=max((len(cell.cycles) for cell in cells[axis]), default=0),
             n_target_cycles=max((len(cell.target_cycles) for cell in cells[axis]), default=0),
+            apart=compared[axis].apart,
         )
         judgements[axis] = replace(judgement, state=_state(judgement, policy))
     return judgements

@@ -176,7 +176,7 @@ def _diagnose(
             try:
                 found = cause.explain(
                     axis,
-                    sides.baseline.sources,
+                    decided.baseline_sources(axis),
                     decided.target_sources(axis),
                     config.joint,
                     times,
@@ -205,6 +205,7 @@ def _diagnose(
         named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
+    of_baseline = (*normal.errors, *decided.odd_ones())
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
@@ -217,11 +218,11 @@ def _diagnose(
         exit_code=written.exit_code or (ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.DONE),
         n_runs=len(normal.runs_done) + len(other.runs_done),
         errors=(
-            *(*normal.errors, *other.errors, *unjudged.errors),
+            *(*of_baseline, *other.errors, *unjudged.errors),
             *unjudged.sessions_at_rest(sides),
             *([InputError(stranger)] if stranger else []),
         ),
-        n_of_baseline=len(normal.errors),
+        n_of_baseline=len(of_baseline),
         conditions=check_comparable(sides.baseline.sources, sides.target.sources),
         notes=every_note,
     )

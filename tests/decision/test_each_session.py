@@ -71,5 +71,5 @@ def test_an_axis_that_rests_in_a_session_is_none_of_it():
 def test_cycles_of_other_sessions_are_left_out():
     own = cells(Fleet(n_target=2), 0)[1][0]
     number = np.repeat([0, 1], len(own.target_cycles) // 2)
-    alone = replace(own, session_of_target_cycle=number).of_target(1)
+    alone = replace(own, session_of_target_cycle=number).of_sessions(range(6), [7])
     assert np.array_equal(alone.target_cycles.sum(axis=0), own.target[1])

@@ -79,10 +79,10 @@ class AmplitudeEvidence:
             [(cell.sessions, cell.cycles, cell.within) for cell in self.cells], self.n_baseline
         )
 
-    def of_target(self, session: int) -> "AmplitudeEvidence":
-        """Return the evidence with one of the target's sessions alone."""
-        rows = [*range(self.n_baseline), self.n_baseline + session]
-        return replace(self, cells=chosen(self.cells, ("sessions", "cycles"), rows))
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "AmplitudeEvidence":
+        """Return the evidence with some of its sessions as the baseline and some as the target."""
+        cells = chosen(self.cells, ("sessions", "cycles"), [*baseline, *target])
+        return replace(self, cells=cells, n_baseline=len(baseline))
 
 
 @dataclass(frozen=True)

@@ -50,8 +50,8 @@ class Evidence(Protocol):
     def change(self) -> float:
         """Return the relative change beyond the noise of cycles; NaN if it tells no such."""
 
-    def of_target(self, session: int) -> "Evidence":
-        """Return the same with one of the target's sessions alone, counted from 0."""
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "Evidence":
+        """Return the same with some of its sessions as the baseline and some as the target."""
 
 
 @dataclass(frozen=True)

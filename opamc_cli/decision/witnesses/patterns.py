@@ -45,13 +45,20 @@ class Cell:
     session_of_target_cycle: NDArray[np.int64] | None = None
     """Row of `target` that each of `target_cycles` belongs to; None: not known."""
 
-    def of_target(self, session: int) -> "Cell":
-        """Return the cell with one of the target's sessions alone."""
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "Cell":
+        """Return the cell with some sessions, numbered baseline first, on either side.
+
+        The cycles of the target stay where it is known of which session they are.
+        """
+        counts = np.concatenate([self.baseline, self.target])
         cycles, of = self.target_cycles, self.session_of_target_cycle
         return replace(
             self,
-            target=self.target[session : session + 1],
-            target_cycles=cycles if of is None else cycles[of == session],
+            baseline=counts[list(baseline)],
+            target=counts[list(target)],
+            target_cycles=(
+                cycles if of is None else cycles[np.isin(of + len(self.baseline), target)]
+            ),
             session_of_target_cycle=None,
         )
 
@@ -131,9 +138,9 @@ class PatternEvidence:
         """Return NaN: what it knows differs between any two sessions."""
         return math.nan
 
-    def of_target(self, session: int) -> "PatternEvidence":
-        """Return the evidence with one of the target's sessions alone."""
-        return PatternEvidence([cell.of_target(session) for cell in self.cells])
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "PatternEvidence":
+        """Return the evidence with some of its sessions as the baseline and some as the target."""
+        return PatternEvidence([cell.of_sessions(baseline, target) for cell in self.cells])
 
 
 def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:

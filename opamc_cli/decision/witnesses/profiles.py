@@ -112,10 +112,10 @@ class ProfileEvidence:
             [(cell.course, cell.cycles, cell.within) for cell in self.cells], self.n_baseline
         )
 
-    def of_target(self, session: int) -> "ProfileEvidence":
-        """Return the evidence with one of the target's sessions alone."""
-        rows = [*range(self.n_baseline), self.n_baseline + session]
-        return replace(self, cells=chosen(self.cells, ("course", "cycles", "scale"), rows))
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "ProfileEvidence":
+        """Return the evidence with some of its sessions as the baseline and some as the target."""
+        cells = chosen(self.cells, ("course", "cycles", "scale"), [*baseline, *target])
+        return replace(self, cells=cells, n_baseline=len(baseline))
 
 
 @dataclass(frozen=True)

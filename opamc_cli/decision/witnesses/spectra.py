@@ -102,15 +102,15 @@ class SpectrumEvidence:
         """Return NaN: what it knows differs between any two sessions."""
         return math.nan
 
-    def of_target(self, session: int) -> "SpectrumEvidence":
-        """Return the evidence with one of the target's sessions alone."""
-        rows = [*range(self.n_baseline), self.n_baseline + session]
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "SpectrumEvidence":
+        """Return the evidence with some of its sessions as the baseline and some as the target."""
+        rows = [*baseline, *target]
         cells = chosen(self.cells, ("sessions", "cycles"), rows)
         limited = [
             cell if cell.limited is None else replace(cell, limited=cell.limited[rows])
             for cell in cells
         ]
-        return replace(self, cells=limited)
+        return replace(self, cells=limited, n_baseline=len(baseline))
 
 
 @dataclass(frozen=True)

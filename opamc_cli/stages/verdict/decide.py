@@ -34,7 +34,7 @@ class DecideOutcome:
     exit_code: ExitCode
     """What it ends with."""
     errors: tuple[OpamcError, ...] = ()
-    """Why nothing that was found unchanged is a verdict."""
+    """What was left out, and why nothing that was found unchanged is a verdict."""
 
 
 def default_tables(folder: Path) -> tuple[Path, Path]:
@@ -79,10 +79,9 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
 
     written = verdict.write(decided, scored, config, out, causes=found.causes, complete=complete)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
-    if stranger is None:
-        return DecideOutcome(written.verdict, written.exit_code)
-    exit_code = written.exit_code or ExitCode.NOT_ENOUGH_DATA
-    return DecideOutcome(written.verdict, exit_code, (InputError(stranger),))
+    errors = (*decided.odd_ones(), *([InputError(stranger)] if stranger else []))
+    worst = ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.PARTIAL if errors else ExitCode.DONE
+    return DecideOutcome(written.verdict, written.exit_code or worst, errors)
 
 
 def _beside(folder: Path, tables: tuple[Path, Path]) -> dict[str, str]:

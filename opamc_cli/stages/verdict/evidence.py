@@ -35,7 +35,7 @@ def bundles(sides: Sides) -> dict[int, Bundle]:
                 evidence = witness.evidence(tables[0], tables[1], axis, names)
                 if evidence.cells:
                     witnesses[witness.NAME] = evidence
-        result[axis] = Bundle(cells, witnesses, names.sessions[1])
+        result[axis] = Bundle(cells, witnesses, names.sessions[1], tuple(names.sessions[0]))
     return result
 
 

@@ -14,7 +14,8 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.each_session import LoneSession, each_session
 from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy, judge
-from opamc_cli.errors import ExitCode
+from opamc_cli.decision.odd_session import odd_sessions
+from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
@@ -60,6 +61,8 @@ class Decided:
     """The same by each of several target sessions alone."""
     alone: Mapping[int, LoneSession] = field(default_factory=dict)
     """Those by which an axis is judged, since they are worse than all together."""
+    odd: Mapping[int, str] = field(default_factory=dict)
+    """Sessions of the baseline without which an axis is judged: no healthy one differs as much."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
         """Return the axes whose change asks for a cause."""
@@ -76,6 +79,27 @@ class Decided:
             return sources
         of_run = self.sides.sessions[1].of_run
         return [s for s in sources if of_run[s.name] == self.alone[axis].session]
+
+    def baseline_sources(self, axis: int) -> Sequence[RunSource]:
+        """Return the baseline's recordings that an axis is held against."""
+        of_run = self.sides.sessions[0].of_run
+        odd = self.odd.get(axis)
+        return [s for s in self.sides.baseline.sources if of_run[s.name] != odd]
+
+    def odd_ones(self) -> list[InputError]:
+        """Say which sessions of the baseline were left out."""
+        by_session: dict[str, list[int]] = {}
+        for axis, session in sorted(self.odd.items()):
+            by_session.setdefault(session, []).append(axis)
+        return [
+            InputError(
+                f"{self.sides.sessions[0].named(session)} of the baseline differs from the others "
+                f"on {'axis' if len(axes) == 1 else 'axes'} {', '.join(map(str, axes))} as no "
+                "healthy one does, and is left out there; look at it, and take it out of the "
+                "baseline if it was not healthy"
+            )
+            for session, axes in by_session.items()
+        ]
 
     def target_runs(self) -> dict[int, list[str]]:
         """Return the names of the target's recordings by which each axis is judged."""
@@ -119,13 +143,17 @@ def decide(sides: Sides, config: Config) -> Decided:
     policy = policy_of(config.score)
     known = bundles(sides)
     judgements = judge(known, policy)
+    odd = odd_sessions(known, judgements, policy)
+    if odd:
+        known |= {axis: known[axis].without(session) for axis, session in odd.items()}
+        judgements = judge(known, policy)
     each, alone = each_session(known, policy), {}
     for axis, by_session in each.items():
         worst = max(by_session, key=lambda one: _concern(one.judgement), default=None)
         if worst is not None and _concern(worst.judgement)[0] > _concern(judgements[axis])[0]:
             alone[axis] = worst
             known[axis], judgements[axis] = worst.bundle, worst.judgement
-    return Decided(sides, known, judgements, each, alone)
+    return Decided(sides, known, judgements, each, alone, odd)
 
 
 def _concern(judgement: Judgement) -> tuple[int, float]:
@@ -212,12 +240,12 @@ def content(
             role: [source for source in sources if source.name in _runs_of(axis, rows)]
             for role, sources, rows in zip(
                 ("baseline", "target"),
-                (sides[0].sources, decided.target_sources(axis)),
+                (decided.baseline_sources(axis), decided.target_sources(axis)),
                 decided.sides.rows,
                 strict=True,
             )
         }
-        lacking = _not_compared(axis, decided.sides)
+        lacking = _not_compared(axis, decided)
         which = decided.sessions_at_fault(axis)
         axes.append(
             {
@@ -329,13 +357,14 @@ def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
     return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.runs}
 
 
-def _not_compared(axis: int, sides: Sides) -> dict[str, list[str]]:
+def _not_compared(axis: int, decided: Decided) -> dict[str, list[str]]:
     """Return, by role, the runs of a side that have no part in what is said of an axis."""
-    found = {}
+    found, sides = {}, decided.sides
+    held = {source.name for source in (*decided.baseline_sources(axis), *sides.target.sources)}
     for role, side, rows in zip(
         ("baseline", "target"), (sides.baseline, sides.target), sides.rows, strict=True
     ):
-        there = _runs_of(axis, rows)
+        there = _runs_of(axis, rows) & held
         found[role] = [source.name for source in side.sources if source.name not in there]
     return {role: names for role, names in found.items() if names}
 

@@ -170,6 +170,23 @@ def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(
         assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
 
 
+def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
+    """It was what healthy nights differ by: the same fault in the next night was healthy."""
+    rule = "alarm: {nights: 1, of: 1}\nrobots: {r2: {}}\n"
+    cell.write_text(cell.read_text().replace("nights: 3", "nights: 4") + rule)
+    first = opamc("nightly", cell, "--quiet")
+    assert first.code == ExitCode.UNHEALTHY
+    assert "r2 axis 2: ALARM" in first.out
+    told = f"night {NIGHTS[3]} of the baseline differs from the others on axis 2 as no healthy one"
+    assert f"r2 its baseline: {told}" in first.out
+    assert opamc("nightly", cell, "--quiet").out == ""
+    verdict = json.loads((cell.parent / f"nightly/r2/{NIGHTS[4]}/verdict.json").read_text())
+    assert [one.get("not_compared") for one in verdict["axes"]] == [
+        None,
+        {"baseline": [f"{NIGHTS[3]}/cycle"]},
+    ]
+
+
 def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     cell.write_text(cell.read_text() + "alarm: {nights: 1, of: 1, remind_after: 1}\n")
     late = cell.parent / "logs" / "r2" / NIGHTS[4]

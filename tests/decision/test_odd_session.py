@@ -1,0 +1,72 @@
+"""A worn session among the baseline's."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from opamc_cli.decision.judge import Bundle, judge
+from opamc_cli.decision.odd_session import odd_sessions
+from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
+from tests.decision.fleet import Fleet, cells, spectra
+
+
+def robot(seed: int, worn: int | None, n_baseline: int = 6) -> dict[int, Bundle]:
+    """Six joints; of the third one baseline session, and the target, may have other spectra."""
+    names = tuple(f"2026-03-0{day}" for day in range(1, n_baseline + 1))
+    plan = Fleet(n_baseline=n_baseline)
+    found, known = {}, spectra(plan, seed)
+    for axis, own in cells(plan, seed).items():
+        power = known[axis]
+        if axis == 3 and worn is not None:
+            for cell, spectrum in zip(own, power, strict=True):
+                cell.target[0] = cell.target[0][::-1]
+                cell.baseline[worn] = cell.baseline[worn][::-1]
+                spectrum.sessions[[worn, n_baseline]] += 1.5
+        witnesses = {"spectrum": SpectrumEvidence(power, n_baseline)}
+        found[axis] = Bundle(own, witnesses, ("2026-03-20",), names)
+    return found
+
+
+@pytest.mark.parametrize("worn", [0, 3, 5])
+def test_a_worn_night_of_the_baseline_is_found_and_hides_no_fault_any_more(worn):
+    """One of six was what healthy nights differ by, and the target's same fault was none."""
+    bundles = robot(1, worn)
+    before = judge(bundles)
+    assert before[3].state == "healthy"
+    odd = odd_sessions(bundles, before)
+    assert odd == {3: f"2026-03-0{worn + 1}"}
+    after = judge(bundles | {3: bundles[3].without(odd[3])})
+    assert after[3].state == "fault"
+    assert after[3].n_baseline_sessions == 5
+
+
+def test_healthy_baselines_hang_together():
+    """At the level of 1 % a robot."""
+    found = [odd_sessions(one, judge(one)) for one in (robot(seed, None) for seed in range(60))]
+    assert sum(map(bool, found)) <= 2
+
+
+def test_three_sessions_do_not_tell_which_of_them_is_odd():
+    bundles = robot(1, 2, n_baseline=3)
+    assert odd_sessions(bundles, judge(bundles)) == {}
+
+
+def test_a_session_that_is_held_out_is_judged_as_a_target_of_the_others():
+    bundle = robot(2, None)[1]
+    held_out = bundle.held_out(4)
+    names = bundle.baseline_sessions
+    assert (held_out.baseline_sessions, held_out.target_sessions) == (
+        (*names[:4], names[5]),
+        (names[4],),
+    )
+    cell, own = held_out.cells[0], bundle.cells[0]
+    np.testing.assert_array_equal(cell.target, own.baseline[[4]])
+    np.testing.assert_array_equal(cell.baseline, own.baseline[[0, 1, 2, 3, 5]])
+    spectrum, whole = (one.witnesses["spectrum"] for one in (held_out, bundle))
+    assert (spectrum.n_baseline, whole.n_baseline) == (5, 6)
+    rows = [0, 1, 2, 3, 5, 4]
+    np.testing.assert_array_equal(spectrum.cells[0].sessions, whole.cells[0].sessions[rows])
+    # who has no names is asked nothing
+    unnamed = replace(bundle, baseline_sessions=())
+    assert odd_sessions({1: unnamed}, judge({1: unnamed})) == {}
