@@ -39,6 +39,17 @@ LEAST_HZ = 100.0
 
 OF_OTHERS = ("effect", "parameters", "share", "interpretation", "origin")
 
+FRICTION = frozenset(
+    name
+    for name, effect in built_in_library().items()
+    if effect.resists and effect.origin == "joint" and not effect.at_a_place
+)
+ANY_FRICTION = (
+    "friction, in a form that the recordings do not tell: check grease, preload and seals"
+)
+"""Of forms that tie: dry and lubricant friction that grow by half are nearest to a sublinear form,
+and were called a starved lubricant."""
+
 MUCH = 9.0
 """Times as much again: of a baseline that has hardly any of it, a factor says nothing."""
 
@@ -180,12 +191,14 @@ def _entry(change: Change) -> dict[str, Any] | None:
 def _interpretation(cause: Cause) -> str:
     """Say what a cause means, and of friction whether it has grown, and by how much."""
     change = cause.evidence.get("relative_change")
+    unsure = cause.effect in FRICTION and not FRICTION.isdisjoint(cause.ties)
+    meaning = ANY_FRICTION if unsure else cause.interpretation
     if change is None:
-        return cause.interpretation
+        return meaning
     if not -1 < change < MUCH:
-        return f"{cause.interpretation}; it {'has grown much' if change > 0 else 'is gone'}"
+        return f"{meaning}; it {'has grown much' if change > 0 else 'is gone'}"
     way = "grown" if change > 0 else "fallen"
-    return f"{cause.interpretation}; it has {way} by {abs(change):.0%}"
+    return f"{meaning}; it has {way} by {abs(change):.0%}"
 
 
 def _why(cause: Cause, change: Change) -> list[str]:

@@ -67,6 +67,26 @@ def test_of_friction_it_is_said_whether_it_has_grown(change, said):
     assert told["interpretation"] == said
 
 
+@pytest.mark.parametrize(
+    ("effect", "ties", "said"),
+    [
+        ("sublinear_friction", ("coulomb",), "friction, in a form that the recordings do not tell"),
+        ("coulomb", ("viscous", "offset"), "friction, in a form that the recordings do not tell"),
+        ("sublinear_friction", ("spring",), "meaning; it has grown by 50%"),
+        ("spring", ("coulomb",), "meaning; it has grown by 50%"),
+    ],
+)
+def test_of_forms_of_friction_that_tie_none_is_claimed(effect, ties, said):
+    """Dry and lubricant friction that had grown by half were called a starved lubricant."""
+    found = Cause(
+        effect=effect, parameters={}, interpretation="meaning", p_value=0.0, ties=ties,
+        evidence={"relative_change": 0.5},
+    )  # fmt: skip
+    told = cause._entry(Change((found,), 1.0, False))["interpretation"]
+    assert told.startswith(said)
+    assert told.endswith("; it has grown by 50%")
+
+
 @pytest.mark.long
 def test_without_the_joint_s_constants_the_order_is_electrical_and_read_with_a_condition():
     found = cause.explain(3, sources("normal"), sources("fault"), JointConfig())
