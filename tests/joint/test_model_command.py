@@ -331,6 +331,17 @@ def test_a_channel_that_is_mostly_gaps_is_refused_also_if_quiet(folder, capsys):
     assert not (folder / "out" / "loop.json").exists()
 
 
+def test_a_position_whose_values_are_held_is_not_said_to_rest(folder, capsys):
+    """Its travel of a radian was told beside."""
+    made = simulate(3, (), 0.0, rate=250.0, cycles=6)
+    held = np.repeat(made.position[::25], 25)[: made.position.size]
+    write_run(folder / "run.parquet", 250.0, axis1_current=made.current, axis1_position=held)
+    assert close(folder, "--axis", "1") == 5
+    said = capsys.readouterr().err
+    assert "changes in 7% of the samples alone and stands still between" in said
+    assert "does not move" not in said
+
+
 def test_too_little_motion_to_seal_anything_off(folder, capsys):
     made = simulate(3, (), 0.0, rate=250.0, cycles=6)
     write_run(

@@ -14,7 +14,7 @@ from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.motion.groups import FEWEST_GROUPS, FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
-from opamc_cli.joint.motion.recordings import grouped_track, is_moving
+from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
@@ -22,6 +22,9 @@ from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.storage.runs import Run
 
+HELD = 0.5
+"""Share of samples in which a position that is logged at its own rate changes, at the least, while
+its joint moves; in one that each value is held for ten samples it is a tenth."""
 OPPOSITE = (
     "axis {}: friction would drive the joint: its current has the opposite sign of its motion, and "
     "the negative of it is modelled"
@@ -197,10 +200,16 @@ def _too_little_motion(
 ) -> NotEnoughDataError:
     track, _ = grouped_track(recordings, joint)
     if not is_moving(track):
+        travel, share = np.ptp(track.position_rad), np.mean(np.diff(track.position_rad) != 0)
         msg = (
-            f"{named}: axis {axis} does not move (travel {np.ptp(track.position_rad):.2g} rad); "
-            "give runs in which it does"
+            f"{named}: axis {axis} does not move (travel {travel:.2g} rad); give runs in which it "
+            "does"
         )
+        if travel > SHORTEST_TRAVEL_RAD and share < HELD:
+            msg = (
+                f"{named}: the position of axis {axis} changes in {share:.0%} of the samples alone "
+                "and stands still between: is each value held? Log it at its own rate"
+            )
         return NotEnoughDataError(msg)
     moving = np.count_nonzero(track.moving)
     msg = (
