@@ -112,9 +112,10 @@ def run(
         summary = outcome.summary.only(outcome.robots)
         untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
         if wanted == Wanted():
-            today = datetime.now(UTC).date()
-            now = [*silent(history, today, loaded.alarm.remind_after), *outcome.thinned]
-            now += outcome.strays
+            silent_since, now = silent(history, _today(), loaded.alarm.remind_after)
+            # the page knows no clock: it follows from the records alone
+            summary = summary.without_recordings(silent_since) if silent_since else summary
+            now += [*outcome.thinned, *outcome.strays]
             now += [one for said in outcome.gathering.values() for one in said]
             now += left(history, loaded)
             untold += history.untold(now)
@@ -285,6 +286,10 @@ def _reason(why: str) -> str:
         msg = "--why is blank; say what was found or done"
         raise UsageError(msg)
     return told
+
+
+def _today() -> date:
+    return datetime.now(UTC).date()
 
 
 def _now() -> str:

@@ -13,7 +13,7 @@ from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import Event
+from opamc_cli.storage.history.rows import THE_CELL, Event
 from opamc_cli.storage.schemas import files
 
 OVER = {
@@ -55,14 +55,24 @@ class Morning:
     """The largest concern of the cell."""
 
 
-def silent(history: History, today: date, remind_after: int) -> Iterator[Event]:
-    """Say that the whole cell has no new night: no robot can be said to lack what others have."""
+def silent(history: History, today: date, remind_after: int) -> tuple[str, list[Event]]:
+    """Say that the whole cell has no new night: no robot can be said to lack what others have.
+
+    Returns
+    -------
+    since : str
+        First night without a recording; empty if the cell is not silent.
+    events : list of Event
+        What is worth saying of it.
+    """
     last = max((night for _, night in history.nights()), default="")
     days = (today - date.fromisoformat(last)).days if last else 0
-    if days > SILENT_DAYS:
-        told = (days - SILENT_DAYS - 1) // remind_after  # each time is an event of its own
-        time = (date.fromisoformat(last) + timedelta(told * remind_after)).isoformat()
-        yield Event(time, "the cell:", None, "silent", f"no recording of any robot since {last}")
+    if days <= SILENT_DAYS:
+        return "", []
+    told = (days - SILENT_DAYS - 1) // remind_after  # each time is an event of its own
+    since, time = (date.fromisoformat(last) + timedelta(n) for n in (1, told * remind_after))
+    text = f"no recording of any robot since {last}"
+    return since.isoformat(), [Event(time.isoformat(), THE_CELL, None, "silent", text)]
 
 
 def left(history: History, cell: CellConfig) -> Iterator[Event]:
@@ -137,11 +147,11 @@ def tell(
         lines.append(f"{name} judged anew: {some(sorted(texts), MOST_OTHERS)}")
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     alarms = any(robot.alarms for robot in summary.robots)
-    broken = any(robot.broken for robot in summary.robots)
-    ended = any(event.kind in ("ended", "stray") for event in news)  # of which nothing stays
-    in_part = outcome.unjudged or any(robot.in_part for robot in summary.robots)
-    failed = failed_now or broken or in_part or ended or outcome.absent or outcome.ended
-    code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if failed else ExitCode.DONE
+    unwatched = any(robot.unwatched for robot in summary.robots)
+    once = any(event.kind in ("ended", "stray") for event in news)  # nothing stays of it
+    failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
+    doubtful = failed or unwatched or once
+    code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE
     return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
 
 
@@ -169,6 +179,7 @@ def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
     for robot in summary.robots:
         robots[robot.name] = {
             "state": robot.shown,
+            "missing_since": robot.missing or None,
             "done": sorted(night for name, night in outcome.done if name == robot.name),
             "skipped": sorted(
                 night.night

@@ -27,6 +27,9 @@ OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
 REST_WEEKS = 4
 """Weeks in a row after which a weekday without files, such as Sunday, is the robot's habit."""
 
+HOW_TO_END = "if they are to have none: opamc nightly acknowledge ROBOT --why TEXT"
+"""What ends that a robot counts as missing, beside its files."""
+
 
 def settle_cell(
     cell: CellConfig, source: str, history: History, robots: Sequence[str], *, whole: bool = False
@@ -200,6 +203,8 @@ def _missing(
                 weeks = min(_weeks_before(one, lacking, own) for one in gap)
                 if weeks == REST_WEEKS - 1:
                     text += f", as in the {weeks} weeks before; this weekday is not said again"
+                if not night:
+                    text += f"; {HOW_TO_END}"
                 for index in said_in(gap, [""] * len(gap), remind_after):
                     known = gap[0] <= gone.get(robot, "") <= gap[index]
                     if not known and weeks < REST_WEEKS:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from opamc_cli.stages.nightly.inputs.recordings import some
@@ -12,14 +12,25 @@ from opamc_cli.storage.history.rows import UNJUDGED, AlarmRow, NightRow, begun_a
 SEVERITY = (
     "alarm",
     "failed",
+    "missing",
+    "gathering",
     "fault",
     "changed",
     "insufficient-data",
+    "partial",
     "known",
+    "gone",
     "baseline",
     "healthy",
 )
-"""Worst first; known: an alarm that was acknowledged."""
+"""Worst first; known: an alarm that was acknowledged, gone: that there are no recordings."""
+
+COMPLETE = """
+SELECT robot, min(night) AS night FROM (
+  SELECT robot, max(night) AS night FROM baseline GROUP BY robot, program, condition, since
+) GROUP BY robot
+"""
+"""The night in which each robot had a complete baseline for the first time."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +74,12 @@ class RobotSummary:
     """What became of its last night; None if it has none."""
     undated: NightRow | None = None
     """What became of files that tell no night; None without any."""
+    missing: str = ""
+    """First night since which it has no recordings but the cell has; empty if it rests, or has."""
+    gone: bool = False
+    """Whether somebody has said that it has none."""
+    gathering: bool = False
+    """Whether its last night became part of a baseline though an earlier one was complete."""
 
     @property
     def several_programs(self) -> bool:
@@ -83,15 +100,33 @@ class RobotSummary:
     @property
     def broken(self) -> bool:
         """Whether nothing of its last night could be judged, or some of it may be lost."""
-        return self.last is None or self.failure is not None
+        return not self.gone and (self.last is None or self.failure is not None)
 
     @property
-    def in_part(self) -> bool:
-        """Whether a joint of its last night could not be judged."""
-        return any(
+    def of_last_night(self) -> str:
+        """What became of it as a whole; empty where its joints tell how it stands."""
+        if self.gone:
+            return "gone"
+        if self.broken:
+            return "failed"
+        if self.missing:
+            return "missing"
+        if self.gathering:
+            return "gathering"
+        assert self.last is not None
+        return self.last.status if self.last.status in ("partial", "baseline") else ""
+
+    @property
+    def unwatched(self) -> bool:
+        """Whether it cannot be said for sure how it is: of its last night something is missing."""
+        if self.gone:
+            return False
+        # a baseline's night has a reason, too, if not all of it could be used
+        in_part = bool(self.last and self.last.why) or any(
             (joint.state, joint.night) == ("insufficient-data", self.last_night)
             for joint in self.joints
         )
+        return in_part or self.of_last_night in ("failed", "missing", "gathering")
 
     @property
     def alarms(self) -> list[JointSummary]:
@@ -114,15 +149,17 @@ class RobotSummary:
         worst = max(more, key=lambda one: one.health_index or 0.0)
         return f"{joint.alarm.text}; axis {worst.axis} changed more that night, look there first"
 
+    def shown_of(self, joint: JointSummary) -> str:
+        """Return a joint's state, or what became of the last night if that is worse."""
+        if self.gone and joint.shown != "alarm":
+            return "gone"
+        return min(joint.shown, self.of_last_night or "healthy", key=SEVERITY.index)
+
     @property
     def shown(self) -> str:
         """The worst of its joints, or what became of its last night."""
-        shown = [joint.shown for joint in self.joints]
-        if self.broken:
-            shown.append("failed")
-        elif self.last is not None and self.last.status == "baseline":
-            shown.append("baseline")
-        return min(shown, key=SEVERITY.index, default="failed")
+        shown = [self.shown_of(joint) for joint in self.joints]
+        return min(shown, key=SEVERITY.index, default=self.of_last_night or "failed")
 
 
 @dataclass(frozen=True)
@@ -134,6 +171,12 @@ class Summary:
     def only(self, names: Sequence[str]) -> "Summary":
         """Return some robots of the cell."""
         return Summary(tuple(robot for robot in self.robots if robot.name in names))
+
+    def without_recordings(self, since: str) -> "Summary":
+        """Return how the cell stands if none of its robots has a recording since a night."""
+        return Summary(
+            tuple(replace(robot, missing=robot.missing or since) for robot in self.robots)
+        )
 
     def needing(self) -> list[RobotSummary]:
         """Return the robots that need a look, worst first."""
@@ -159,17 +202,21 @@ class Summary:
             parts.append(f"{n_alarms} {joints} of {_robots(counts['alarm'])} with an alarm")
         for state, words in (
             ("failed", "could not be judged"),
+            ("missing", "without recordings"),
+            ("gathering", "not judged while a baseline is recorded"),
             ("fault", "with a fault in the last night, no alarm yet"),
             ("changed", "changed in the last night, no alarm yet"),
             ("insufficient-data", "with a joint that was not judged"),
+            ("partial", "judged in part"),
             ("known", "with an acknowledged alarm"),
+            ("gone", "without recordings, acknowledged"),
             ("baseline", "recording the baseline"),
             ("healthy", "healthy"),
         ):
             if counts[state]:
                 # where no line of the morning need name them
-                named = state in ("fault", "changed", "insufficient-data")
-                names = some([one.name for one in self.robots if one.shown == state])
+                named = state not in ("failed", "known", "gone", "baseline", "healthy")
+                names = some([_named(one) for one in self.robots if one.shown == state])
                 parts.append(f"{_robots(counts[state])} {words}" + (f": {names}" if named else ""))
         return "; ".join(parts)
 
@@ -196,11 +243,19 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
             undated[night.robot] = night
         if night.robot not in last or night.night > last[night.robot].night:
             last[night.robot] = night
+    declared = history.declared()
     begun = {
         robot: night
-        for robot, night in begun_anew(history.declared())
+        for robot, night in begun_anew(declared)
         if robot in last and night <= last[robot].night
     }
+    gone = {one.robot: one.night for one in declared if one.kind == "gone"}
+    # the first and its reminders; those of before its last night are over
+    missing: dict[str, str] = {}
+    for row in history.rows("SELECT robot, time FROM event WHERE kind = 'missing' ORDER BY time"):
+        if row["robot"] in last and row["time"] > last[row["robot"]].night:
+            missing.setdefault(row["robot"], row["time"])
+    complete = {row["robot"]: row["night"] for row in history.rows(COMPLETE)}
     joints: dict[str, list[JointSummary]] = {}
     query = (
         "SELECT robot, program, axis, state, max(night) AS night, report, health_index "
@@ -216,7 +271,17 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
     names = sorted({*last, *joints, *robots})
     return Summary(
         tuple(
-            RobotSummary(name, tuple(joints.get(name, ())), last.get(name), undated.get(name))
+            RobotSummary(
+                name,
+                tuple(joints.get(name, ())),
+                last.get(name),
+                undated.get(name),
+                missing.get(name, ""),
+                name in last and last[name].night < gone.get(name, ""),
+                name in last
+                and last[name].status == "baseline"
+                and complete.get(name, "9999") < last[name].night,
+            )
             for name in names
         )
     )
@@ -236,6 +301,10 @@ def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
 
 def _worst_first(joint: JointSummary) -> tuple[int, float]:
     return SEVERITY.index(joint.state), -(joint.health_index or 0.0)
+
+
+def _named(robot: RobotSummary) -> str:
+    return f"{robot.name} since {robot.missing}" if robot.shown == "missing" else robot.name
 
 
 def _robots(count: int) -> str:

@@ -13,6 +13,9 @@ OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed", "partial")
 OF_NIGHT = ("judged-anew", "lacking")
 """Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
 
+THE_CELL = "the cell:"
+"""What an event is of that is none of a robot's."""
+
 UNJUDGED = ("failed", "broken")
 """What a night's status is if nothing of it could be judged."""
 

@@ -120,7 +120,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[4], *at)
     ended = opamc("nightly", cell)
     assert (ended.code, ended.out.split("\n")[0]) == (
-        ExitCode.DONE,
+        ExitCode.PARTIAL,  # nobody watches the robot meanwhile
         f"r2 axis 2: the alarm of {NIGHTS[3]} is over, by a new baseline",
     )
     assert rows(cell, "SELECT cleared FROM alarm") == [(NIGHTS[4],)]
@@ -136,8 +136,8 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     # a new gear, a new baseline: two nights are not enough for it yet
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[3], "--why", "new gear", "--cell", cell)
     after = opamc("nightly", cell, "--json")
-    assert after.code == ExitCode.DONE
-    assert states(json.loads(after.out)["robots"])["r2"] == "baseline"
+    assert after.code == ExitCode.PARTIAL
+    assert states(json.loads(after.out)["robots"])["r2"] == "gathering"
     assert rows(cell, "SELECT count(*) FROM verdict WHERE robot = 'r2'") == [(0,)]
     assert not of_night.exists()
 
@@ -242,7 +242,7 @@ def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_histor
         ((time_of_alarm, _, text),) = rows(cell, events)
         opamc(*begin)
         ended = opamc("nightly", cell, "--quiet")
-        assert (ended.code, ended.out) == (ExitCode.DONE, f"r2 {over}\n")
+        assert (ended.code, ended.out) == (ExitCode.PARTIAL, f"r2 {over}\n")
         kept = [(time_of_alarm, "alarm", text), (NIGHTS[4], "cleared", over)]
         alarms = "SELECT raised, cleared FROM alarm WHERE robot = 'r2'"
         # it stays, and is no news, when alarms are found anew
@@ -377,14 +377,19 @@ def test_a_night_that_is_not_judged_is_said_when_quiet(cell, opamc):
         shutil.rmtree(logs / "r1" / NIGHTS[index])
     cell_logs.record(logs / "r1" / NIGHTS[3] / "cycle.parquet", 500, 3, program="another")
     ended = opamc("nightly", cell, "--quiet")
-    assert ended.code == ExitCode.DONE  # the first night of another program's baseline
+    assert ended.code == ExitCode.PARTIAL  # the first night of another program's baseline
     gathered = (
         "r1 nights of program 'another' at 2048 Hz, 100 %, 0 kg are not judged, they have no "
         "baseline yet: 1 of 3 gathered\n"
     )
-    silent = f"the cell: no recording of any robot since {NIGHTS[3]}\n"
-    assert ended.out == silent + gathered
-    assert opamc("nightly", cell, "--quiet").out == ""  # once of each condition
+    assert ended.out == gathered
+    again = opamc("nightly", cell, "--quiet")
+    assert (again.code, again.out) == (ExitCode.PARTIAL, "")  # said once of each condition
+    counted = "1 robot not judged while a baseline is recorded: r1"
+    assert opamc("nightly", cell).out.startswith(counted)
+    assert counted in (cell.parent / "nightly" / "index.html").read_text()
+    metrics = (cell.parent / "nightly" / "metrics.prom").read_text()
+    assert 'opamc_robot_failed{robot="r1"} 1' in metrics
     cell.write_text(cell.read_text().replace("nights: 3", f"from: {NIGHTS[0]}, to: {NIGHTS[2]}"))
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.PARTIAL
@@ -398,7 +403,7 @@ def test_other_conditions_have_a_baseline_of_their_own(cell, opamc):
     for index in (3, 4):
         cell_logs.record(logs / "r1" / NIGHTS[index] / "cycle.parquet", 500, index, payload_kg=2.0)
     entry = json.loads(opamc("nightly", cell, "--json").out)["robots"]["r1"]
-    assert (entry["state"], entry["done"]) == ("baseline", NIGHTS[:5])
+    assert (entry["state"], entry["done"]) == ("gathering", NIGHTS[:5])
 
 
 @pytest.mark.parametrize(

@@ -44,8 +44,8 @@ def _lines(summary: Summary) -> Iterator[str]:
         for of, one in joints
         if one.health_index is not None
     )
-    yield from _family("opamc_robot_failed", "1: the robot's last night could not be judged.")
-    yield from (f"opamc_robot_failed{of} {int(one.broken)}" for of, one in robots)
+    yield from _family("opamc_robot_failed", "1: its last night is missing or not wholly judged.")
+    yield from (f"opamc_robot_failed{of} {int(one.unwatched)}" for of, one in robots)
     yield from _family("opamc_robot_last_night_seconds", "Last night of the robot, Unix time.")
     yield from (
         f"opamc_robot_last_night_seconds{of} {_unix(one.last_night)}"

@@ -30,6 +30,10 @@ MORE_STATES = {
     "alarm": ("!", "fault"),
     "known": ("!", "changed"),
     "failed": ("–", "unknown"),
+    "missing": ("–", "unknown"),
+    "gathering": ("…", "unknown"),
+    "partial": ("–", "unknown"),
+    "gone": ("–", "unknown"),
     "baseline": ("…", "baseline"),
 }
 """Sign and colour of what a verdict knows nothing of."""
@@ -73,7 +77,7 @@ def _data(history: History, summary: Summary, nights: Sequence[str]) -> dict[str
         rows = [
             [
                 joint.axis,
-                STATES.index(joint.shown),
+                STATES.index(robot.shown_of(joint)),
                 joint.since,
                 joint.night,
                 joint.report,

@@ -1,0 +1,136 @@
+"""What the last line counts, and the exit code: both hold for as long as what they say."""
+
+import json
+import shutil
+from datetime import date, timedelta
+
+import cell_logs
+import nightly_kills
+import pytest
+from cell_logs import night
+
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.settle import _missing
+from opamc_cli.stages.nightly.summary import summarise
+from opamc_cli.storage.history.history import History
+from opamc_cli.storage.history.rows import NightRow
+
+
+@pytest.fixture
+def logs(cell):
+    """The logs of two robots whose nights are all healthy."""
+    shutil.rmtree(cell.parent / "logs" / "r2")
+    with nightly_kills.with_stand_in():
+        yield cell.parent / "logs"
+
+
+def add_night(logs, index, *robots, **said):
+    for number, robot in enumerate(robots):
+        path = logs / robot / night(index) / "cycle.parquet"
+        cell_logs.record(path, 500, 100 * number + index, **said)
+
+
+def counted(cell, opamc):
+    """Return the code of a quiet start, that of another, and the last line of that."""
+    quiet, loud = opamc("nightly", cell, "--quiet"), opamc("nightly", cell)
+    headline = loud.out.splitlines()[-1].rpartition("; ")[0]
+    page = (cell.parent / "nightly" / "index.html").read_text()
+    assert f"<h1>{headline}</h1>" in page
+    return quiet.code, loud.code, headline
+
+
+def failed(cell):
+    """Return the robots that the metrics call failed."""
+    lines = (cell.parent / "nightly" / "metrics.prom").read_text().splitlines()
+    return [line.split('"')[1] for line in lines if "robot_failed{" in line and line[-1] == "1"]
+
+
+def test_a_robot_that_delivers_nothing_is_not_counted_healthy(cell, logs, opamc):
+    opamc("nightly", cell)
+    for index in (5, 6):
+        add_night(logs, index, "r3")
+        said = f"1 robot without recordings: r1 since {night(5)}; 1 robot healthy"
+        assert counted(cell, opamc) == (ExitCode.PARTIAL, ExitCode.PARTIAL, said)
+        assert failed(cell) == ["r1"]
+    robots = json.loads(opamc("nightly", cell, "--json").out)["robots"]
+    assert (robots["r1"]["state"], robots["r1"]["missing_since"]) == ("missing", night(5))
+    assert (robots["r3"]["state"], robots["r3"]["missing_since"]) == ("healthy", None)
+    # until somebody says that it is to have none
+    why = ("--why", "sold", "--cell", cell)
+    assert opamc("nightly", "acknowledge", "r1", *why).code == ExitCode.DONE
+    said = "1 robot without recordings, acknowledged; 1 robot healthy"
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+    assert failed(cell) == []
+    add_night(logs, 7, "r1", "r3")
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+    # it was not, after all; the second time is another one
+    add_night(logs, 8, "r3")
+    assert counted(cell, opamc)[0] == ExitCode.PARTIAL
+
+
+def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
+    first = date(2026, 3, 2)  # a Monday
+    key = {"version": "1", "config": "", "baseline": ""}
+
+    def rows(name, days):
+        dates = [(first + timedelta(day)).isoformat() for day in days]
+        return [
+            NightRow(name, one, json.dumps({**key, "files": [f"{name} {one}"]}), "done")
+            for one in dates
+        ]
+
+    for days, state in ((21, "missing"), (35, "healthy"), (36, "missing")):  # 7 n ends on a Sunday
+        rests = {"r1": rows("r1", [n for n in range(days) if n % 7 < 6 and n != 35])}
+        nights = {**rests, "r2": rows("r2", range(days))}
+        with History(tmp_path / f"{days}.sqlite") as history:
+            for row in [*nights["r1"], *nights["r2"]]:
+                history.record_night(row)
+            history.replace_missing(_missing(nights, {"r1", "r2"}, {}, 7))
+            (robot, _) = summarise(history).robots
+        assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
+
+
+def test_a_cell_that_is_silent_is_not_counted_healthy(cell, logs, opamc, monkeypatch):
+    assert opamc("nightly", cell).code == ExitCode.DONE
+    today = date.fromisoformat(night(8))
+    monkeypatch.setattr("opamc_cli.commands.nightly.nightly._today", lambda: today)
+    for out in (f"the cell: no recording of any robot since {night(4)}\n", ""):
+        ended = opamc("nightly", cell, "--quiet")
+        assert (ended.code, ended.out) == (ExitCode.PARTIAL, out)
+    since = night(5)
+    said = f"2 robots without recordings: r1 since {since}, r3 since {since}"
+    assert opamc("nightly", cell).out.startswith(said)
+    add_night(logs, 8, "r1", "r3")
+    assert opamc("nightly", cell).code == ExitCode.DONE
+
+
+def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, opamc):
+    (logs / "r1" / night(4) / "empty.parquet").touch()
+    assert "in part not judged" in opamc("nightly", cell, "--quiet").out
+    said = "1 robot judged in part: r1; 1 robot healthy"
+    assert counted(cell, opamc) == (ExitCode.PARTIAL, ExitCode.PARTIAL, said)
+    assert failed(cell) == ["r1"]
+    add_night(logs, 5, "r1", "r3")
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+
+
+def test_a_robot_whose_next_baseline_is_recorded_is_not_watched(cell, logs, opamc):
+    for index in (5, 6, 7, 8):
+        add_night(logs, index, "r1", program="pick_v2")
+        add_night(logs, index, "r3")
+        ended = counted(cell, opamc)
+        if index < 8:
+            said = "1 robot not judged while a baseline is recorded: r1; 1 robot healthy"
+            assert ended == (ExitCode.PARTIAL, ExitCode.PARTIAL, said)
+            assert failed(cell) == ["r1"]
+    assert ended == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+
+
+def test_a_first_baseline_is_no_concern(cell, logs, opamc):
+    for index in (2, 3, 4):
+        for robot in ("r1", "r3"):
+            shutil.rmtree(logs / robot / night(index))
+    said = "2 robots recording the baseline"
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+    add_night(logs, 2, "r1", "r3")  # the baseline is complete
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
