@@ -90,6 +90,7 @@ def run(
     from opamc_cli.stages.nightly.start.outcome import Wanted
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
+    from opamc_cli.storage.history.rows import THE_CELL
     from opamc_cli.storage.schemas import files
 
     forgo_pandas()
@@ -110,7 +111,8 @@ def run(
                 loaded, str(cell), history, wanted, jobs=jobs, scheduler=scheduler, progress=steps
             )
         summary = outcome.summary.only(outcome.robots)
-        untold = [one for one in history.events(untold=True) if one.robot in outcome.robots]
+        told_of = {*outcome.robots, THE_CELL}
+        untold = [one for one in history.events(untold=True) if one.robot in told_of]
         if wanted == Wanted():
             silent_since, now = silent(history, _today(), loaded.alarm.remind_after)
             # the page knows no clock: it follows from the records alone

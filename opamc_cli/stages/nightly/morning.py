@@ -20,7 +20,7 @@ OVER = {
     kind: rank
     for rank, kind in enumerate(
         (
-            *("ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
+            *("lost", "ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
             *("missing", "cleared", "gathering"),
         )
     )
@@ -28,7 +28,7 @@ OVER = {
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
-NO_ROBOTS = ("silent", "ended", "stray")
+NO_ROBOTS = ("lost", "silent", "ended", "stray")
 """Kinds of event that may be of none of the cell's robots."""
 
 MOST_STANDING = 20
@@ -148,7 +148,7 @@ def tell(
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
-    once = any(event.kind in ("ended", "stray") for event in news)  # nothing stays of it
+    once = any(event.kind in ("lost", "ended", "stray") for event in news)  # nothing stays of it
     failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
     doubtful = failed or unwatched or once
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE

@@ -217,6 +217,10 @@ class History:
         with self.transaction():
             self._put("file", files)
 
+    def is_new(self) -> bool:
+        """Whether no start has looked at a recording yet."""
+        return not self.rows("SELECT path FROM file LIMIT 1") and not self.nights()
+
     def nights(self) -> dict[tuple[str, str], NightRow]:
         """Return what became of every robot's night."""
         found = self._read(NightRow, "SELECT * FROM night")
@@ -278,6 +282,11 @@ class History:
             self._db.execute(f"DELETE FROM event WHERE {where}", key)
         self._db.execute(f"DELETE FROM told WHERE {where}", key)
         self._put("event", [event])
+
+    def record_news(self, event: Event) -> None:
+        """Keep what somebody is to be told, whichever start comes to it."""
+        with self.transaction():
+            self._put_news(event, replaces=False)
 
     def forget_nights(self, robot: str, nights: Iterable[str]) -> None:
         """Forget nights of which nothing could be judged: their files are mended, or gone."""

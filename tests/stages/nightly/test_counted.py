@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import sqlite3
 from datetime import date, timedelta
 
 import cell_logs
@@ -134,3 +135,30 @@ def test_a_first_baseline_is_no_concern(cell, logs, opamc):
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
     add_night(logs, 2, "r1", "r3")  # the baseline is complete
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+
+
+def test_a_history_that_is_lost_is_said_with_what_its_results_tell(cell, opamc):
+    why = "alarms of before are not known\n"
+    nightly = cell.parent / "nightly"
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+    (nightly / "r1" / night(4) / "verdict.json").write_text("half a")
+    for path in nightly.glob("history.sqlite*"):
+        path.unlink()
+    for index in (3, 4):
+        shutil.rmtree(cell.parent / "logs" / "r2" / night(index))
+    assert opamc("nightly", cell, "--dry-run").code == ExitCode.DONE  # which tells nobody
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    faults = f"2 with a fault: r2 {night(4)}, r2 {night(3)}"
+    lost = f"the cell: no history here, but results of 6 earlier nights, {faults}; {why}"
+    assert first.out.startswith(lost)
+    assert first.code == ExitCode.PARTIAL
+    assert "no history" not in second.out
+    assert json.loads((nightly / "r2" / night(4) / "verdict.json").read_text())["axes"]
+
+
+def test_results_of_a_start_that_was_killed_are_no_lost_history(cell, logs, opamc):
+    opamc("nightly", cell)
+    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+        for table in ("night", "verdict", "measure", "baseline", "event"):
+            db.execute(f"DELETE FROM {table}")
+    assert opamc("nightly", cell, "--quiet").out == ""

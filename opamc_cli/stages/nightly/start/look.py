@@ -15,6 +15,7 @@ from opamc_cli.stages.nightly.inputs.strangers import said_of_baselines, without
 from opamc_cli.stages.nightly.plan.planned import PlannedNight, RobotPlan, Situation
 from opamc_cli.stages.nightly.plan.robot import plan_robot
 from opamc_cli.stages.nightly.start.jobs import COPIES
+from opamc_cli.stages.nightly.start.lost import say_lost
 from opamc_cli.stages.nightly.start.outcome import CellOutcome, Wanted
 from opamc_cli.stages.nightly.start.past import Past
 from opamc_cli.storage.history.history import History
@@ -51,6 +52,7 @@ def arrive(
     cell: CellConfig, source: str, history: History, wanted: Wanted
 ) -> tuple[Scene, Past, CellOutcome]:
     """Find all recordings and what is known, and say what is odd about them."""
+    say_lost(cell, history)
     found = find_recordings(cell, history, wanted.robots, cell.out / COPIES)
     past = Past(cell, history)
     own = without_strangers(found.by_robot, found.baseline_by_robot, found.beside, past.recorded)
