@@ -3,10 +3,12 @@
 import json
 import shutil
 import sqlite3
+from dataclasses import replace
 from datetime import date, timedelta
 
 import cell_logs
 import nightly_kills
+import pyarrow.parquet as pq
 import pytest
 from cell_logs import night
 
@@ -15,6 +17,7 @@ from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
+from opamc_cli.storage.runs import Run, save_run
 
 
 @pytest.fixture
@@ -135,6 +138,22 @@ def test_a_first_baseline_is_no_concern(cell, logs, opamc):
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
     add_night(logs, 2, "r1", "r3")  # the baseline is complete
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+
+
+def test_a_key_that_metadata_had_not_is_named_with_the_condition_that_it_makes(cell, logs, opamc):
+    for path in (logs / "r1").glob("*/*.parquet"):
+        with Run(path) as run:
+            info = replace(run.info, speed_percent=None)
+        table = pq.read_table(path)
+        save_run(path, info, {name: table[name].to_numpy() for name in table.column_names})
+    add_night(logs, 5, "r1")
+    add_night(logs, 5, "r3", payload_kg=2.0)
+    said = opamc("nightly", cell, "--quiet").out
+    (line,) = (line for line in said.splitlines() if line.startswith("r1"))
+    assert line.endswith("no baseline yet: 1 of 3 gathered; its metadata now say speed 100 %")
+    # another value than before is no new key
+    (line,) = (line for line in said.splitlines() if line.startswith("r3"))
+    assert line.endswith("1 of 3 gathered")
 
 
 def test_a_history_that_is_lost_is_said_with_what_its_results_tell(cell, opamc):

@@ -6,6 +6,7 @@ from opamc_cli.stages.nightly.inputs.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.stages.nightly.plan.planned import Comparison, Situation
 from opamc_cli.storage.history.rows import AlarmSpan
+from opamc_cli.storage.logs import Facts
 
 LEAST_NIGHTS = 2
 """Nights that must be left of a baseline: one says nothing of how much nights differ."""
@@ -128,8 +129,23 @@ class Baselines:
                 yield (
                     nights[0],
                     f"nights{of} at {condition} are not judged, they have no baseline yet: "
-                    f"{len(nights)} of {wanted} gathered",
+                    f"{len(nights)} of {wanted} gathered{self._newly_said(key)}",
                 )
+
+    def _newly_said(self, key: tuple[str, str, str]) -> str:
+        """Say what metadata alone may have made a condition: a logger that was updated."""
+        now = self._told_by(key)
+        for other in self.complete:
+            then = self._told_by(other)
+            if other[::2] == key[::2] and then < now and self._there[other]:
+                return f"; its metadata now say {', '.join(sorted(now - then))}"
+        return ""
+
+    def _told_by(self, key: tuple[str, str, str]) -> set[str]:
+        """Return speed and payload of a condition, as far as its metadata say them."""
+        of = next((night[0].facts for night in self._nights_there(key).values()), Facts())
+        told = (("speed", of.speed_percent, "%"), ("payload", of.payload_kg, "kg"))
+        return {f"{name} {value:g} {unit}" for name, value, unit in told if value is not None}
 
     def _gone_from(self, key: tuple[str, str, str], left: Sequence[str]) -> Iterator[Recording]:
         """Yield what nights of a baseline have lost; what was renamed is there."""
