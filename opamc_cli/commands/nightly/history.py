@@ -1,7 +1,7 @@
 """`opamc history`: what is known of a cell's nights, as a table or a file."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -9,6 +9,9 @@ from opamc_cli.commands.nightly.nightly import DEFAULT_CELL, Cell, as_night
 from opamc_cli.commands.terminal.options import Json, Quiet
 from opamc_cli.commands.terminal.output import Output
 from opamc_cli.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from opamc_cli.storage.history.history import History
 
 SHOWN = ("robot", "axis", "night", "state", "health_index", "p_value", "cause", "alarm", "n_runs")
 
@@ -58,6 +61,11 @@ def history(
             if name not in known:
                 msg = f"--robot {name}: no night of it is known; there are {some(sorted(known))}"
                 raise InputError(msg)
+        axes = _axes(opened, robot) if axis is not None else set()
+        if axis not in {None, *axes}:
+            has = some([str(one) for one in sorted(axes)]) or "none yet"
+            msg = f"--axis {axis}: nothing is known of it; there are {has}"
+            raise InputError(msg)
         rows = opened.rows(
             f"SELECT * FROM {table} WHERE {' AND '.join(where)} ORDER BY robot, {column}, axis",
             values,
@@ -67,6 +75,19 @@ def history(
         output.result({"written": str(out), "rows": len(rows)}, f"{out}: {len(rows)} rows")
         return
     output.result({table: rows}, _table(rows, events) if rows else "nothing of that kind is known")
+
+
+def _axes(history: "History", robots: list[str] | None) -> set[int]:
+    """Return the joints of which anything is known.
+
+    A healthy one may have no event, and one whose baseline is recorded anew no verdict.
+    """
+    return {
+        row["axis"]
+        for table in ("verdict", "event")
+        for row in history.rows(f"SELECT DISTINCT robot, axis FROM {table}")
+        if row["axis"] is not None and (not robots or row["robot"] in robots)
+    }
 
 
 def _table(rows: list[dict[str, Any]], events: bool) -> Any:

@@ -181,3 +181,14 @@ def test_results_of_a_start_that_was_killed_are_no_lost_history(cell, logs, opam
         for table in ("night", "verdict", "measure", "baseline", "event"):
             db.execute(f"DELETE FROM {table}")
     assert opamc("nightly", cell, "--quiet").out == ""
+
+
+def test_a_joint_of_which_nothing_is_known_is_no_empty_history(cell, logs, opamc):
+    opamc("nightly", cell)
+    for option, value in (("--axis", "9"), ("--robot", "zz")):
+        ended = opamc("history", "--cell", cell, option, value)
+        assert ended.code == ExitCode.BAD_INPUT
+        assert f"{option} {value}: no" in ended.err
+    assert "there are 1, 2" in opamc("history", "--cell", cell, "--axis", 9).err
+    for more in ((), ("--events",), ("--since", "2062-03-01"), ("--robot", "r1")):
+        assert opamc("history", "--cell", cell, "--axis", 1, *more).code == ExitCode.DONE
