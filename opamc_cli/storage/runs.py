@@ -33,6 +33,7 @@ from opamc_cli.storage.schemas.channels import (
     MOST_HZ,
     NEARLY_COLUMN,
     PHASES,
+    same_clock,
 )
 
 METADATA_KEY = b"opamc"
@@ -41,9 +42,6 @@ ROW_GROUP_SAMPLES = 1 << 18
 
 RECENT_GROUPS = 2
 """Row groups kept after reading: a segment may span a boundary."""
-
-RATE_TOLERANCE = 1e-3
-"""Largest relative disagreement of `time_s` with the declared sampling rate."""
 
 MOST_GROUP_SAMPLES = 1 << 24
 """Rows of a row group, which is decoded at once: two hours at 2048 Hz."""
@@ -296,7 +294,7 @@ class Run:
                     "resample the recording with `opamc ingest`"
                 )
                 raise InputError(msg)
-            if step.size and abs(float(step.mean()) / period - 1.0) > RATE_TOLERANCE:
+            if step.size and not same_clock(float(step.mean()), period):
                 msg = (
                     f"{self.path}: column time_s says {1 / step.mean():.6g} Hz, the metadata "
                     f"{self.sampling_rate_hz:g} Hz; correct sampling_rate_hz or drop time_s"

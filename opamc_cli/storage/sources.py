@@ -10,10 +10,11 @@ from opamc_cli.errors import InputError
 from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.files.result import published
 from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
+from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.tables import table_record
 
 REQUIRED_EQUAL = ("sampling_rate_hz", "program", "current_unit")
-"""What must agree between recordings before their patterns can be compared."""
+"""What must agree between recordings to be compared; rates as those of one clock do."""
 
 WORTH_NOTING = ("robot", "speed_percent", "payload_kg")
 """What may differ, since it may be the very thing that is looked for, but has to be said."""
@@ -191,9 +192,13 @@ def _first_difference(
     known = [(run, getattr(run.info, key)) for run in runs]
     known = [(run, value) for run, value in known if value is not None]
     for other in known[1:]:
-        if other[1] != known[0][1]:
+        if not _agree(key, other[1], known[0][1]):
             return known[0], other
     return None
+
+
+def _agree(key: str, value: Any, expected: Any) -> bool:
+    return same_clock(value, expected) if key == "sampling_rate_hz" else bool(value == expected)
 
 
 def _locate(path: Path, name: str, moved_to: Sequence[Path]) -> Path:

@@ -205,6 +205,16 @@ def test_a_torque_is_never_called_a_current(folder, capsys):
     assert axis["unit"] == "Nm"
 
 
+def test_runs_at_rates_of_one_clock_are_one_model_s(folder, capsys):
+    made, later = folder / "run.parquet", folder / "later.parquet"
+    table = pq.read_table(made)
+    for rate, code in ((250.02, 0), (250.5, 3)):
+        record = {b"opamc": json.dumps({"sampling_rate_hz": rate}).encode()}
+        pq.write_table(table.replace_schema_metadata(record), later)
+        assert opamc("model", "fit", made, later, "--axis", 1, "--out", folder / "out") == code
+    assert "different rates (250, 250.5 Hz)" in capsys.readouterr().err
+
+
 def test_fit_and_trace_write_their_tables(folder):
     for command, table in (("fit", "fit"), ("trace", "candidates")):
         code = opamc(

@@ -29,6 +29,7 @@ from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
 from opamc_cli.storage.tables import read_table, table_input, write_table
@@ -427,6 +428,12 @@ def _identify_part(job: _Job) -> pa.Table:
         "reference_samples": samples,
     }
     rows = part.rows
+    if reference is not None:
+        rate_hz, own_hz = (of.source.info.sampling_rate_hz for of in (reference, part))
+        if same_clock(own_hz, rate_hz):
+            # of one clock's drift a delay in samples, which rounds, must not make two
+            at = rows.schema.get_field_index("sampling_rate_hz")
+            rows = rows.set_column(at, rows.field(at), pa.array(np.full(n, rate_hz)))
     for name, values in columns.items():
         rows = rows.append_column(MOTIONS.field(name), pa.array(values, MOTIONS.field(name).type))
     return rows.select(MOTIONS.names).replace_schema_metadata(None).cast(MOTIONS)

@@ -21,6 +21,7 @@ from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.storage.runs import Run
+from opamc_cli.storage.schemas.channels import same_clock
 
 HELD = 0.5
 """Share of samples in which a position that is logged at its own rate changes, at the least, while
@@ -166,13 +167,15 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         msg = f"{runs[0].path}: some runs hold currents (A), others torques (Nm); give one kind"
         raise InputError(msg)
     rates = {recording.rate_hz for recording in recordings}
-    if len(rates) > 1:
+    rate_hz = recordings[0].rate_hz
+    if not all(same_clock(rate, rate_hz) for rate in rates):
         msg = (
             f"{runs[0].path}: the runs have different rates "
             f"({', '.join(f'{rate:g}' for rate in sorted(rates))} Hz); give runs of one rate, or "
             "ingest them again with one resample_hz in the map"
         )
         raise InputError(msg)
+    recordings = [replace(recording, rate_hz=rate_hz) for recording in recordings]
     for recording, run in zip(recordings, runs, strict=True):
         if recording.size < 64:
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
@@ -184,7 +187,7 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     # Of a heavy joint of an arm it may be anything until the others' torques are known: one of
     # positive friction (by 44 errors) drove by 14 in another program.
     if opposite is None and signed and not moving_beside(recordings):
-        opposite = friction_drives(pairs, recordings[0].rate_hz)
+        opposite = friction_drives(pairs, rate_hz)
         notes += [OPPOSITE.format(axis)] if opposite else []
     if signed and opposite:
         recordings = [

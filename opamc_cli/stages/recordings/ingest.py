@@ -40,7 +40,7 @@ from opamc_cli.storage.runs import (
     file_sha256,
     write_run,
 )
-from opamc_cli.storage.schemas.channels import quantity_of
+from opamc_cli.storage.schemas.channels import quantity_of, same_clock
 
 _TIME = "time"
 
@@ -138,12 +138,12 @@ def run(
 
 
 def rates_note(results: Sequence[Ingested]) -> str | None:
-    """Return what to do about runs of different rates, None where they have one rate.
+    """Return what to do about runs of different rates, None where they have one.
 
     Baseline and target are compared at one rate only; to hear of it now saves a refusal later.
     """
     rates = sorted({item.sampling_rate_hz for item in results})
-    if len(rates) < 2:
+    if not rates or same_clock(rates[-1], rates[0]):
         return None
     low, high = (next(i for i in results if i.sampling_rate_hz == r) for r in (rates[0], rates[-1]))
     said = (

@@ -1,6 +1,7 @@
 """Why a joint has changed: the effect that target runs have and baseline runs lack."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -94,8 +95,9 @@ def explain(
     """
     sides = []
     seconds = 60.0 * config.explain_minutes
+    rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
     for sources in (baseline, target):
-        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, moving or {})
+        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, moving or {}, rate_hz)
         if not recordings:
             return None
         sides.append(recordings)
@@ -133,12 +135,13 @@ def _recordings(
     sources: Sequence[RunSource],
     seconds: float,
     moving: Mapping[str, tuple[int, int]],
+    rate_hz: float,
 ) -> list[Recording]:
     found = []
     for source in sources:
         # seconds are those of a log of this rate: a slower one costs no more for being longer
-        rate_hz = max(source.info.sampling_rate_hz, LEAST_HZ)
-        beside, most = round(BESIDE_S * rate_hz), round(seconds / len(sources) * rate_hz)
+        read_hz = max(rate_hz, LEAST_HZ)
+        beside, most = round(BESIDE_S * read_hz), round(seconds / len(sources) * read_hz)
         try:
             with source.open() as run:
                 known = [_moves(run, axis), moving.get(source.name)]
@@ -146,7 +149,8 @@ def _recordings(
                 spans = [span for span in known if span] or [(0, source.n_samples)]
                 first, last = min(start for start, _ in spans), max(stop for _, stop in spans)
                 start, stop = max(first - beside, 0), min(last + beside, first + most)
-                found.append(interpolated(read_recording(run, axis, start, stop), LEAST_HZ))
+                recording = replace(read_recording(run, axis, start, stop), rate_hz=rate_hz)
+                found.append(interpolated(recording, LEAST_HZ))
         except OpamcError:
             continue  # the run served the chain but not a model, which needs motion beside current
     return found

@@ -74,6 +74,22 @@ LEAST_HZ, MOST_HZ = 1e-3, 1e8
 """A current that is sampled once in a quarter of an hour has a clock in another unit; no converter
 is faster than the other, but a time in nanoseconds that was taken for a rate is."""
 
+SAME_CLOCK = 1e-3
+"""Relative difference of rates that is a clock's drift, or how well it was measured, no other rate:
+frequencies and lengths of motions differ by more from night to night."""
+
+
+def same_clock(rate_hz: float, other_hz: float) -> bool:
+    """Tell whether two rates are one.
+
+    Examples
+    --------
+    >>> same_clock(200.006, 200.0), same_clock(200.3, 200.0)
+    (True, False)
+    """
+    return abs(rate_hz / other_hz - 1.0) <= SAME_CLOCK
+
+
 COLUMN = re.compile(rf"axis([1-9][0-9]*)_({'|'.join(CHANNELS)})")
 """Name of a run's column."""
 

@@ -206,6 +206,11 @@ def test_other_rates_and_programs_are_refused(tmp_path):
         score.run(baseline, target, CONFIG, tmp_path)
 
 
+def test_rates_of_one_clock_are_compared(tmp_path):
+    baseline, target = write_patterns(tmp_path, Fleet(), 0, sampling_rate_hz=2048.02)
+    assert score.run(baseline, target, CONFIG, tmp_path).notes == ()
+
+
 def test_tables_without_anything_in_common_are_refused(tmp_path):
     baseline, _ = write_patterns(tmp_path / "a", Fleet(n_axes=1), 0)
     _, target = write_patterns(tmp_path / "b", Fleet(n_axes=1), 0)

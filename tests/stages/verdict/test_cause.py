@@ -1,5 +1,6 @@
 """The cause of a change in the shipped samples: phases alone, axis 3 has a ground flexspline."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -156,6 +157,18 @@ def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
     assert found[0] == found[1]
 
 
+def test_a_clock_s_drift_is_no_other_rate(tmp_path):
+    baseline, target = (pushed(tmp_path / str(extra_a), extra_a) for extra_a in (0.0, 0.6))
+    known = cause.explain(1, baseline, target, JointConfig())
+    for source in target:
+        with Run(source.path) as run:
+            columns = run.read(run.columns)
+        # a little below what slower logs are interpolated to
+        save_run(source.path, replace(source.info, sampling_rate_hz=99.95), columns)
+    assert known is not None
+    assert cause.explain(1, baseline, target, JointConfig()) == known
+
+
 def test_a_spike_of_the_position_hides_no_motion(tmp_path):
     sources = pushed(tmp_path, 0.0, rest=300)
     for source in sources:
@@ -164,7 +177,7 @@ def test_a_spike_of_the_position_hides_no_motion(tmp_path):
         columns["axis1_position"] = columns["axis1_position"].copy()
         columns["axis1_position"][1000] = 1e6
         save_run(source.path, source.info, columns)
-    found = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)))
+    found = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), 100.0)
     assert [recording.size for recording in found] == [2600] * 3
 
 

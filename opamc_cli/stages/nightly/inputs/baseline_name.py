@@ -1,5 +1,7 @@
 """What a baseline is called: where it begins, and the condition that it was recorded at."""
 
+import re
+
 
 def baseline_name(begin: str, condition: str) -> str:
     """Return a baseline's name.
@@ -28,3 +30,15 @@ def condition_in(name: str) -> str:
     '100 Hz, 70 %'
     """
     return name.partition(", ")[2]
+
+
+def rate_in(condition: str) -> float | None:
+    """Return the sampling rate that a condition names; None if it names none.
+
+    Examples
+    --------
+    >>> rate_in("100 Hz, 70 %")
+    100.0
+    """
+    told = re.match(r"(\d+(?:\.\d+)?(?:e[+-]\d+)?) Hz", condition)
+    return float(told[1]) if told else None

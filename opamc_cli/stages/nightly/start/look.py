@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from opamc_cli.config.cell import CellConfig
+from opamc_cli.stages.nightly.inputs.one_rate import at_named_rates, named_rates
 from opamc_cli.stages.nightly.inputs.recordings import (
     CellRecordings,
     Recording,
@@ -129,13 +130,17 @@ def plan_of(robot: str, scene: Scene, past: Past, done: set[tuple[str, str]] | N
     cell, recordings = scene.cell, scene.recordings
     config = cell.diagnosis_of(robot, scene.source)
     axes = cell.axes_of(robot)
+    pinned = past.pinned.get(robot, {})
+    fixed, own = recordings.baseline_by_robot[robot], recordings.by_robot[robot]
+    older = sorted(pinned, key=lambda key: (pinned[key][0], key))
+    rates = named_rates((condition for _, condition, _ in older), [*fixed, *own])
     situation = Situation(
         baseline=cell.baseline,
-        fixed=recordings.baseline_by_robot[robot],
-        gone=recordings.gone_by_robot[robot],
-        gone_fixed=recordings.gone_of_baseline[robot],
+        fixed=at_named_rates(fixed, rates),
+        gone=at_named_rates(recordings.gone_by_robot[robot], rates),
+        gone_fixed=at_named_rates(recordings.gone_of_baseline[robot], rates),
         begun=past.begun.get(robot, ()),
-        pinned=past.pinned.get(robot, {}),
+        pinned=pinned,
         recorded=past.recorded.get(robot, {}),
         removed=past.removed.get(robot, ()),
         config_hash=config.digest() + ("" if axes is None else f" axes {axes}"),
@@ -144,7 +149,7 @@ def plan_of(robot: str, scene: Scene, past: Past, done: set[tuple[str, str]] | N
             done is not None and scene.wanted.has(night) and (robot, night) not in done
         ),
     )
-    return plan_robot(robot, recordings.by_robot[robot], situation)
+    return plan_robot(robot, at_named_rates(own, rates), situation)
 
 
 def _keep_baselines(

@@ -14,14 +14,12 @@ import numpy.typing as npt
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.source import Name
+from opamc_cli.storage.schemas.channels import same_clock
 
 Seconds = npt.NDArray[np.float64]
 
 EVEN_WITHIN = 0.01
 """Largest deviation from the line, in samples, of stamps that count as even."""
-
-DRIFT_WITHIN = 1e-3
-"""Relative difference of declared and measured rate that is a clock's drift, not another rate."""
 
 RATE_WITHIN = 0.1
 """Relative difference of declared and measured rate beyond which the declaration is wrong: far
@@ -196,7 +194,7 @@ def _even_clock(times_s: Seconds, declared_rate_hz: float | None) -> Clock | Non
         if declared_rate_hz is None:
             simple = float(f"{1.0 / period:.6g}")
             rate = simple if _is_line(times_s, 1.0 / simple, rounding) else 1.0 / period
-        elif abs(1.0 / period / declared_rate_hz - 1.0) <= DRIFT_WITHIN:
+        elif same_clock(1.0 / period, declared_rate_hz):
             rate = declared_rate_hz
         else:
             return None
