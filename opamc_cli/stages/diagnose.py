@@ -134,13 +134,13 @@ def _diagnose(
     _check_before(baseline, target)
     if config.joint.library:
         _cause().library_of(config.joint)  # a mistake in it is better told now than at the end
-    repeats, left_out = repeated(baseline, target, kept)
+    repeats = repeated(baseline, target, kept)
     agreement = Agreement(config.identify)
     normal = run_chain(
         baseline,
         config,
         out / "baseline",
-        without=repeats["baseline"],
+        without=repeats.baseline,
         check=partial(agreement.check, "baseline", kept=kept),
         jobs=jobs,
         kept=kept,
@@ -151,7 +151,7 @@ def _diagnose(
         config,
         out / "target",
         reference=normal.motions,
-        without=repeats["target"],
+        without=repeats.target,
         check=partial(agreement.check, "target", motions=normal.motions),
         jobs=jobs,
         progress=lambda stage: progress(f"target: {stage}"),
@@ -192,7 +192,14 @@ def _diagnose(
     every_note = tuple(
         dict.fromkeys(
             worded(note)
-            for said in (left_out, normal.notes, other.notes, scored.notes, decided.notes(), notes)
+            for said in (
+                repeats.notes,
+                normal.notes,
+                other.notes,
+                scored.notes,
+                decided.notes(),
+                notes,
+            )
             for note in said
         )
     )
@@ -218,7 +225,7 @@ def _diagnose(
         exit_code=written.exit_code or (ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.DONE),
         n_runs=len(normal.runs_done) + len(other.runs_done),
         errors=(
-            *(*of_baseline, *other.errors, *unjudged.errors),
+            *(*of_baseline, *repeats.errors, *other.errors, *unjudged.errors),
             *unjudged.sessions_at_rest(sides),
             *([InputError(stranger)] if stranger else []),
         ),

@@ -14,7 +14,7 @@ import shutil
 import stat
 import uuid
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import date
 from pathlib import Path
 
@@ -78,6 +78,8 @@ class Facts:
     """That it names; empty if it names none."""
     error: str = ""
     """Why it is no recording; empty if it is one."""
+    samples: str = ""
+    """SHA-256 of its currents' samples; empty if they never change, or nobody looked."""
 
     @classmethod
     def of(cls, info: RunInfo) -> "Facts":
@@ -229,7 +231,7 @@ def read_facts(log: LogFile, at: Path) -> tuple[str, Facts]:
             while block := file.read(BLOCK_BYTES):
                 digest.update(block)
         with Run(at) as run:
-            facts = Facts.of(run.info)
+            facts = replace(Facts.of(run.info), samples=run.currents_sha256)
     except OpamcError as error:
         facts = Facts(error=str(error).replace(str(at), log.path))
     except OSError as error:

@@ -23,7 +23,7 @@ from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
-from opamc_cli.storage.files.parquet import read_schema, reading, shown_line
+from opamc_cli.storage.files.parquet import read_schema, reading, samples_sha256, shown_line
 from opamc_cli.storage.files.paths import expand_patterns
 from opamc_cli.storage.ingest.formats import FORMAT_OF_ENDING
 from opamc_cli.storage.schemas.channels import (
@@ -33,6 +33,7 @@ from opamc_cli.storage.schemas.channels import (
     MOST_HZ,
     NEARLY_COLUMN,
     PHASES,
+    quantity_of,
     same_clock,
 )
 
@@ -306,6 +307,13 @@ class Run:
     def sha256(self) -> str:
         """SHA-256 of the file."""
         return file_sha256(self.path)
+
+    @property
+    def currents_sha256(self) -> str:
+        """SHA-256 of the currents' samples as they are stored; empty if they never change."""
+        names = (name for own in self._channels.values() for name in own.columns.values())
+        currents = [name for name in names if quantity_of(name) == "current"]
+        return samples_sha256(self.path, currents, self._file.metadata)
 
     def close(self) -> None:
         """Close the file."""

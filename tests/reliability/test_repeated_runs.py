@@ -2,11 +2,13 @@
 
 import json
 import shutil
+from dataclasses import replace
 
 import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import ExitCode
+from opamc_cli.storage.runs import Run, save_run
 from tests.marks import long
 
 pytestmark = pytest.mark.usefixtures("undrawn")
@@ -54,6 +56,32 @@ def test_a_run_twice_in_the_baseline_counts_once(opamc, baseline, tonight, tmp_p
     assert "night-7.parquet is the same recording as the baseline's" in ended.err
     verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
     assert verdict["baseline"]["runs"] == ["night-0", "night-1", "night-2"]
+
+
+def begun(source, to, started_at):
+    """Write the same samples with another time, as a logger that is stuck does."""
+    with Run(source) as run:
+        save_run(to, replace(run.info, started_at=started_at), run.read(run.columns))
+
+
+def test_samples_of_the_baseline_with_another_time_are_no_night(opamc, baseline, tonight, tmp_path):
+    folder, at = tmp_path / "target", ("--out", tmp_path / "out", "--set", "joint.explain=false")
+    folder.mkdir()
+    begun(baseline / "night-1.parquet", folder / "stuck.parquet", "2026-03-20T22:00:00Z")
+    ended = opamc("diagnose", "--baseline", baseline, "--target", folder, *at, "--quiet")
+    assert ended.code == ExitCode.BAD_INPUT
+    (sentence,) = ended.sentences
+    assert "stuck.parquet: left out, its samples are those of the baseline's" in sentence
+    copied(tonight, folder / "tonight.parquet")
+    copied(tonight, folder / "twice.parquet")
+    ended = opamc("diagnose", "--baseline", baseline, "--target", folder, *at, "--quiet")
+    assert ended.code == ExitCode.PARTIAL
+    first, second = ended.sentences
+    assert "twice.parquet: left out, is the same recording as" in first
+    assert second == sentence
+    verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert verdict["baseline"]["runs"] == ["night-0", "night-1", "night-2"]
+    assert verdict["target"]["runs"] == ["tonight"]
 
 
 def test_a_run_against_itself_is_refused(opamc, tonight, tmp_path):

@@ -46,6 +46,23 @@ def test_what_a_run_says_of_itself(tmp_path):
     assert Run(tmp_path / "r.parquet", "other").name == "other"
 
 
+def test_samples_are_the_same_whatever_a_run_says_of_itself(tmp_path):
+    noise = np.random.default_rng(0).normal(size=(2, 400)).astype("f4")
+
+    def hashed(info, current, **more):
+        columns = {"axis1_a": noise[0], "axis2_current": current, **more}
+        with Run(saved(tmp_path / "r.parquet", info=info, **columns)) as run:
+            return run.currents_sha256
+
+    first = hashed(INFO, noise[1])
+    warm = {"axis1_temperature": noise[0], "time_s": np.arange(400) / 100}
+    assert hashed(RunInfo(100.01, "R1", started_at="2026-03-01"), noise[1], **warm) == first
+    assert hashed(INFO, noise[1][::-1].copy()) != first
+    assert hashed(INFO, np.zeros(400, "f4")) != first
+    with Run(saved(tmp_path / "r.parquet", axis1_a=np.full(400, 0.5))) as run:
+        assert run.currents_sha256 == ""
+
+
 def test_columns_of_an_axis(tmp_path):
     names = "axis2_a axis2_c axis2_position axis2_velocity axis10_current axis3_position time_s x"
     columns = {name: np.arange(10) / 100 for name in names.split()}

@@ -1,7 +1,8 @@
 """Parquet files that others may have written or damaged: whatever the reader makes of them."""
 
+import hashlib
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -89,6 +90,48 @@ def _refuse_repeated(path: Path, schema: pa.Schema, advice: str) -> None:
         if schema.names.count(name) > 1:
             msg = f"{path}: has column {shown(name)} more than once; {advice}"
             raise InputError(msg)
+
+
+def samples_sha256(path: Path, columns: Iterable[str], footer: pq.FileMetaData) -> str:
+    """Return the SHA-256 of some columns as they are stored, whatever the file says besides.
+
+    Nothing is decoded: the same samples, compressed otherwise, are others.
+
+    Parameters
+    ----------
+    path
+        A Parquet file.
+    columns
+        Names of columns of numbers.
+    footer
+        Of the file.
+
+    Returns
+    -------
+    str
+        Empty if none of them ever changes.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged.
+    """
+    wanted = set(columns)
+    digest = hashlib.sha256()
+    changing = False
+    with reading(path, "copy it again from its source"), path.open("rb") as file:
+        for number in range(footer.num_row_groups):
+            group = footer.row_group(number)
+            for chunk in map(group.column, range(group.num_columns)):
+                if chunk.path_in_schema not in wanted:
+                    continue
+                known = chunk.statistics
+                changing |= known is None or (known.has_min_max and known.min != known.max)
+                starts = (chunk.dictionary_page_offset, chunk.data_page_offset)
+                file.seek(min(start for start in starts if start is not None))
+                digest.update(chunk.path_in_schema.encode())
+                digest.update(file.read(max(chunk.total_compressed_size, 0)))
+    return digest.hexdigest() if changing else ""
 
 
 def read_whole(path: Path, advice: str) -> pa.Table:

@@ -102,7 +102,7 @@ def test_a_baselines_runs_are_read_once_to_be_told_apart(tmp_path, monkeypatch):
     kept = KeptResults(tmp_path / "results")
     first = duplicates.repeated(*sides, kept)
     assert first == duplicates.repeated(*sides)
-    assert [len(paths) for paths in first[0].values()] == [1, 0]
+    assert (len(first.baseline), len(first.target)) == (1, 0)
     opened: list[Path] = []
 
     def opening(path: Path) -> Run:

@@ -6,6 +6,7 @@ from datetime import date
 from pathlib import Path
 
 import cell_logs
+import nightly_kills
 import pytest
 
 
@@ -35,3 +36,11 @@ def cell(recorded, tmp_path) -> Path:
         "runs: logs/{robot}/{night}/*.parquet\nbaseline: {nights: 3}\nset: {joint.explain: false}\n"
     )
     return path
+
+
+@pytest.fixture
+def logs(cell):
+    """The logs of two robots of a cell whose nights are all healthy."""
+    shutil.rmtree(cell.parent / "logs" / "r2")
+    with nightly_kills.with_stand_in():
+        yield cell.parent / "logs"

@@ -4,10 +4,8 @@ import json
 import os
 import shutil
 import sqlite3
-from dataclasses import replace
 from datetime import date, timedelta
 
-import nightly_kills
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -22,38 +20,10 @@ from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
 from opamc_cli.storage.runs import Run, save_run
+from tests.stages.nightly.changed_logs import add_night, set_clock, states
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
 GONE = "if they are to have none: opamc nightly acknowledge ROBOT --why TEXT"
-
-
-@pytest.fixture
-def logs(cell, monkeypatch):
-    """The logs of two robots of a cell whose nights are all healthy."""
-    shutil.rmtree(cell.parent / "logs" / "r2")
-    with nightly_kills.with_stand_in():
-        yield cell.parent / "logs"
-
-
-def states(cell):
-    """Return what became of every night of r1."""
-    with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
-        query = "SELECT night, status FROM night WHERE robot = 'r1' ORDER BY night"
-        return [status for _, status in db.execute(query).fetchall()]
-
-
-def add_night(logs, index, robot="r1"):
-    """Have a robot recorded in one more night."""
-    shutil.copytree(logs / robot / night(4), logs / robot / night(index))
-    set_clock(logs / robot / night(index) / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
-
-
-def set_clock(path, started_at):
-    """Have a recording say that it began at another time."""
-    with Run(path) as run:
-        info = replace(run.info, started_at=started_at)
-    table = pq.read_table(path)
-    save_run(path, info, {name: table[name].to_numpy() for name in table.column_names})
 
 
 def test_a_clock_that_tells_no_night_is_said_until_it_is_set(cell, logs, opamc):
@@ -357,39 +327,6 @@ def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, 
     set_clock(path / "cycle.parquet", "2026-02-28T22:00:00+00:00")
     opamc("nightly", cell)
     assert states(cell) == ["done", "baseline", "baseline", "done", "done", "done"]
-
-
-def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc):
-    stuck = logs / "r1" / night(4) / "cycle.parquet"
-    shutil.copy(logs / "r1" / night(3) / "cycle.parquet", stuck)
-    ended = opamc("nightly", cell, "--quiet")
-    assert ended.code == ExitCode.PARTIAL
-    assert f"r1 {night(4)}: {stuck}: is a copy of {logs / 'r1' / night(3)}" in ended.out
-    assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
-
-
-def test_a_copy_is_no_night_of_the_cell_and_is_forgotten_once_it_is_removed(cell, logs, opamc):
-    opamc("nightly", cell)
-    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
-    ended = opamc("nightly", cell, "--quiet")
-    assert f"r1 {night(5)}: " in ended.out
-    assert "no file of" not in ended.out
-    assert "1 robot could not be judged" in opamc("nightly", cell).out
-    aside = cell.parent / "aside"
-    logs.rename(aside)  # a disk that is not mounted mends nothing
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.PARTIAL
-    aside.rename(logs)
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.PARTIAL
-    shutil.rmtree(logs / "r1" / night(5))
-    ended = opamc("nightly", cell, "--json")
-    assert (ended.code, json.loads(ended.out)["robots"]["r1"]["state"]) == (
-        ExitCode.DONE,
-        "healthy",
-    )
-    assert "could not be judged" not in (cell.parent / "nightly" / "index.html").read_text()
-    # the same file again is told again
-    shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))
-    assert f"r1 {night(5)}: " in opamc("nightly", cell, "--quiet").out
 
 
 def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opamc):

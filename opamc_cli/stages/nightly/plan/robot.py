@@ -5,11 +5,11 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
+from opamc_cli.stages.nightly.inputs.copies import without_copies
 from opamc_cli.stages.nightly.inputs.recordings import Recording
 from opamc_cli.stages.nightly.plan.baselines import Baselines, Series
 from opamc_cli.stages.nightly.plan.planned import PlannedNight, RobotPlan, Situation
 from opamc_cli.stages.nightly.plan.reason import hashes_before, key_of, reason_of
-from opamc_cli.storage.logs import Facts
 
 
 def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> RobotPlan:
@@ -24,7 +24,7 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
     now
         What is known besides.
     """
-    recordings = _without_copies(recordings)
+    recordings = without_copies(recordings)
     usable = [one for one in recordings if not one.facts.error]
     fixed = {one.sha256 for one in now.fixed}
     judged = [one for one in usable if one.sha256 not in fixed]
@@ -113,22 +113,6 @@ def _without_waiting(plan: RobotPlan, now: Situation) -> RobotPlan:
     )
     complete = {key: members for key, members in plan.complete.items() if key not in waits}
     return replace(plan, nights=nights, complete=complete, waiting=True)
-
-
-def _without_copies(recordings: Sequence[Recording]) -> list[Recording]:
-    """Have recordings of an earlier night stand for nothing: a logger that is stuck repeats one."""
-    first: dict[str, Recording] = {}
-    for one in sorted(recordings, key=lambda one: (one.night, one.log.path)):
-        if not one.facts.error:
-            first.setdefault(one.sha256, one)
-    found = []
-    for one in recordings:
-        original = first.get(one.sha256, one)
-        if original.night != one.night and not one.facts.error:
-            error = f"{one.log.path}: is a copy of {original.log.path}; was that night recorded?"
-            one = replace(one, facts=Facts(error=error))
-        found.append(one)
-    return found
 
 
 def _main_conditions(recordings: Sequence[Recording]) -> Series:

@@ -1,23 +1,39 @@
 """Recordings that are given twice: they hide a fault, since they are their own baseline."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
 from opamc_cli.errors import InputError, OpamcError
 from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs import Run, find_runs
+
+
+@dataclass
+class Repeated:
+    """Runs to be left out."""
+
+    baseline: set[Path] = field(default_factory=set)
+    target: set[Path] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+    """One sentence for each of the baseline's."""
+    errors: list[InputError] = field(default_factory=list)
+    """One for each of the target's, which is not judged."""
 
 
 def repeated(
     baseline: Sequence[Path], target: Sequence[Path], kept: KeptResults | None = None
-) -> tuple[dict[str, set[Path]], tuple[str, ...]]:
-    """Return the runs to be left out of "baseline" and "target", and one sentence for each.
+) -> Repeated:
+    """Find the runs that are given twice.
 
-    Of equal recordings, the target's is kept rather than the baseline's, and the first name of
-    one side. A copy, a link, or the same samples written by another program are equal.
+    A copy, a link, or the same samples written by another program are equal. Of equal recordings,
+    the first name of one side is kept, and the target's rather than the baseline's: but for one
+    that says to have begun at another time, as a logger that is stuck repeats what it knows.
 
     Parameters
     ----------
@@ -29,44 +45,64 @@ def repeated(
     Raises
     ------
     InputError
-        If nothing is left of the baseline.
+        If nothing is left of one side.
     """
-    seen: dict[str, tuple[str, Path]] = {}
-    left_out: dict[str, set[Path]] = {"baseline": set(), "target": set()}
-    notes = []
-    sides = (
-        ("target", target, _fingerprint),
-        ("baseline", baseline, remembered(_fingerprint, kept)),
-    )
-    for role, paths, fingerprint in sides:
-        runs = find_runs(paths)
-        for _, path in runs:
-            try:
-                key = fingerprint(path)
-            except OpamcError:
-                continue  # reported with its reason when its turn comes
-            if key is None:
-                continue
-            if key not in seen:
-                seen[key] = role, path
-                continue
-            first_role, first = seen[key]
-            left_out[role].add(path)
-            where = f"{role}'s {path} is the same recording as the {first_role}'s {first}"
-            notes.append(f"left out: the {where}")
-        if runs and all(path in left_out[role] for _, path in runs):
-            msg = (
-                f"{runs[0][1]}: every run of the {role} is also one of the target; a baseline "
-                "needs other recordings than those that it judges"
-            )
-            raise InputError(msg)
-    return left_out, tuple(notes)
+    found = Repeated()
+    judged: dict[str, Path] = {}
+    runs = [path for _, path in find_runs(target)]
+    for key, path in _hashed(runs, _hash_of_currents):
+        first = judged.setdefault(key, path)
+        if first != path:
+            found.target.add(path)
+            found.errors.append(InputError(f"{path}: left out, is the same recording as {first}"))
+    known: dict[str, Path] = {}
+    healthy = [path for _, path in find_runs(baseline)]
+    for key, path in _hashed(healthy, remembered(_hash_of_currents, kept)):
+        first = known.setdefault(key, path)
+        if first != path:
+            found.baseline.add(path)
+            where = f"baseline's {path} is the same recording as the baseline's {first}"
+            found.notes.append(f"left out: the {where}")
+        elif key in judged and _begun(path) == _begun(judged[key]):
+            found.baseline.add(path)
+            where = f"baseline's {path} is the same recording as the target's {judged[key]}"
+            found.notes.append(f"left out: the {where}")
+        elif key in judged:
+            found.target.add(judged[key])
+            why = f"left out, its samples are those of the baseline's {path}; was it recorded?"
+            found.errors.append(InputError(f"{judged[key]}: {why}"))
+    if healthy and found.baseline.issuperset(healthy):
+        msg = (
+            f"{healthy[0]}: every run of the baseline is also one of the target; a baseline "
+            "needs other recordings than those that it judges"
+        )
+        raise InputError(msg)
+    if runs and found.target.issuperset(runs):
+        raise found.errors[0]
+    return found
 
 
-def _fingerprint(path: Path) -> str | None:
+def _hashed(
+    runs: Sequence[Path], hash_of: Callable[[Path], str | None]
+) -> Iterator[tuple[str, Path]]:
+    for path in runs:
+        try:
+            key = hash_of(path)
+        except OpamcError:
+            continue  # reported with its reason when its turn comes
+        if key is not None:
+            yield key, path
+
+
+def _begun(path: Path) -> datetime | None:
+    with Run(path) as run:
+        return started(run.info.started_at)
+
+
+def _hash_of_currents(path: Path) -> str | None:
     """Hash the currents at the beginning of a run; None if none of them moves."""
     with Run(path) as run:
-        state = hashlib.sha256(f"{run.n_samples} {run.sampling_rate_hz}".encode())
+        state = hashlib.sha256(f"{run.n_samples}".encode())
         moving = False
         for axis in run.axes:
             channels = run.channels(axis)
