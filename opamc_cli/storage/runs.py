@@ -9,6 +9,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
+from datetime import datetime
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -17,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 import pyarrow.parquet as pq
-from pydantic import BeforeValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic_core import PydanticCustomError
 
 from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
@@ -532,6 +534,17 @@ def _as_text(value: object) -> object:
     return str(value) if isinstance(value, int | float) else value
 
 
+def _as_moment(text: str) -> str:
+    # one that no session can be told by is worse than none; loggers write "" for none
+    try:
+        if text:
+            datetime.fromisoformat(text)
+    except ValueError as error:
+        kind, needed = "time", "an ISO 8601 time such as 2026-03-01T22:00:00Z is needed, or none"
+        raise PydanticCustomError(kind, needed) from error
+    return text
+
+
 Text = Annotated[str, Field(max_length=1000), BeforeValidator(_as_text)]
 Condition = Annotated[float, Field(ge=-1e6, le=1e6)]
 
@@ -544,7 +557,7 @@ class RunMetadata(Document):
     program: Text | None = None
     speed_percent: Condition | None = None
     payload_kg: Condition | None = None
-    started_at: Text | None = None
+    started_at: Annotated[Text, AfterValidator(_as_moment)] | None = None
     session: Text | None = None
     source_sha256: Text | None = None
     map_sha256: Text | None = None

@@ -146,6 +146,12 @@ def raw_run(path, metadata, columns=None):
         ({"opamc": '{"sampling_rate_hz": "2048"}'}, None, "sampling_rate_hz is '2048'"),
         ({"opamc": '{"sampling_rate_hz": true}'}, None, "sampling_rate_hz is True"),
         ({"opamc": '{"sampling_rate_hz": 1, "payload_kg": "two"}'}, None, "payload_kg is 'two'"),
+        (
+            {"opamc": '{"sampling_rate_hz": 1, "started_at": "yesterday"}'},
+            None,
+            "started_at is 'yesterday'; an ISO 8601 time such as 2026-03-01T22:00:00Z is needed",
+        ),
+        ({"opamc": '{"sampling_rate_hz": 1, "started_at": 5}'}, None, "started_at is 5; an ISO"),
         ({"opamc": '{"sampling_rate_hz": 1}'}, {"axis1_a": ["x"]}, "axis1_a has type string"),
         ({"opamc": '{"sampling_rate_hz": 1}'}, {"current": [1.0]}, "no current column among"),
         ({"opamc": '{"sampling_rate_hz": 1}'}, {"axis0_a": [1.0]}, "no current column among"),
@@ -171,10 +177,16 @@ def test_unknown_metadata_is_left_alone(tmp_path):
     assert Run(raw_run(tmp_path / "r.parquet", {"opamc": text})).sampling_rate_hz == 100
 
 
+@pytest.mark.parametrize("when", [None, "", "2026-03-01", "20260301T2200+0100", "2026-03-01 22:00"])
+def test_a_start_may_be_missing_or_a_time_of_any_form(tmp_path, when):
+    text = json.dumps({"sampling_rate_hz": 100, "started_at": when})
+    assert Run(raw_run(tmp_path / "r.parquet", {"opamc": text})).info.started_at == when
+
+
 def test_names_that_are_numbers_are_names(tmp_path):
-    text = json.dumps({"sampling_rate_hz": 100, "program": 7, "robot": 3, "started_at": 5})
+    text = json.dumps({"sampling_rate_hz": 100, "program": 7, "robot": 3, "session": 5})
     info = Run(raw_run(tmp_path / "r.parquet", {"opamc": text})).info
-    assert (info.program, info.robot, info.started_at) == ("7", "3", "5")
+    assert (info.program, info.robot, info.session) == ("7", "3", "5")
 
 
 @pytest.mark.parametrize(

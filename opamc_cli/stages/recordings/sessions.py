@@ -22,7 +22,7 @@ class Sessions:
     wrong_clocks: int = 0
     """Recordings whose `started_at` is more than a day off the date of their folder."""
     unread_clocks: int = 0
-    """Recordings whose `started_at` is no time."""
+    """Recordings whose `started_at` is in a year that no clock was set to."""
 
     def named(self, session: str) -> str:
         """Return a session's name with its kind: "night 2026-03-12"."""

@@ -76,7 +76,7 @@ def test_a_clock_that_was_never_set_does_not_make_one_session_of_dated_folders()
 
 
 def test_a_start_that_is_no_time_is_said():
-    runs = [source(f"{k}.parquet", started_at="yesterday") for k in range(3)]
+    runs = [source(f"{k}.parquet", started_at="0001-01-01") for k in range(3)]
     found = sessions_of(runs, 12.0)
     assert (len(found), found.told_by, found.unread_clocks) == (3, ("file",), 3)
     assert "started_at of 3 of 3 runs is no time" in " ".join(in_words(found, found))
