@@ -59,8 +59,13 @@ class AlarmConfig(Section):
     """When a joint is worth a mechanic's walk."""
 
     nights: Count = Field(2, description="Nights with a signal that make an alarm ...")
-    of: Count = Field(3, description="... among so many judged nights.")
-    gross: Positive = Field(0.9, description="One night at fault with an effect above is enough.")
+    of: Annotated[int, Field(ge=1, le=365)] = Field(
+        3, description="... among so many judged nights."
+    )
+    # the largest effects seen are 2 to 3: above 10 per cent were meant
+    gross: Annotated[float, Field(gt=0, le=10)] = Field(
+        0.9, description="One night at fault with an effect above is enough."
+    )
     remind_after: Count = Field(7, description="Nights after which a standing alarm is repeated.")
 
     @model_validator(mode="after")

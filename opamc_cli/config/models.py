@@ -13,6 +13,12 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Positive = Annotated[float, Field(gt=0, le=1e15, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
+Tolerance = Annotated[float, Field(gt=0, le=1)]
+"""Of relative differences: more was meant in per cent."""
+Short = Annotated[float, Field(gt=0, le=60)]
+"""Of parts of a motion, seconds: more was meant in milliseconds."""
+LEAST_RATE = 1e-6
+"""Of false alarms: once in three thousand years of nights; less silences what it is to watch."""
 
 
 class Section(BaseModel):
@@ -24,7 +30,8 @@ class Section(BaseModel):
 class JointConfig(Section):
     """Constants of the joints, where known."""
 
-    gear_ratio: Positive | None = Field(
+    # below, the ratio upside down; above, no gear of one joint's, but a comma lost
+    gear_ratio: Annotated[float, Field(ge=0.1, le=10_000)] | None = Field(
         None, description="Motor revolutions per joint revolution; null if unknown."
     )
     pole_pairs: Annotated[int, Field(ge=1, le=1000)] | None = Field(
@@ -76,11 +83,11 @@ class SegmentConfig(Section):
     threshold_off: Fraction = Field(
         0.3, description="A motion lasts while S(t) stays above this value."
     )
-    min_motion_s: Positive = Field(0.1, description="Shorter motions are dropped.")
-    min_still_s: Positive = Field(
+    min_motion_s: Short = Field(0.1, description="Shorter motions are dropped.")
+    min_still_s: Short = Field(
         0.06, description="Shorter standstills belong to the motion around them."
     )
-    max_dip_s: Positive = Field(
+    max_dip_s: Short = Field(
         2.0,
         description="Longest dip of S(t) that is bridged because the joint is fast before and "
         "after it, as while braking.",
@@ -117,22 +124,22 @@ class IdentifyConfig(Section):
     min_similarity: Fraction = Field(
         0.9, description="Least cosine similarity of variance vectors for a cycle to be one."
     )
-    duration_tolerance: Positive = Field(
+    duration_tolerance: Tolerance = Field(
         0.35,
         description="Largest relative difference of a segment's duration from the reference's.",
     )
-    speed_tolerance: Positive = Field(
+    speed_tolerance: Tolerance = Field(
         0.01,
         description="Largest relative difference of how long a recording's motions last, the "
         "middle one, from the baseline's; of another speed nothing can be compared.",
     )
-    f_max_tolerance: Positive = Field(
+    f_max_tolerance: Tolerance = Field(
         0.25, description="Largest relative difference of f_d,max from the reference's."
     )
     use_direction: bool = Field(
         True, description="A segment that turns the other way than the reference's does not match."
     )
-    max_lag_s: Positive = Field(
+    max_lag_s: Short = Field(
         0.5, description="Largest lag that the synchronisation with the reference looks at."
     )
 
@@ -180,7 +187,7 @@ class ScoreConfig(Section):
     base: Annotated[float, Field(gt=1, allow_inf_nan=False)] = Field(
         2.0, description="Base of the logarithm in the Jensen-Shannon divergence."
     )
-    false_alarm_rate: Annotated[float, Field(gt=0, lt=0.5)] = Field(
+    false_alarm_rate: Annotated[float, Field(ge=LEAST_RATE, lt=0.5)] = Field(
         0.01,
         description="Largest accepted probability of any false alarm over all joints of one "
         "diagnosis.",

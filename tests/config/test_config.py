@@ -7,6 +7,7 @@ import yaml
 from pydantic import BaseModel
 
 from opamc_cli.config import Config, load_config
+from opamc_cli.config.cell import load_cell
 from opamc_cli.config.yaml.document import to_yaml
 from opamc_cli.errors import ConfigError
 
@@ -43,6 +44,33 @@ def attributes_read():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)
     }
+
+
+@pytest.mark.parametrize(
+    "override",
+    [
+        "score.false_alarm_rate=1e-300",
+        "joint.gear_ratio=120000",
+        "joint.gear_ratio=0.01",
+        "identify.speed_tolerance=2",
+        "segment.min_still_s=80",
+    ],
+)
+def test_values_that_cannot_be_meant_are_refused(override):
+    key, _, value = override.partition("=")
+    with pytest.raises(ConfigError, match=rf"^--set: {key} is {value}; .* than or equal to "):
+        load_config(None, [override])
+
+
+@pytest.mark.parametrize(
+    "rule",
+    ["alarm: {gross: 90}", "alarm: {of: 1000}", "set: {score.false_alarm_rate: 1.0e-300}"],
+)
+def test_a_rule_that_would_never_alarm_is_refused(tmp_path, rule):
+    cell = tmp_path / "cell.yaml"
+    cell.write_text(f"runs: logs/{{robot}}/*.parquet\n{rule}\n")
+    with pytest.raises(ConfigError, match=r"cell.yaml: .* is .*; .* than or equal to "):
+        load_cell(cell)
 
 
 def test_yaml_round_trip():

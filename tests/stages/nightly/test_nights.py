@@ -222,7 +222,7 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     # other options, another verdict
     cell.write_text(watched)
     assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
-    cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 100}\n")
+    cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 10}\n")
     ended = opamc("nightly", cell, "--quiet")
     assert "r2 axis 2: the alarm of" in ended.out
     assert "its nights show none now" in ended.out
