@@ -102,6 +102,10 @@ joint, the last one of a small arm, turns at 50 rad/s.
 SELDOM = 0.01
 """Share of the samples up to which they are disturbances of a log that is right."""
 
+ABOVE = 5.0
+"""Times the largest of all other samples: as much stands out. A log in another unit, whose largest
+samples alone are beyond any joint's, has others nearly as large."""
+
 STRIDE_S = 0.05
 """Over which a position's speed is taken: steps and noise of the encoder do not count."""
 
@@ -160,6 +164,33 @@ class Size:
                 f"{self.largest:.3g}), which are no measurement"
             )
         return None
+
+
+def spikes(values: NDArray[np.floating], limit: Limit) -> NDArray[np.intp]:
+    """Return which samples are beyond any joint's and stand out of a log that is right.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Samples of one channel; NaN is none.
+    limit
+        What they are held against.
+
+    Returns
+    -------
+    array of int, shape (k,)
+        Their indices, ascending; empty where more than `SELDOM` are beyond.
+    """
+    none = np.zeros(0, dtype=np.intp)
+    extremes = (np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0))
+    if max(extremes[0], -extremes[1]) <= limit.impossible:
+        return none
+    sizes = np.abs(values)
+    beyond = sizes > limit.impossible
+    if np.count_nonzero(beyond) > SELDOM * values.size:
+        return none
+    usual = np.fmax.reduce(sizes[~beyond], initial=0.0)
+    return np.flatnonzero(beyond) if sizes[beyond].min() > ABOVE * usual else none
 
 
 def strided_speed(position_rad: FloatArray, fs_hz: float) -> FloatArray:

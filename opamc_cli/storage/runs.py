@@ -23,6 +23,7 @@ from pydantic_core import PydanticCustomError
 
 from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
+from opamc_cli.signal.quality import LIMITS, spikes
 from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, reading, samples_sha256, shown_line
@@ -159,6 +160,7 @@ class Run:
             raise InputError(msg)
         self._channels = _axis_channels(self.path, schema)
         self._recent: dict[tuple[int, str], Array] = {}
+        self._spikes: dict[str, dict[int, float]] = {}
 
     @property
     def sampling_rate_hz(self) -> float:
@@ -205,7 +207,7 @@ class Run:
     def read(
         self, columns: Sequence[str], start: int = 0, stop: int | None = None
     ) -> dict[str, Array]:
-        """Read samples start..stop (half-open) of some columns; nulls and infinities become NaN.
+        """Read samples start..stop (half-open) of some columns; nulls, spikes, infinities are NaN.
 
         Only the row groups that hold these samples are touched.
 
@@ -239,7 +241,7 @@ class Run:
                 batch = next(batches, None)
             if batch is None:
                 return
-            yield start, {name: _to_numpy(name, batch.column(name)) for name in columns}
+            yield start, {name: self._samples(name, batch.column(name), start) for name in columns}
             start += batch.num_rows
 
     def _group(self, group: int, columns: Sequence[str]) -> dict[str, Array]:
@@ -252,12 +254,34 @@ class Run:
         if missing:
             table = self._read_groups([group], missing)
             for name in missing:
-                self._recent[group, name] = _to_numpy(name, table.column(name))
+                start = self._row_group_starts[group]
+                self._recent[group, name] = self._samples(name, table.column(name), start)
         found = {name: self._recent[group, name] for name in columns}
         kept = max(RECENT_GROUPS * len(columns), len(columns))
         while len(self._recent) > kept:
             self._recent.pop(next(iter(self._recent)))
         return found
+
+    def _samples(self, name: str, column: pa.ChunkedArray | pa.Array, start: int) -> Array:
+        values = _to_numpy(name, column)
+        if quantity_of(name) == "current":
+            beyond = spikes(values, LIMITS[self.info.current_unit])
+            if beyond.size:
+                found = self._spikes.setdefault(name, {})
+                sizes = np.abs(values[beyond]).tolist()
+                found.update(zip((start + beyond).tolist(), sizes, strict=True))
+                values = values.copy()
+                values[beyond] = np.nan
+        return values
+
+    def doubt(self, column: str) -> str | None:
+        """Say what was no measurement in what was read of a current so far; None: nothing."""
+        found = self._spikes.get(column)
+        if not found:
+            return None
+        count = f"{len(found)} sample{'s' * (len(found) > 1)}"
+        largest = f"{max(found.values()):.3g} {self.info.current_unit}"
+        return f"{self.path}: column {column} has {count} of up to {largest}, no measurement"
 
     def _read_groups(self, groups: list[int], columns: Sequence[str]) -> pa.Table:
         with self._reading(columns):

@@ -11,6 +11,7 @@ from opamc_cli.signal.quality import (
     bridged,
     clipped_share,
     is_constant,
+    spikes,
     strided_speed,
 )
 from opamc_cli.signal.transform.analytic import clarke
@@ -82,6 +83,20 @@ def test_numbers_that_no_joint_has_are_told_from_disturbances():
             size.add(block)
         assert size.is_impossible is impossible
         assert (size.doubt() is None) if words is None else (words in size.doubt())
+
+
+def test_a_handful_of_samples_beyond_any_joint_are_spikes():
+    current = 5 * np.sin(np.arange(1000.0))
+    spiked = current.copy()
+    spiked[[7, 8, 500]] = 1e4, 2000, -3e5
+    assert spikes(spiked, LIMITS["A"]).tolist() == [7, 8, 500]
+    assert spikes(np.where(np.arange(1000) == 3, np.nan, spiked), LIMITS["A"]).size == 3
+    assert not spikes(spiked, LIMITS["Nm"])[:-1].size
+    # a log in mA, whose largest samples alone are beyond; one with more than a few; none at all
+    for others in (np.where(current > 4.99, 1010.0, 200 * current), 1000 * current, current):
+        assert not spikes(others, LIMITS["A"]).size
+    assert not spikes(np.full(10, np.nan), LIMITS["A"]).size
+    assert not spikes(np.zeros(0), LIMITS["A"]).size
 
 
 def test_a_turn_passed_is_no_speed():

@@ -153,6 +153,17 @@ def test_some_missing_samples_are_noted_and_passed_over(tmp_path):
     assert "axis1_b has 4 samples that are no numbers" in outcome.notes[0]
 
 
+def test_spikes_are_no_measurement_and_passed_over(tmp_path):
+    values, _ = columns()
+    clean = run_stage(tmp_path, save(tmp_path / "clean.parquet", values)).table
+    values["axis1_b"] = values["axis1_b"].copy()
+    values["axis1_b"][3000:3003] = [1e4, -2e4, 1500]
+    outcome = run_stage(tmp_path, save(tmp_path / "spiked.parquet", values))
+    assert "axis1_b has 3 samples of up to 2e+04 A, no measurement" in " ".join(outcome.notes)
+    assert outcome.table["start"].equals(clean["start"])
+    np.testing.assert_allclose(outcome.table["variance"], clean["variance"], rtol=0.01)
+
+
 def test_a_clipped_phase_is_noted(tmp_path):
     values, _ = columns()
     values["axis1_a"] = np.clip(values["axis1_a"], -1, 1)

@@ -208,6 +208,7 @@ def _gather(
         for name, n in n_missing.items()
         if n
     )
+    notes += tuple(odd for name in names if (odd := run.doubt(name)))
     notes += tuple(odd for name, size in sizes.items() if (odd := sized(run.path, name, size)))
     joined = join_frames(frames)
     frames.clear()

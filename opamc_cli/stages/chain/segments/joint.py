@@ -56,6 +56,7 @@ def joint_segments(
     speed_of = channels.velocity or f"{channels.position} (its speed)"
     kind = "position" if channels.velocity is None else "velocity"
     beyond = [
+        run.doubt(name),
         limited(run.path, name, known, LIMITS[run.info.current_unit]),
         limited(run.path, speed_of, velocity, LIMITS[kind]),
     ]
