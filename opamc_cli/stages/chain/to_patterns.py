@@ -172,7 +172,7 @@ def _of_other_speeds(identified: identify.IdentifyOutcome) -> list[str]:
     if not runs:
         return []
     named = ", ".join(runs[:3]) + (f" and {len(runs) - 3} more" if len(runs) > 3 else "")
-    return [f"of another speed than the baseline's, and left out: {named}"]
+    return [f"of another speed, or a clock or lost samples, and left out: {named}"]
 
 
 def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:

@@ -61,8 +61,8 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
 def of_another_speed(ratio: float) -> str:
     """Say why a run, whose motions last so many times as long as the baseline's, is left out."""
     return (
-        f"its motions last {ratio:.2f} times as long as the baseline's: of another speed nothing "
-        "can be compared"
+        f"its motions last {ratio:.2f} times as long as the baseline's: of another speed, or a "
+        "clock or lost samples, nothing can be compared"
     )
 
 

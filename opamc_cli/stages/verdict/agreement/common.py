@@ -25,7 +25,7 @@ def _where(entry: Mapping[str, Any]) -> str:
 
 _COMMON = (
     "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
-    "check unit, sensors, program, payload and speed, and record again, or record a new baseline."
+    "check unit, sensors, clock, program, payload and speed, and record again, or a new baseline."
 )
 _ALONE = (
     "too far to be called healthy, though what was compared does not suffice to call it changed; "
