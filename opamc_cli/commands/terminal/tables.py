@@ -33,10 +33,9 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     from opamc_cli.stages.report import wording
 
     axes = list(verdict.get("axes", ()))
-    states = wording.by_state(verdict)
-    worst = next(iter(states), None)
-    title = Text(wording.headline(verdict), style=_style(worst or "unknown"))
-    if set(states) <= {"healthy"}:
+    unhealthy = _unhealthy(verdict)
+    title = Text(wording.headline(verdict), style=_style_of(verdict))
+    if not unhealthy:
         known = [a for a in axes if isinstance(a.get("health_index"), int | float)]
         if known:
             top = max(known, key=lambda a: float(a["health_index"]))
@@ -62,7 +61,6 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
             wording.p_value(entry.get("p_adjusted")),
             *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
-    unhealthy = [entry for entry in axes if entry.get("state") != "healthy"]
     shared = wording.shared_reasons(unhealthy)
     lines = [line for entry in unhealthy for line in _explanation(entry, set(shared))]
     for reason, numbers in shared.items():
@@ -87,10 +85,9 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
 
     from opamc_cli.stages.report import wording
 
-    unhealthy = [entry for entry in verdict.get("axes", ()) if entry.get("state") != "healthy"]
-    worst = next(iter(wording.by_state(verdict)), "unknown")
+    unhealthy = _unhealthy(verdict)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
-        lines = [Text(wording.headline(verdict), style=_style(worst))]
+        lines = [Text(wording.headline(verdict), style=_style_of(verdict))]
     else:
         lines = []  # the one joint's own line says it
     healthy = len(verdict.get("axes", ())) - len(unhealthy)
@@ -140,6 +137,12 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
     return table
 
 
+def _unhealthy(verdict: Mapping[str, Any]) -> "list[Mapping[str, Any]]":
+    """Return the axes that are not healthy for sure: those that are excused among them."""
+    axes = verdict.get("axes", ())
+    return [one for one in axes if one.get("state") != "healthy" or one.get("excused")]
+
+
 def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":
     from rich.text import Text
 
@@ -171,6 +174,14 @@ def _state(state: str) -> "Text":
     from opamc_cli.stages.report.figures.palette import state_sign
 
     return Text(f"{state_sign(state)} {printable(state)}", style=_style(state))
+
+
+def _style_of(verdict: Mapping[str, Any]) -> str:
+    """Return the style of the worst state."""
+    from opamc_cli.stages.report import wording
+
+    worst = next(iter(wording.by_state(verdict)), "unknown")
+    return _style("unknown" if worst == "healthy" and _unhealthy(verdict) else worst)
 
 
 def _style(state: str) -> str:

@@ -52,19 +52,22 @@ def day_span(side: Mapping[str, Any]) -> str | None:
 
 def headline(verdict: Mapping[str, Any]) -> str:
     """Return the verdict in one sentence."""
+    excused = [int(a["axis"]) for a in verdict.get("axes", ()) if a.get("excused")]
     states = by_state(verdict)
+    healthy = [axis for axis in states.pop("healthy", ()) if axis not in excused]
+    states |= {name: axes for name, axes in (("excused", excused), ("healthy", healthy)) if axes}
     phrases = {
         "fault": "at fault",
         "changed": "changed",
         "insufficient-data": "not judged for want of data",
+        "excused": "not told from unusual conditions",
         "healthy": "healthy",
     }
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
     if not parts:
         return "No axis was judged"
-    healthy = len(states.get("healthy", ()))
-    if healthy > 1 and len(parts) > 1:
-        parts[-1] = f"the other {healthy} axes healthy"
+    if len(healthy) > 1 and len(parts) > 1:
+        parts[-1] = f"the other {len(healthy)} axes healthy"
     text = "; ".join(parts)
     return text[0].upper() + text[1:]
 

@@ -105,6 +105,12 @@ def reasons(
     return [*sentences, *_short(cells)]
 
 
+def is_excused(judgement: Judgement, limits: ScoreConfig) -> bool:
+    """Tell whether a joint that would be unhealthy is called healthy: the others differ, too."""
+    differs = judgement.p_adjusted <= limits.false_alarm_rate
+    return differs and judgement.state == "healthy" and judgement.effect >= limits.minimum_effect
+
+
 def lies_outside(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause of verdict.json is no fault of the joint: load, environment, sensors."""
     return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"
@@ -135,7 +141,14 @@ def _change(
         f"the target lies {judgement.distance_ratio:.3g} times as far from the baseline as a "
         "healthy session does"
     )
-    if judgement.state == "healthy":
+    if is_excused(judgement, limits):
+        first = (
+            f"It differs from its baseline (p {_p(judgement.p_adjusted)}, "
+            f"{judgement.distance_ratio:.3g} times as far as a healthy session), but no more than "
+            "conditions as unusual as its other joints' may move it: a fault that looks alike "
+            "would not be told; record under the baseline's conditions."
+        )
+    elif judgement.state == "healthy":
         if judgement.p_adjusted <= SUSPICION < judgement.p_alone:
             return [
                 f"Changed no more than the other joints of this robot: {distance}.",

@@ -22,7 +22,7 @@ from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import reasons
+from opamc_cli.stages.verdict.reasons import is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit
@@ -199,11 +199,15 @@ def write(
 
 
 def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
-    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5."""
+    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5.
+
+    So does one whose fault would not be told.
+    """
     states = {axis["state"] for axis in verdict["axes"]}
     if states & {"changed", "fault"}:
         return ExitCode.UNHEALTHY
-    return ExitCode.DONE if states == {"healthy"} else ExitCode.NOT_ENOUGH_DATA
+    excused = any(axis["excused"] for axis in verdict["axes"])
+    return ExitCode.DONE if states == {"healthy"} and not excused else ExitCode.NOT_ENOUGH_DATA
 
 
 def content(
@@ -247,10 +251,15 @@ def content(
         }
         lacking = _not_compared(axis, decided)
         which = decided.sessions_at_fault(axis)
+        excused = is_excused(final, config.score)
+        said = reasons(final, bundle, motions, runs, cause, config.score)
+        if which:  # after what the state does not tell
+            said.insert(int(excused), which)
         axes.append(
             {
                 "axis": axis,
                 "state": final.state,
+                "excused": excused,
                 **({"session": decided.named(axis)} if axis in decided.alone else {}),
                 **({"not_compared": lacking} if lacking else {}),
                 "health_index": _finite(final.health_index),
@@ -267,10 +276,7 @@ def content(
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
                 "brief": brief(final, bundle, cause, unit, which),
-                "reasons": [
-                    *([which] if which else []),
-                    *reasons(final, bundle, motions, runs, cause, config.score),
-                ],
+                "reasons": said,
             }
         )
     return {
@@ -309,11 +315,6 @@ def policy_of(config: ScoreConfig) -> Policy:
     )
 
 
-def is_excused(judgement: Judgement, config: ScoreConfig) -> bool:
-    """Tell whether a joint is called healthy although it differs: others may differ as much."""
-    return judgement.state == "healthy" and judgement.p_adjusted <= config.false_alarm_rate
-
-
 def believed(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Mapping[str, Any] | None:
@@ -340,8 +341,7 @@ def _with_cause(
     if cause is None:
         return judgement
     if is_excused(judgement, config):
-        matters = judgement.effect >= config.minimum_effect
-        return replace(judgement, state="fault") if matters and cause.get("clear") else judgement
+        return replace(judgement, state="fault") if cause.get("clear") else judgement
     if judgement.state not in ("changed", "fault"):
         return judgement
     if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:

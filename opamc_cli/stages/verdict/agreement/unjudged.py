@@ -131,6 +131,7 @@ def with_reasons(
 
 _UNKNOWN: Mapping[str, Any] = {
     "state": "insufficient-data",
+    "excused": False,
     "health_index": None,
     "p_value": None,
     "p_adjusted": None,

@@ -1,0 +1,75 @@
+"""A joint that differs, but no more than conditions may move it, is not passed over in silence."""
+
+from dataclasses import replace
+
+import pytest
+
+from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.decision.judge import judge
+from opamc_cli.errors import ExitCode
+from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
+from opamc_cli.stages.verdict.reasons import is_excused, reasons
+from opamc_cli.stages.verdict.verdict import exit_code
+from tests.decision import known_fleet
+
+SAID = "It differs from its baseline (p 0.001, 3 times as far as a healthy session), but no more"
+
+
+def axis(number, state="healthy", **more):
+    return {"axis": number, "state": state, "excused": False, "reasons": [], **more}
+
+
+@pytest.fixture(scope="module")
+def differing():
+    """Return a healthy joint that lies far out, and what is known of it."""
+    bundle = known_fleet.bundle(4, 6, 1, (), 0.0)
+    one = judge({4: bundle})[4]
+    changes = {"p_adjusted": 1e-3, "p_alone": 0.2, "allowed_log_ratio": 1.0, "distance_ratio": 3.0}
+    return replace(one, state="healthy", **changes), bundle
+
+
+def test_it_is_one_that_would_be_unhealthy_but_for_what_was_allowed(differing):
+    one, limits = differing[0], ScoreConfig()
+    assert is_excused(one, limits)
+    assert not is_excused(replace(one, p_adjusted=0.02), limits)
+    assert not is_excused(one, ScoreConfig(minimum_effect=1.0, fault_effect=1.0))
+    assert not is_excused(replace(one, state="changed"), limits)
+
+
+def test_its_first_reason_says_that_a_fault_may_look_alike(differing):
+    one, bundle = differing
+    entries = [
+        {
+            **{"motion": cell.motion, "order": cell.order, "tau": cell.tau},
+            **{"jsd_baseline": [0.02], "jsd_target": [0.03]},
+        }
+        for cell in bundle.cells
+    ]
+    first, *_ = reasons(one, bundle, entries, {"baseline": [], "target": []})
+    assert first.startswith(SAID)
+    assert "a fault that looks alike would not be told" in first
+
+
+def test_it_ends_as_not_judged_and_a_fault_still_wins():
+    excused = axis(2, excused=True)
+    assert exit_code({"axes": [axis(1)]}) is ExitCode.DONE
+    assert exit_code({"axes": [axis(1), excused]}) is ExitCode.NOT_ENOUGH_DATA
+    assert exit_code({"axes": [excused, axis(3, "fault")]}) is ExitCode.UNHEALTHY
+
+
+def test_one_that_is_not_judged_for_another_reason_is_not_excused():
+    verdict = with_reasons({"axes": [axis(2, excused=True)]}, {2: ["too far"], 5: ["at rest"]})
+    assert [one["excused"] for one in verdict["axes"]] == [False, False]
+
+
+def test_it_is_a_line_and_is_not_counted_as_healthy(capsys):
+    from opamc_cli.commands.terminal.output import Output
+
+    verdict = {"axes": [axis(1), axis(2, excused=True, reasons=[SAID, "More."]), axis(3)]}
+    assert [line.plain for line in verdict_lines(verdict)] == [
+        "Axis 2 not told from unusual conditions; the other 2 axes healthy",
+        f"axis 2: {SAID}",
+    ]
+    Output().result({}, verdict_table(verdict))
+    assert SAID in " ".join(capsys.readouterr().out.split())
