@@ -7,7 +7,7 @@ from typing import Any
 
 from opamc_cli.stages.nightly.inputs.recordings import some
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import UNJUDGED, AlarmRow, NightRow, begun_anew
+from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, AlarmRow, NightRow, begun_anew
 
 SEVERITY = (
     "alarm",
@@ -18,6 +18,7 @@ SEVERITY = (
     "changed",
     "insufficient-data",
     "partial",
+    "excused",
     "known",
     "gone",
     "baseline",
@@ -49,12 +50,14 @@ class JointSummary:
     """Of its last night."""
     alarm: AlarmRow | None
     """The alarm that stands, or None."""
+    excused: bool = False
+    """Whether it differs, but no more than conditions may move it."""
 
     @property
     def shown(self) -> str:
-        """Its state, or that an alarm stands."""
+        """Its state, or that it is excused or an alarm stands."""
         if self.alarm is None:
-            return self.state
+            return "excused" if self.excused else self.state
         return "alarm" if self.alarm.acknowledged is None else "known"
 
     @property
@@ -123,7 +126,7 @@ class RobotSummary:
             return False
         # a baseline's night has a reason, too, if not all of it could be used
         in_part = bool(self.last and self.last.why) or any(
-            (joint.state, joint.night) == ("insufficient-data", self.last_night)
+            joint.night == self.last_night and (joint.state == "insufficient-data" or joint.excused)
             for joint in self.joints
         )
         return in_part or self.of_last_night in ("failed", "missing", "gathering")
@@ -208,6 +211,7 @@ class Summary:
             ("changed", "changed in the last night, no alarm yet"),
             ("insufficient-data", "with a joint that was not judged"),
             ("partial", "judged in part"),
+            ("excused", "with a joint not told from unusual conditions"),
             ("known", "with an acknowledged alarm"),
             ("gone", "without recordings, acknowledged"),
             ("baseline", "recording the baseline"),
@@ -258,15 +262,16 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
     complete = {row["robot"]: row["night"] for row in history.rows(COMPLETE)}
     joints: dict[str, list[JointSummary]] = {}
     query = (
-        "SELECT robot, program, axis, state, max(night) AS night, report, health_index "
-        "FROM verdict GROUP BY robot, program, axis"
+        "SELECT robot, program, axis, state, max(night) AS night, report, health_index, reason "
+        "FROM verdict JOIN measure USING (robot, program, axis, night) "
+        "GROUP BY robot, program, axis"
     )
     for row in history.rows(query):
         alarm = standing.get((row["robot"], row["program"], row["axis"]))
         since = begun.get(row["robot"], "")
         if alarm is None and row["night"] < since:
             # against a baseline that somebody has replaced
-            row |= {"state": "baseline", "health_index": None}
+            row |= {"state": "baseline", "health_index": None, "reason": ""}
         joints.setdefault(row["robot"], []).append(_joint(row, alarm))
     names = sorted({*last, *joints, *robots})
     return Summary(
@@ -296,6 +301,7 @@ def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
         row["report"] or "",
         row["health_index"],
         alarm,
+        row["reason"].startswith(EXCUSED),
     )
 
 

@@ -7,7 +7,7 @@ from typing import get_args, get_type_hints
 
 import pyarrow as pa
 
-OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "failed", "partial")
+OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "excused", "failed", "partial")
 """Kinds of event that follow from the nights of one robot."""
 
 OF_NIGHT = ("judged-anew", "lacking")
@@ -18,6 +18,10 @@ THE_CELL = "the cell:"
 
 UNJUDGED = ("failed", "broken")
 """What a night's status is if nothing of it could be judged."""
+
+EXCUSED = "excused: "
+"""What the reason begins with of a joint that is healthy, but differs, if no more than conditions
+may move it; a column of its own would be another layout of the file."""
 
 DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
 """Kinds of event that follow from the nights; the others were declared by a user."""
@@ -64,7 +68,7 @@ class MeasureRow:
     harmless: int
     """Whether the change has a cause outside the joint."""
     reason: str
-    """First reason of the verdict, for what could not be judged."""
+    """First reason of the verdict, for what could not be judged or is `EXCUSED`."""
 
 
 @dataclass(frozen=True)

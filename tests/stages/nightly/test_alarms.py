@@ -7,8 +7,8 @@ import pytest
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
-from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary
-from opamc_cli.storage.history.rows import AlarmRow, Declared, NightRow
+from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
+from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, NightRow
 
 
 def nights_of(states, distances=None):
@@ -293,3 +293,35 @@ def test_temperature_is_taken_off_the_trend_where_it_is_logged():
     assert (told["per_night"], told["level"]) == pytest.approx((0.01, 0.29), abs=3e-3)
     # 0.4 is reached 11 nights after the last one
     assert told["reach"][0] <= 11 <= told["reach"][1] <= 13
+
+
+def nights_excused(*excused, of=12):
+    """Return a healthy joint's nights, of which some differ by no more than conditions may do."""
+    rows = nights_of(["healthy"] * of)
+    for day, row in enumerate(rows, start=1):
+        row["reason"] = f"{EXCUSED}differs by {day}" if day in excused else "No change."
+    return rows
+
+
+def test_a_joint_that_conditions_alone_excuse_is_told_and_again_after_some_nights():
+    """Whatever lies between: warm days come and go."""
+    (told,) = settled(nights_excused(4)).events
+    assert (told.time, told.kind) == ("2026-03-04", "excused")
+    assert told.text == "axis 2: not told from unusual conditions in 2026-03-04: differs by 4"
+    found = settled(nights_excused(2, 4, 5, 8, 9, 10)).events
+    assert [one.time[-2:] for one in found] == ["02", "09"]
+    (text,) = {one.text for one in found}
+    assert "in 6 nights from 2026-03-02 to 2026-03-10: differs by 10" in text
+    assert settled(nights_excused()).events == ()
+
+
+def test_a_robot_whose_last_night_conditions_alone_excuse_is_not_counted_as_healthy():
+    def robot(night):
+        joint = JointSummary(2, "", "healthy", night, "", 4.2, None, excused=True)
+        return RobotSummary("r1", (joint,), NightRow("r1", "2026-03-09", "", "done"))
+
+    assert robot("2026-03-09").in_part
+    assert not robot("2026-03-08").in_part
+    assert Summary((robot("2026-03-09"),)).headline() == (
+        "1 robot with a joint not told from unusual conditions: r1"
+    )

@@ -1,4 +1,4 @@
-"""What to say of nights that could not be judged: not every night the same."""
+"""What to say of nights that were not judged, or not for sure: not every night the same."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
-from opamc_cli.storage.history.rows import UNJUDGED, Event, NightRow
+from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
 
 
 def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
@@ -24,6 +24,23 @@ def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) 
             text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
+
+
+def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+    """Say of a joint in which nights it differed, but no more than conditions may move it.
+
+    Nights between that are plainly healthy begin nothing anew: the weather comes and goes.
+    """
+    found = [row for row in rows if row["reason"].startswith(EXCUSED)]
+    nights = [row["night"] for row in found]
+    for index in said_in(nights, [""] * len(nights), remind_after):
+        last = found[-1]
+        span = last["night"]
+        if len(nights) > 1:
+            span = f"{len(nights)} nights from {nights[0]} to {span}"
+        text = f"{name}: not told from unusual conditions in {span}: "
+        text += last["reason"].removeprefix(EXCUSED)
+        yield Event(nights[index], last["robot"], last["axis"], "excused", text)
 
 
 def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterator[Event]:

@@ -10,7 +10,7 @@ from opamc_cli.decision.trend.alarm import Night, episodes
 from opamc_cli.decision.trend.chart import CALM, LIMIT
 from opamc_cli.stages.nightly.alarms.alarm import Watched, alarm_of
 from opamc_cli.stages.nightly.alarms.course import JUDGED, chart_of, courses
-from opamc_cli.stages.nightly.alarms.not_judged import failed, not_judged
+from opamc_cli.stages.nightly.alarms.not_judged import excused, failed, not_judged
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, NightRow, begun_anew
 
 
@@ -78,6 +78,7 @@ def settle_robot(
                     if raised <= row["night"] < (ended or "9999")
                 ]
         events += not_judged(joint, name, rule.remind_after)
+        events += excused(joint, name, rule.remind_after)
     events += failed(robot, nights, rule.remind_after)
     return Settled(tuple(alarms), tuple(dict.fromkeys(standing)), tuple(events))
 

@@ -35,6 +35,7 @@ MORE_STATES = {
     "partial": ("–", "unknown"),
     "gone": ("–", "unknown"),
     "baseline": ("…", "baseline"),
+    "excused": ("?", "unknown"),
 }
 """Sign and colour of what a verdict knows nothing of."""
 

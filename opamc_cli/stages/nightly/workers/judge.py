@@ -24,6 +24,7 @@ from opamc_cli.stages.nightly.workers.night import (
 from opamc_cli.stages.report.wording import axes_phrase
 from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
+from opamc_cli.storage.history.rows import EXCUSED
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs import know_sha256
 from opamc_cli.storage.schemas import files
@@ -173,7 +174,7 @@ def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
         log_common=_log(distance.get("allowed")),
         effect=distance.get("effect"),
         temperature_c=temperature_c,
-        reason=str(reasons[0]),
+        reason=EXCUSED * bool(entry.get("excused")) + str(reasons[0]),
     )
 
 
