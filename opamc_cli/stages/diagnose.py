@@ -60,8 +60,9 @@ class DiagnoseOutcome:
     """What is worth knowing besides."""
     n_of_baseline: int = 0
     """How many of the errors, the first ones, are the baseline's."""
-    conditions: tuple[str, ...] = ()
-    """Those of the notes that say what differs between the recordings of both sides."""
+    warnings: tuple[str, ...] = ()
+    """Those of the notes that nobody may miss: what differs between the recordings of both sides,
+    and which faults would not be told."""
 
 
 def run(
@@ -188,21 +189,18 @@ def _diagnose(
                 continue
             if found is not None and found["share"] >= LEAST_SHARE:
                 causes[axis] = found
-    # what both sides give alike is said once
-    every_note = tuple(
-        dict.fromkeys(
-            worded(note)
-            for said in (
-                repeats.notes,
-                normal.notes,
-                other.notes,
-                scored.notes,
-                decided.notes(),
-                notes,
-            )
-            for note in said
-        )
+    blind = decided.blind(config.score)
+    of_both = (
+        repeats.notes,
+        normal.notes,
+        other.notes,
+        scored.notes,
+        decided.notes(),
+        notes,
+        blind,
     )
+    # what both sides give alike is said once
+    every_note = tuple(dict.fromkeys(worded(note) for said in of_both for note in said))
     sources = (*sides.baseline.sources, *sides.target.sources)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
@@ -230,7 +228,7 @@ def _diagnose(
             *([InputError(stranger)] if stranger else []),
         ),
         n_of_baseline=len(of_baseline),
-        conditions=check_comparable(sides.baseline.sources, sides.target.sources),
+        warnings=(*check_comparable(sides.baseline.sources, sides.target.sources), *blind),
         notes=every_note,
     )
 

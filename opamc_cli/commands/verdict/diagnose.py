@@ -61,9 +61,9 @@ def diagnose(
             progress=progress,
         )
     output.passed_over([*baseline, *target])
-    for condition in outcome.conditions:
-        output.failure(condition)
-    output.notes([note for note in outcome.notes if note not in outcome.conditions], verbose)
+    for warning in outcome.warnings:
+        output.failure(warning)
+    output.notes([note for note in outcome.notes if note not in outcome.warnings], verbose)
     output.result(
         {
             **outcome.verdict,

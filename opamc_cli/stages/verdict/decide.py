@@ -66,7 +66,7 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     found = read_findings(folder, (baseline, target))
     scored = score.compare_sides(sides, config, out)
     decided = verdict.decide(sides, config)
-    notes = [*scored.notes, *decided.notes()]
+    notes = [*scored.notes, *decided.notes(), *decided.blind(config.score)]
     if any(axis not in found.causes for axis in decided.differing(config.score)):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)

@@ -134,6 +134,23 @@ class Decided:
             if names
         ]
 
+    def blind(self, config: ScoreConfig) -> list[str]:
+        """Say on which healthy axes a fault would not have been told from one baseline session."""
+        least = {
+            axis: one.least_effect
+            for axis, one in self.judgements.items()
+            if one.state == "healthy" and one.least_effect > config.fault_effect
+        }
+        if not least:
+            return []
+        shares = dict.fromkeys(f"{of(least.values()):.0%}" for of in (min, max))
+        return [
+            f"{'axes' if len(least) > 1 else 'axis'} {', '.join(map(str, least))}: with one "
+            f"baseline session patterns that changed by less than {' to '.join(shares)} would not "
+            f"have been called changed, and {config.fault_effect:.0%} is a fault; record more "
+            "of the baseline, on other days"
+        ]
+
 
 def decide(sides: Sides, config: Config) -> Decided:
     """Decide about every joint, by all target sessions together and by each of them alone.

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 
+from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.stages.verdict.reasons import reasons
 from opamc_cli.stages.verdict.verdict import Decided
@@ -87,6 +88,17 @@ def test_what_one_baseline_session_would_have_missed_is_said():
         least = f"{judged[axis].least_effect:.0%}"
         said[axis] = f"changed by less than {least} would not have been called changed" in text
     assert said == {1: True, 2: False}
+
+
+def test_that_one_baseline_session_is_blind_to_faults_is_a_line_of_its_own():
+    judged = known_fleet.judged("one session")
+    one = replace(judged[1], state="healthy", least_effect=0.91)
+    axes = {1: one, 2: replace(one, state="fault"), 3: replace(one, least_effect=0.35), 4: one,
+            5: replace(one, least_effect=0.2), 6: replace(one, least_effect=math.nan)}  # fmt: skip
+    (said,) = Decided(None, {}, axes).blind(ScoreConfig())
+    assert said.startswith("axes 1, 3, 4: with one baseline session patterns that changed by less ")
+    assert "than 35% to 91% would not have been called changed, and 30% is a fault" in said
+    assert Decided(None, {}, axes).blind(ScoreConfig(fault_effect=0.95)) == []
 
 
 @pytest.mark.parametrize(
