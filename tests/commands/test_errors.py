@@ -422,8 +422,9 @@ def test_a_diagnosis_of_what_is_left(opamc, tmp_path, pair):
         *("--out", tmp_path / "out", "--json"),
     )
     assert ended.code == ExitCode.PARTIAL, ended
-    assert len(ended.sentences) == 1
-    assert str(bad) in ended.sentences[0]
+    of_baseline, of_bad = ended.sentences
+    assert "with one baseline session" in of_baseline
+    assert str(bad) in of_bad
     assert (tmp_path / "out" / "report.html").exists()
 
 

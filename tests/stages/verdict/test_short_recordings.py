@@ -7,6 +7,7 @@ import pyarrow as pa
 import pytest
 
 from opamc_cli.stages.verdict.agreement.unjudged import Side, unjudged
+from opamc_cli.stages.verdict.agreement.whole import not_whole
 
 
 def side(role, spans):
@@ -34,3 +35,74 @@ def test_a_recording_that_is_much_shorter_is_told_so_first(stop, says):
     (why,) = unjudged(side("baseline", nights), target).axes[1]
     assert says in why
     assert why.startswith("The target: ")
+
+
+def recorded(role, **runs):
+    """Return recordings of two axes whose cycles have three motions, a letter for each.
+
+    `c` is a cycle, `x` a motion of none; axis 2 does what axis 1 does, unless it has a text of its
+    own behind a slash.
+    """
+    rows = []
+    for run, text in runs.items():
+        parts = text.split("/")
+        for axis, own in ((1, parts[0]), (2, parts[-1])):
+            places = []
+            for letter in own:
+                cycle = 1 + max((c for c, _ in places), default=-1)
+                places += [(cycle, m) for m in range(3)] if letter == "c" else [(-1, -1)]
+            rows += [
+                {
+                    **{"run": run, "axis": axis, "cycle": cycle, "motion": motion},
+                    **{"start": 100 * k, "stop": 100 * k + 90, "sampling_rate_hz": 100.0},
+                }
+                for k, (cycle, motion) in enumerate(places)
+            ]
+    measured = [
+        SimpleNamespace(run=run, path=Path(run), axis=axis, moves=True)
+        for run in runs
+        for axis in (1, 2)
+    ]
+    return Side(role, measured, (), pa.Table.from_pylist(rows))
+
+
+def told(target, *baseline):
+    nights = recorded("baseline", **{f"n{k}": text for k, text in enumerate(baseline)})
+    return [str(error) for error in not_whole(nights, recorded("target", new=target))]
+
+
+def test_a_recording_that_ends_early_is_told():
+    cut = "new: holds {} where the baseline's recordings hold {} (its motion ends at {} s)"
+    assert told("ccx", "ccccc", "ccccc") == [cut.format("2 cycles", "5", 6.9)]
+    assert told("c", "ccccc", "cccc") == [cut.format("1 cycle", "4 to 5", 2.9)]
+    assert told("cccc", "ccccc", "ccccc") == []
+
+
+@pytest.mark.parametrize(
+    ("target", "baseline"),
+    [
+        ("c", ("ccccc", "ccc")),  # of no usual length
+        ("c", ("ccccc",)),  # nor is that of one recording
+        ("c/ccccc", ("ccccc", "ccccc")),  # a joint whose motions fit no more
+    ],
+)
+def test_a_recording_that_may_be_meant_to_be_short_is_not_told(target, baseline):
+    assert told(target, *baseline) == []
+
+
+def test_a_recording_of_which_half_is_another_program_is_told():
+    odd = "of axis 1 (axis 2 likewise) fit no motion of the baseline's cycle and are not judged"
+    for text in ("cccxxxxxxxxx", "xxxxxxxxxccc", "cxxxcxxxcxxx"):
+        (said,) = told(text, "ccccc", "ccccc")
+        assert said.startswith(f"new: 9 of 18 segments {odd}: another program"), text
+    (said,) = told("ccc/cccxxxxxxx", "ccc", "ccc")
+    assert said.startswith("new: 7 of 16 segments of axis 2 fit")
+
+
+def test_cycles_that_the_edges_cut_are_no_other_program():
+    assert told("xxcxx", "xxcxx", "cc") == []
+    assert told("xxcxx", "ccc", "ccc") != []  # but the recording is cut
+    # nor are motions that noise has made
+    assert told("xcxxcxxcx", "ccc", "ccc") == []
+    # nor is what the baseline's recordings hold as well
+    assert told("cxxxcxxx", "cxxxcxxx", "cxxxcxxx") == []

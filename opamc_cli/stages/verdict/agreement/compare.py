@@ -1,7 +1,7 @@
 """The questions of this package in the order of a diagnosis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
@@ -18,6 +18,7 @@ from opamc_cli.stages.verdict.agreement.unjudged import (
     sentence,
     unjudged,
 )
+from opamc_cli.stages.verdict.agreement.whole import not_whole
 from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import read_sources
 from opamc_cli.storage.tables import read_table, record_at
@@ -75,7 +76,7 @@ class Agreement:
         return {(finding.run, finding.axis) for finding in self.found[role]}
 
     def unjudged(self, baseline: Path, target: Path) -> Unjudged:
-        """Return what is left out, once the motions of both sides are identified.
+        """Return what is left out, or missing, once the motions of both sides are identified.
 
         Parameters
         ----------
@@ -92,4 +93,5 @@ class Agreement:
             )
             for role, path in (("baseline", baseline), ("target", target))
         ]
-        return unjudged(sides[0], sides[1])
+        found = unjudged(sides[0], sides[1])
+        return replace(found, errors=(*found.errors, *not_whole(sides[0], sides[1])))
