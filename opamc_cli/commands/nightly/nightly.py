@@ -114,10 +114,8 @@ def run(
         told_of = {*outcome.robots, THE_CELL}
         untold = [one for one in history.events(untold=True) if one.robot in told_of]
         if wanted == Wanted():
-            silent_since, now = silent(history, _today(), loaded.alarm.remind_after)
-            # the page knows no clock: it follows from the records alone
-            summary = summary.without_recordings(silent_since) if silent_since else summary
-            now += [*outcome.thinned, *outcome.strays]
+            now = [*outcome.thinned, *outcome.strays]
+            now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
             now += left(history, loaded)
             untold += history.untold(now)

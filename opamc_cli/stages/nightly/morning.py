@@ -55,24 +55,17 @@ class Morning:
     """The largest concern of the cell."""
 
 
-def silent(history: History, today: date, remind_after: int) -> tuple[str, list[Event]]:
+def silent(history: History, today: date, remind_after: int) -> Iterator[Event]:
     """Say that the whole cell has no new night: no robot can be said to lack what others have.
 
-    Returns
-    -------
-    since : str
-        First night without a recording; empty if the cell is not silent.
-    events : list of Event
-        What is worth saying of it.
+    It is said and no more: of logs of the past, which are judged, too, only the clock tells it.
     """
     last = max((night for _, night in history.nights()), default="")
     days = (today - date.fromisoformat(last)).days if last else 0
-    if days <= SILENT_DAYS:
-        return "", []
-    told = (days - SILENT_DAYS - 1) // remind_after  # each time is an event of its own
-    since, time = (date.fromisoformat(last) + timedelta(n) for n in (1, told * remind_after))
-    text = f"no recording of any robot since {last}"
-    return since.isoformat(), [Event(time.isoformat(), THE_CELL, None, "silent", text)]
+    if days > SILENT_DAYS:
+        told = (days - SILENT_DAYS - 1) // remind_after  # each time is an event of its own
+        time = (date.fromisoformat(last) + timedelta(told * remind_after)).isoformat()
+        yield Event(time, THE_CELL, None, "silent", f"no recording of any robot since {last}")
 
 
 def left(history: History, cell: CellConfig) -> Iterator[Event]:

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from opamc_cli.stages.nightly.inputs.recordings import some
@@ -126,7 +126,7 @@ class RobotSummary:
             return False
         # a baseline's night has a reason, too, if not all of it could be used
         in_part = bool(self.last and self.last.why) or any(
-            joint.night == self.last_night and (joint.state == "insufficient-data" or joint.excused)
+            (joint.state, joint.night) == ("insufficient-data", self.last_night)
             for joint in self.joints
         )
         return in_part or self.of_last_night in ("failed", "missing", "gathering")
@@ -174,12 +174,6 @@ class Summary:
     def only(self, names: Sequence[str]) -> "Summary":
         """Return some robots of the cell."""
         return Summary(tuple(robot for robot in self.robots if robot.name in names))
-
-    def without_recordings(self, since: str) -> "Summary":
-        """Return how the cell stands if none of its robots has a recording since a night."""
-        return Summary(
-            tuple(replace(robot, missing=robot.missing or since) for robot in self.robots)
-        )
 
     def needing(self) -> list[RobotSummary]:
         """Return the robots that need a look, worst first."""

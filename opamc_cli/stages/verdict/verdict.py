@@ -216,15 +216,11 @@ def write(
 
 
 def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
-    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5.
-
-    So does one whose fault would not be told.
-    """
+    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5."""
     states = {axis["state"] for axis in verdict["axes"]}
     if states & {"changed", "fault"}:
         return ExitCode.UNHEALTHY
-    excused = any(axis["excused"] for axis in verdict["axes"])
-    return ExitCode.DONE if states == {"healthy"} and not excused else ExitCode.NOT_ENOUGH_DATA
+    return ExitCode.DONE if states == {"healthy"} else ExitCode.NOT_ENOUGH_DATA
 
 
 def content(

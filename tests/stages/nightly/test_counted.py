@@ -94,20 +94,6 @@ def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
         assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
 
 
-def test_a_cell_that_is_silent_is_not_counted_healthy(cell, logs, opamc, monkeypatch):
-    assert opamc("nightly", cell).code == ExitCode.DONE
-    today = date.fromisoformat(night(8))
-    monkeypatch.setattr("opamc_cli.commands.nightly.nightly._today", lambda: today)
-    for out in (f"the cell: no recording of any robot since {night(4)}\n", ""):
-        ended = opamc("nightly", cell, "--quiet")
-        assert (ended.code, ended.out) == (ExitCode.PARTIAL, out)
-    since = night(5)
-    said = f"2 robots without recordings: r1 since {since}, r3 since {since}"
-    assert opamc("nightly", cell).out.startswith(said)
-    add_night(logs, 8, "r1", "r3")
-    assert opamc("nightly", cell).code == ExitCode.DONE
-
-
 def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, opamc):
     (logs / "r1" / night(4) / "empty.parquet").touch()
     assert "in part not judged" in opamc("nightly", cell, "--quiet").out

@@ -144,7 +144,7 @@ def test_a_silent_cell_is_said_again(tmp_path):
     with History(tmp_path / "history.sqlite") as history:
         history.record_night(NightRow("r1", "2026-03-01", KEY, "done", 0, "", ""))
         times = [
-            [event.time for event in silent(history, date(2026, 3, day), 7)[1]]
+            [event.time for event in silent(history, date(2026, 3, day), 7)]
             for day in (4, 5, 11, 12, 19)
         ]
     assert times == [[], ["2026-03-01"], ["2026-03-01"], ["2026-03-08"], ["2026-03-15"]]
