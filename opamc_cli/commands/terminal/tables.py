@@ -33,7 +33,7 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     from opamc_cli.stages.report import wording
 
     axes = list(verdict.get("axes", ()))
-    unhealthy = _unhealthy(verdict)
+    unhealthy = doubtful(verdict)
     title = Text(wording.headline(verdict), style=_style_of(verdict))
     if not unhealthy:
         known = [a for a in axes if isinstance(a.get("health_index"), int | float)]
@@ -85,7 +85,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
 
     from opamc_cli.stages.report import wording
 
-    unhealthy = _unhealthy(verdict)
+    unhealthy = doubtful(verdict)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
         lines = [Text(wording.headline(verdict), style=_style_of(verdict))]
     else:
@@ -137,7 +137,7 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
     return table
 
 
-def _unhealthy(verdict: Mapping[str, Any]) -> "list[Mapping[str, Any]]":
+def doubtful(verdict: Mapping[str, Any]) -> "list[Mapping[str, Any]]":
     """Return the axes that are not healthy for sure: those that are excused among them."""
     axes = verdict.get("axes", ())
     return [one for one in axes if one.get("state") != "healthy" or one.get("excused")]
@@ -181,7 +181,7 @@ def _style_of(verdict: Mapping[str, Any]) -> str:
     from opamc_cli.stages.report import wording
 
     worst = next(iter(wording.by_state(verdict)), "unknown")
-    return _style("unknown" if worst == "healthy" and _unhealthy(verdict) else worst)
+    return _style("unknown" if worst == "healthy" and doubtful(verdict) else worst)
 
 
 def _style(state: str) -> str:

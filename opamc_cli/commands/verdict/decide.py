@@ -39,7 +39,7 @@ def decide(
 
     Such as with --set score.false_alarm_rate=0.001. Causes are those that a diagnosis found.
     """
-    from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
+    from opamc_cli.commands.terminal.tables import doubtful, verdict_lines, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.stages.verdict import decide as stage
     from opamc_cli.storage.files.lock import output_lock
@@ -56,7 +56,7 @@ def decide(
         {**outcome.verdict, "verdict": str(path)},
         *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
         f"verdict: {path}",
-        urgent=outcome.exit_code is not ExitCode.DONE,
+        urgent=outcome.exit_code is not ExitCode.DONE or bool(doubtful(outcome.verdict)),
     )
     for error in outcome.errors:
         output.failure(str(error))

@@ -40,7 +40,7 @@ def diagnose(
     from opamc_cli.stages.processes.documentation import forgo_documentation
 
     forgo_documentation()
-    from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
+    from opamc_cli.commands.terminal.tables import doubtful, verdict_lines, verdict_table
     from opamc_cli.config import load_config
     from opamc_cli.stages import diagnose as stage
     from opamc_cli.stages.chain.compared import discriminants
@@ -72,7 +72,7 @@ def diagnose(
         },
         *([verdict_table(outcome.verdict)] if verbose else verdict_lines(outcome.verdict)),
         f"report: {outcome.report_path}",
-        urgent=outcome.exit_code is not ExitCode.DONE,
+        urgent=outcome.exit_code is not ExitCode.DONE or bool(doubtful(outcome.verdict)),
     )
     failed = output.failures([str(error) for error in outcome.errors], outcome.n_runs)
     if exit_zero and outcome.exit_code is ExitCode.UNHEALTHY:
