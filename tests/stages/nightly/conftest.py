@@ -1,11 +1,22 @@
 """A small cell of virtual robots, recorded once."""
 
 import shutil
+from collections.abc import Iterator
+from datetime import date
 from pathlib import Path
 
 import cell_logs
 import nightly_kills
 import pytest
+
+
+@pytest.fixture(autouse=True, scope="module")
+def in_time() -> Iterator[None]:
+    """Have no cell's last night lie days ago: a cell that is silent has a line of its own."""
+    with pytest.MonkeyPatch.context() as patch:
+        of = "opamc_cli.commands.nightly.nightly._today"
+        patch.setattr(of, lambda: date.fromisoformat(cell_logs.night(0)))
+        yield
 
 
 @pytest.fixture(scope="session")
