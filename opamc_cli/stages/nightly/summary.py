@@ -27,11 +27,11 @@ SEVERITY = (
 """Worst first; known: an alarm that was acknowledged, gone: that there are no recordings."""
 
 COMPLETE = """
-SELECT robot, min(night) AS night FROM (
-  SELECT robot, max(night) AS night FROM baseline GROUP BY robot, program, condition, since
-) GROUP BY robot
+SELECT robot, since, min(night) AS night FROM (
+  SELECT robot, since, max(night) AS night FROM baseline GROUP BY robot, program, condition, since
+) GROUP BY robot, since
 """
-"""The night in which each robot had a complete baseline for the first time."""
+"""Night in which each robot had a complete baseline for the first time, by where that begins."""
 
 
 @dataclass(frozen=True)
@@ -253,7 +253,11 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
     for row in history.rows("SELECT robot, time FROM event WHERE kind = 'missing' ORDER BY time"):
         if row["robot"] in last and row["time"] > last[row["robot"]].night:
             missing.setdefault(row["robot"], row["time"])
-    complete = {row["robot"]: row["night"] for row in history.rows(COMPLETE)}
+    complete: dict[str, str] = {}
+    for row in history.rows(COMPLETE):
+        # a baseline that a user began is recorded as any first one: nobody was watched by it yet
+        if row["since"] == begun.get(row["robot"], row["since"]):
+            complete[row["robot"]] = min(row["night"], complete.get(row["robot"], "9999"))
     joints: dict[str, list[JointSummary]] = {}
     query = (
         "SELECT robot, program, axis, state, max(night) AS night, report, health_index, reason "

@@ -120,7 +120,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[4], *at)
     ended = opamc("nightly", cell)
     assert (ended.code, ended.out.split("\n")[0]) == (
-        ExitCode.PARTIAL,  # nobody watches the robot meanwhile
+        ExitCode.DONE,
         f"r2 axis 2: the alarm of {NIGHTS[3]} is over, by a new baseline",
     )
     assert rows(cell, "SELECT cleared FROM alarm") == [(NIGHTS[4],)]
@@ -136,8 +136,8 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     # a new gear, a new baseline: two nights are not enough for it yet
     opamc("nightly", "rebaseline", "r2", "--from", NIGHTS[3], "--why", "new gear", "--cell", cell)
     after = opamc("nightly", cell, "--json")
-    assert after.code == ExitCode.PARTIAL
-    assert states(json.loads(after.out)["robots"])["r2"] == "gathering"
+    assert after.code == ExitCode.DONE
+    assert states(json.loads(after.out)["robots"])["r2"] == "baseline"
     assert rows(cell, "SELECT count(*) FROM verdict WHERE robot = 'r2'") == [(0,)]
     assert not of_night.exists()
 
@@ -242,7 +242,7 @@ def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_histor
         ((time_of_alarm, _, text),) = rows(cell, events)
         opamc(*begin)
         ended = opamc("nightly", cell, "--quiet")
-        assert (ended.code, ended.out) == (ExitCode.PARTIAL, f"r2 {over}\n")
+        assert (ended.code, ended.out) == (ExitCode.DONE, f"r2 {over}\n")
         kept = [(time_of_alarm, "alarm", text), (NIGHTS[4], "cleared", over)]
         alarms = "SELECT raised, cleared FROM alarm WHERE robot = 'r2'"
         # it stays, and is no news, when alarms are found anew
