@@ -94,9 +94,8 @@ class Decided:
         return [
             InputError(
                 f"{self.sides.sessions[0].named(session)} of the baseline differs from the others "
-                f"on {'axis' if len(axes) == 1 else 'axes'} {', '.join(map(str, axes))} as no "
-                "healthy one does, and is left out there; look at it, and take it out of the "
-                "baseline if it was not healthy"
+                f"on {_axes_named(axes)} as no healthy one does, and is left out there; look at "
+                "it, and take it out of the baseline if it was not healthy"
             )
             for session, axes in by_session.items()
         ]
@@ -145,11 +144,14 @@ class Decided:
             return []
         shares = dict.fromkeys(f"{of(least.values()):.0%}" for of in (min, max))
         return [
-            f"{'axes' if len(least) > 1 else 'axis'} {', '.join(map(str, least))}: with one "
-            f"baseline session patterns that changed by less than {' to '.join(shares)} would not "
-            f"have been called changed, and {config.fault_effect:.0%} is a fault; record more "
-            "of the baseline, on other days"
+            f"{_axes_named([*least])}: with one baseline session patterns that changed by less "
+            f"than {' to '.join(shares)} would not have been called changed, and "
+            f"{config.fault_effect:.0%} is a fault; record more of the baseline, on other days"
         ]
+
+
+def _axes_named(axes: Sequence[int]) -> str:
+    return f"{'axis' if len(axes) == 1 else 'axes'} {', '.join(map(str, axes))}"
 
 
 def decide(sides: Sides, config: Config) -> Decided:
