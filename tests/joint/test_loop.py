@@ -166,23 +166,21 @@ def test_two_runs_of_the_loop_are_equal():
     assert [s.trial.p_value for s in first.steps] == [s.trial.p_value for s in second.steps]
 
 
-def loaded_from(share):
-    """Close the loop on five cycles, of which the last is sealed, with a payload from then on."""
+def payload_of(made):
+    """Return eight times the noise of a payload's current."""
+    return 8 * made.noise_rms * np.sin(made.position + 0.5)
+
+
+@pytest.mark.parametrize("since", [long(0.4), 0.6, long(0.8)])
+def test_a_payload_that_changes_once_is_found(since):
+    # From 0.8 on the last of five cycles alone knows the new payload.
     made = simulate(3, (), rate=250.0, cycles=5)
-    changed = made.current.copy()
-    start = round(share * changed.size)
-    changed[start:] += 8 * made.noise_rms * np.sin(made.position[start:] + 0.5)
-    return made, start, close_recording(made, changed)[1]
-
-
-@pytest.mark.long
-def test_a_payload_that_changes_in_the_last_open_cycle_is_found():
-    # The fourth cycle alone knows the new payload.
-    made, start, loop = loaded_from(0.6)
+    held = np.arange(made.current.size) >= round(since * made.current.size)
+    loop = close_recording(made, made.current + held * payload_of(made))[1]
     assert [step.term.effect.name for step in loop.steps] == ["payload_change"]
     # A twentieth of a cycle: the refinement ends where a slow stretch tells little.
     found = loop.steps[0].term.parameters["since_s"]
-    assert abs(found - start / made.rate_hz) < 0.05 * 7.3
+    assert abs(found - np.argmax(held) / made.rate_hz) < 0.05 * 7.3
 
 
 @pytest.mark.parametrize(("seed", "cycles"), [(3, 8), *(long(*case) for case in [(6, 8), (9, 80)])])
@@ -214,8 +212,11 @@ def test_presliding_is_no_fault_and_has_no_name(seed):
     assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
-def test_a_payload_that_only_the_sealed_cycles_know_is_not_called_nothing():
-    _, _, loop = loaded_from(0.8)
+def test_a_payload_that_only_sealed_data_know_is_not_called_nothing():
+    made = simulate(3, (), rate=250.0, cycles=5)
+    grouping = close_recording(made, made.current)[1].before.dataset.grouping
+    held = np.isin(grouping.group, grouping.sealed)
+    loop = close_recording(made, made.current + held * payload_of(made))[1]
     assert (loop.steps, loop.verdict) == ((), "not-in-library")
     assert loop.rmse_after_a > 2 * loop.after.rmse(sealed=False)
 
@@ -225,9 +226,10 @@ def test_names_hold_where_a_function_of_time_does_not(monkeypatch):
     monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: extended(chain, swaying))
     recording = joint_of("cyclic", SHAPES["stribeck"], strength=5.0)
     size = recording.current_a.size
-    # It sways while nothing is sealed, and is elsewhere afterwards.
+    # It sways, and the other way where it is sealed.
     time = np.arange(size) / size
-    sway = 0.2 * np.where(time < 0.7, np.sin(9 * time), -1.0 - 4 * time)
+    sealed = close(recording).before.dataset.sharp.sealed
+    sway = 0.2 * np.where(sealed, -1.0, 1.0) * np.sin(9 * time)
     loop = close(replace(recording, current_a=recording.current_a + sway))
     assert names_of(loop) == [{"stribeck"}]
     assert loop.rmse_after_a < loop.rmse_before_a

@@ -9,16 +9,19 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 REPEAT_ERROR = 0.02
 LONGEST_SHARE = 0.7
-SEALED_SHARE = 0.27
-BLOCKS_WITHOUT_CYCLES = 12
+BLOCKS = 12
+FEWEST_CYCLES = 6
+"""Two of six are sealed: nothing tells when a payload changed in a sealed one, and if it is all
+that is sealed, half of that is predicted by the wrong one."""
 SEALED_BLOCKS = (2, 5, 9)
-"""Neither the first nor the last, and not evenly spaced: of a programme of four motions that was
-run three times, every fourth block is the same motion, which nothing open would have shown."""
-FEWEST_GROUPS = 4
+"""Of every twelve. Neither the first nor the last, and not evenly spaced: of a programme of four
+motions that was run three times, every fourth block is the same motion, which nothing open would
+have shown, and the last may be all that there is of a payload, a temperature or a speed."""
+FEWEST_RUNS = 4
 """Sealed as wholes: of two, a way there and a way back, one alone would show no friction."""
 FEWEST_PER_BLOCK = 20
 """Samples: some four per coefficient of the declared effects."""
-FEWEST_MOVING = BLOCKS_WITHOUT_CYCLES * FEWEST_PER_BLOCK
+FEWEST_MOVING = BLOCKS * FEWEST_PER_BLOCK
 
 
 @dataclass(frozen=True)
@@ -83,43 +86,34 @@ def group_samples(
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
-    little moves to seal anything off. The last 27 % of the cycles of each recording are
-    sealed, if each holds four or more, else the third, sixth and tenth of every twelve cycles or
-    recordings. Fewer than four are cut into blocks of equal moving time, of which a quarter is
-    sealed, since the end of a single stroke would be a place that the fit has never seen.
+    little moves to seal anything off. Groups are cycles, if there are six; else recordings, if
+    there are four; else blocks of equal moving time. Of every twelve the third, sixth and tenth are
+    sealed.
     """
-    group = np.full(moving.size, -1, dtype=np.int64)
-    pieces: list[tuple[int, int, int, str]] = []  # run, start, stop, name
-    for run, (start, stop) in enumerate(bounds):
-        if period is not None and stop - start >= 2 * period:
-            cycles = (stop - start + period // 20) // period
-            for cycle in range(cycles):
-                end = start + (cycle + 1) * period if cycle + 1 < cycles else stop
-                pieces.append((run, start + cycle * period, end, f"{run_names[run]}:{cycle}"))
-        else:
-            pieces.append((run, start, stop, run_names[run]))
-    needed = 0.1 * rate_hz
-    pieces = [piece for piece in pieces if moving[piece[1] : piece[2]].sum() >= needed]
-    if len(pieces) < FEWEST_GROUPS:
-        return _blocks(moving, bounds, run_names)
-    for number, (_, start, stop, _) in enumerate(pieces):
-        group[start:stop] = number
-    kind = "cycles" if period is not None else "recordings"
-    names = tuple(name for *_, name in pieces)
-    return Grouping(group, names, _sealed([run for run, *_ in pieces]), kind)
+    runs = [(start, stop, name) for (start, stop), name in zip(bounds, run_names, strict=True)]
+    cycles = [] if period is None else [one for run in runs for one in _cycles(*run, period)]
+    for kind, pieces, fewest in (
+        ("cycles", cycles, FEWEST_CYCLES),
+        ("recordings", runs, FEWEST_RUNS),
+    ):
+        moves = [piece for piece in pieces if moving[piece[0] : piece[1]].sum() >= 0.1 * rate_hz]
+        if len(moves) >= fewest:
+            group = np.full(moving.size, -1, dtype=np.int64)
+            for number, (start, stop, _) in enumerate(moves):
+                group[start:stop] = number
+            return Grouping(group, tuple(name for *_, name in moves), _sealed(len(moves)), kind)
+    return _blocks(moving, bounds, run_names)
 
 
-def _sealed(runs: list[int]) -> tuple[int, ...]:
-    """Which pieces are sealed: the last of each run, if each has four or more, else as of blocks.
+def _cycles(start: int, stop: int, name: str, period: int) -> list[tuple[int, int, str]]:
+    count = max((stop - start + period // 20) // period, 1)
+    ends = [*(start + np.arange(1, count) * period).tolist(), stop]
+    begins = [start, *ends[:-1]]
+    return [(*span, f"{name}:{k}") for k, span in enumerate(zip(begins, ends, strict=True))]
 
-    The last runs may be all that there is of a speed, or a program: of ten runs of a joint at three
-    speeds all of the third were sealed, and every line was taken back that the others had shown.
-    """
-    batches = [np.flatnonzero(np.equal(runs, run)) for run in dict.fromkeys(runs)]
-    if min(batch.size for batch in batches) < 4:
-        return tuple(k for k in range(len(runs)) if k % BLOCKS_WITHOUT_CYCLES in SEALED_BLOCKS)
-    last = [batch[-max(round(SEALED_SHARE * batch.size), 1) :] for batch in batches]
-    return tuple(np.sort(np.concatenate(last)).tolist())
+
+def _sealed(count: int) -> tuple[int, ...]:
+    return tuple(k for k in range(count) if k % BLOCKS in SEALED_BLOCKS)
 
 
 def _blocks(
@@ -132,9 +126,9 @@ def _blocks(
     names: list[str] = []
     for name, (start, stop) in zip(run_names, bounds, strict=True):
         own = indices[np.searchsorted(indices, start) : np.searchsorted(indices, stop)]
-        count = max(round(BLOCKS_WITHOUT_CYCLES * own.size / indices.size), 1)
+        count = max(round(BLOCKS * own.size / indices.size), 1)
         for chunk in np.array_split(own, count):
             if chunk.size:
                 group[chunk[0] : chunk[-1] + 1] = len(names)
                 names.append(f"{name}:block{len(names)}")
-    return Grouping(group, tuple(names), SEALED_BLOCKS, "blocks")
+    return Grouping(group, tuple(names), _sealed(len(names)), "blocks")

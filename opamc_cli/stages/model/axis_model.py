@@ -12,7 +12,7 @@ from opamc_cli.joint.effects.library import Library, built_in_library, effect_na
 from opamc_cli.joint.explain.declared import Declared, best_fit
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
-from opamc_cli.joint.motion.groups import FEWEST_GROUPS, FEWEST_MOVING
+from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint
@@ -217,7 +217,7 @@ def _too_little_motion(
     moving = np.count_nonzero(track.moving)
     msg = (
         f"{named}: axis {axis} moves for {moving / track.rate_hz:.2g} s in all ({moving} samples), "
-        f"too little to seal a part off; record at least {FEWEST_GROUPS} cycles, or "
+        f"too little to seal a part off; record at least "
         f"{FEWEST_MOVING / track.rate_hz:.2g} s of motion ({FEWEST_MOVING} samples)"
     )
     return NotEnoughDataError(msg)

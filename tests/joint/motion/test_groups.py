@@ -24,13 +24,13 @@ def test_several_joints_have_to_repeat_at_once():
     assert cycle_length(np.tile(one, 9), np.zeros(4500)) is None
 
 
-def test_sealed_cycles_are_the_last_and_at_least_one():
-    moving = np.ones(8000, dtype=bool)
-    grouping = group_samples(moving, ((0, 8000),), 1000, 100.0, ("run",))
+def test_some_cycles_between_others_are_sealed():
+    moving = np.ones(15_000, dtype=bool)
+    grouping = group_samples(moving, ((0, 15_000),), 1000, 100.0, ("run",))
     assert grouping is not None
     assert grouping.kind == "cycles"
-    assert [grouping.names[g] for g in grouping.sealed] == ["run:6", "run:7"]
-    assert np.all(grouping.group[6000:] >= 6)
+    assert [grouping.names[g] for g in grouping.sealed] == ["run:2", "run:5", "run:9", "run:14"]
+    assert np.all(grouping.group[2000:3000] == 2)
 
 
 def test_a_single_stroke_is_cut_into_blocks_and_some_of_its_middle_is_sealed():
@@ -70,10 +70,19 @@ def test_few_recordings_are_cut_into_blocks_of_which_each_has_open_ones(count):
         assert set(inside) - set(grouping.sealed)
 
 
-def test_of_three_cycles_or_fewer_none_is_sealed_as_a_whole():
-    moving = np.ones(3000, dtype=bool)
-    kinds = [group_samples(moving, ((0, n),), 750, 100.0, ("run",)).kind for n in (2300, 3000)]
+def test_of_fewer_than_six_cycles_none_is_sealed_as_a_whole():
+    moving = np.ones(4500, dtype=bool)
+    kinds = [group_samples(moving, ((0, n),), 750, 100.0, ("run",)).kind for n in (4300, 4500)]
     assert kinds == ["blocks", "cycles"]
+
+
+def test_recordings_of_few_cycles_are_groups_if_there_are_four():
+    moving = np.ones(8000, dtype=bool)
+    bounds = tuple((k * 2000, k * 2000 + 2000) for k in range(4))
+    found = [group_samples(moving, bounds, n, 100.0, tuple("abcd")) for n in (500, 1500)]
+    assert [grouping.kind for grouping in found] == ["cycles", "recordings"]
+    assert [grouping.names[-1] for grouping in found] == ["d:3", "d"]
+    assert [len(grouping.sealed) for grouping in found] == [4, 1]
 
 
 def test_too_little_motion_seals_nothing():
