@@ -104,6 +104,24 @@ def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, op
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
+def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_part(cell, opamc):
+    logs = cell.parent / "logs"
+    shutil.rmtree(logs / "r2")
+    for number, robot in enumerate(("r1", "r3")):
+        for index in range(5):
+            second = logs / robot / night(index) / "second.parquet"
+            cell_logs.record(second, 500, 100 * number + 50 + index)
+    (logs / "r1" / night(4) / "second.parquet").unlink()
+    with nightly_kills.with_stand_in():
+        said = f"r1 {night(4)}: in part not judged: 1 recording"
+        why = f"{said} of program 'cycle' where each night of the baseline has 2"
+        assert why in opamc("nightly", cell, "--quiet").out
+        assert counted(cell, opamc)[0] == ExitCode.PARTIAL
+        # the file comes late
+        cell_logs.record(logs / "r1" / night(4) / "second.parquet", 500, 54)
+        assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+
+
 def test_a_robot_whose_next_baseline_is_recorded_is_not_watched(cell, logs, opamc):
     for index in (5, 6, 7, 8):
         add_night(logs, index, "r1", program="pick_v2")

@@ -1,5 +1,6 @@
 """What a plan is made of, and what it is made from."""
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -29,6 +30,20 @@ class Comparison:
     """Whether some of these have none any more."""
     gone: tuple[Recording, ...] = ()
     """Recordings that the others once had beside those that are left."""
+
+    @property
+    def lacking(self) -> str:
+        """Say that the night has fewer recordings than each of the baseline's; empty: it has not.
+
+        Of a baseline of one night, or of nights that differ, nobody knows how many there are to be.
+        """
+        nights = Counter(one.night for one in self.baseline)
+        usual, have = set(nights.values()), len(self.targets)
+        if len(nights) < 2 or len(usual) > 1 or have >= min(usual):
+            return ""
+        recordings = "1 recording" if have == 1 else f"{have} recordings"
+        program = f" of program {self.program!r}" * bool(self.program)
+        return f"{recordings}{program} where each night of the baseline has {min(usual)}"
 
 
 @dataclass(frozen=True)
