@@ -377,6 +377,11 @@ def test_too_little_motion_to_seal_anything_off(folder, capsys):
         (1.0, 30 / np.pi, "axis1_velocity seems to be in rpm"),
         (1.0, 0.5 / np.pi, "axis1_velocity seems to be in rev/s"),
         (180 / np.pi, 1.0, "axis1_position seems to be in deg"),
+        (
+            1.0,
+            -1.0,
+            "-1 times the rate of change of axis1_position: one of them has the wrong sign",
+        ),
     ],
 )
 def test_position_and_speed_in_different_units_are_refused(folder, capsys, place, speed, words):
@@ -390,6 +395,19 @@ def test_position_and_speed_in_different_units_are_refused(folder, capsys, place
     )
     assert close(folder, "--axis", "1") == 3
     assert words in capsys.readouterr().err
+
+
+def test_a_joint_that_may_ask_for_another_is_told_of_where_none_is_logged(tmp_path, capsys):
+    made = simulate(3, (), rate=250.0, cycles=5)
+    hump = np.exp(-(((made.position - np.median(made.position)) / 0.1) ** 2))
+    current = made.current + 20 * made.noise_rms * np.sign(made.velocity) * hump
+    still = np.zeros_like(current)
+    columns = {"axis1_current": current, "axis1_position": made.position}
+    for beside in ({}, {"axis2_position": made.position[::-1].copy(), "axis2_current": still}):
+        write_run(tmp_path / "run.parquet", 250.0, **columns, **beside)
+        close(tmp_path, "--axis", "1", model=MODEL)
+        said = "what one that moves in time with it asks would look like position_drag"
+        assert (said in capsys.readouterr().err) == (not beside)
 
 
 def test_a_users_effect_is_used_by_name(folder):

@@ -79,11 +79,13 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     Returns
     -------
     list of Text
-        One line if all is well, one more of few baseline sessions; a faulty joint has five at most.
+        One line if all is well, one more of few baseline sessions, and of each healthy joint that
+        is worth an eye; a faulty joint has five at most.
     """
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
+    from opamc_cli.stages.verdict.reasons import SUSPICION
 
     unhealthy = doubtful(verdict)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
@@ -110,6 +112,12 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
         lines.append(Text(printable(f"  do first: {known['inspect']}")))
         lines += [Text(printable(f"  seen: {text}")) for text in known["evidence"]]
         lines.append(Text(printable(f"  against: {known['against']}")))
+    for entry in verdict.get("axes", ()):
+        p = entry.get("p_adjusted")
+        known = isinstance(p, int | float) and entry not in unhealthy and entry.get("reasons")
+        if known and p <= SUSPICION:
+            text = printable(f"axis {entry.get('axis')}: {entry['reasons'][0]}")
+            lines.append(Text(text, style="dim"))
     sessions = (verdict.get("baseline") or {}).get("sessions")
     if healthy and isinstance(sessions, int) and sessions < ENOUGH_SESSIONS:
         text = "1 baseline session says" if sessions == 1 else f"{sessions} baseline sessions say"

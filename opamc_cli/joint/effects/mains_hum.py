@@ -13,6 +13,10 @@ HIGHEST_FOLDED = 3
 125 Hz show, and lines of a motor that turns at one speed (a UR10's orders 10, 20, 30) were hum."""
 TOLERANCE = 0.005
 SAME_START_S = 1e-3
+LOGGERS_PARTS = (3, 4, 5, 6, 8, 10)
+"""Samples after which a logger's pattern repeats: an arm's had lines at every tenth of its rate."""
+BEAT_ERROR = 0.001
+"""Of the rate: these lay within 0.0008 of it."""
 
 
 def _mains_lines(rate_hz: float) -> list[tuple[float, float]]:
@@ -95,4 +99,9 @@ class MainsHum(Effect):
         for mains in MAINS_HZ:
             if abs(frequency / mains - round(frequency / mains)) * mains < 0.02 * frequency:
                 return f"{self.meaning} ({round(frequency / mains)} x {mains:.0f} Hz)"
-        return f"{self.meaning} (a multiple of 50 or 60 Hz, folded by the sampling rate)"
+        text = f"{self.meaning} (a multiple of 50 or 60 Hz, folded by the sampling rate"
+        for parts in LOGGERS_PARTS:
+            beat = frequency / track.rate_hz * parts
+            if abs(beat - round(beat)) < BEAT_ERROR * parts:
+                return f"{text}, or the logger's own: {round(beat)}/{parts} of its rate)"
+        return f"{text})"

@@ -36,6 +36,12 @@ from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
 from opamc_cli.storage.tables import write_table
 
 Entry = dict[str, Any]
+LIKE_ANOTHER_JOINT = {"position_drag", "hysteresis", "time_delay"}
+"""What gravity on the sum of two joints' angles was called where the second was not logged."""
+ALONE = (
+    "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
+    "like {}; log it beside to tell"
+)
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
 joints of arms that move all of them six did so, by 11 to 161; the least of the others by 3."""
@@ -199,6 +205,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         if negative.read.opposite:  # Of phase currents there is none.
             laid, loop = negative, close_loop(negative.fit, negative.library, seed)
             laid.notes.append(OPPOSITE.format(axis))
+    named = sorted({step.term.effect.name for step in loop.steps} & LIKE_ANOTHER_JOINT)
+    if named and "coupling" in loop.untestable:
+        laid.notes.append(ALONE.format(axis, " and ".join(named)))
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),

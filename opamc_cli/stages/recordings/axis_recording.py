@@ -179,7 +179,7 @@ def _check_channel(run: Run, name: str, values: Array) -> None:
 
 
 def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | None) -> None:
-    """Refuse a position and a speed that are the same motion in different units."""
+    """Refuse a position and a speed that are the same motion in different units, or signs."""
     if position is None or velocity is None:
         return
     ratio = speed_ratio(position, velocity, run.sampling_rate_hz)
@@ -192,6 +192,12 @@ def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | 
                 f"{asked}, or name its unit in the map of opamc ingest"
             )
             raise InputError(msg)
+    if ratio is not None and ratio < 0:
+        msg = (
+            f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
+            f"axis{axis}_position: one of them has the wrong sign; correct the map of opamc ingest"
+        )
+        raise InputError(msg)
 
 
 def _seconds(run: Run) -> float | None:

@@ -162,6 +162,22 @@ def test_a_line_is_hum_near_a_multiple_of_the_mains_only(line_hz, rate_hz, shown
         assert found[0]["frequency_hz"] == pytest.approx(shown_hz, abs=0.1)
 
 
+@pytest.mark.parametrize(
+    ("frequency_hz", "rate_hz", "said"),
+    [
+        (20.04, 66.8, "folded by the sampling rate, or the logger's own: 3/10 of its rate)"),
+        (33.4, 100.2, "folded by the sampling rate, or the logger's own: 1/3 of its rate)"),
+        (20.4, 66.8, "folded by the sampling rate)"),
+        (50.1, 250.5, "(1 x 50 Hz)"),
+    ],
+)
+def test_a_folded_line_at_a_tenth_of_the_rate_may_be_the_loggers(frequency_hz, rate_hz, said):
+    recording = Recording("run", rate_hz, np.zeros(300), position_rad=np.cos(np.arange(300) / 99))
+    track = build_track([recording], Joint())
+    text = built_in_library()["mains_hum"].interpretation({"frequency_hz": frequency_hz}, track)
+    assert text.endswith(said)
+
+
 def test_a_filtered_current_lags_as_a_recursion_of_first_order_does():
     rng = np.random.default_rng(3)
     columns, pole = rng.normal(size=(50, 2)), np.exp(-1 / 2.5)

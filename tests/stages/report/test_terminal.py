@@ -48,6 +48,17 @@ def test_all_healthy_is_one_line() -> None:
     assert text == "Axes 1-6 healthy (largest health index 3, axis 6)\n"
 
 
+def test_a_healthy_axis_that_is_worth_an_eye_has_a_line() -> None:
+    axes = [
+        axis(n, "healthy", reasons=[f"reason {n}"], p_adjusted=p)
+        for n, p in enumerate((0.09, 0.11), 1)
+    ]
+    said = [line.plain for line in verdict_lines({"axes": axes})]
+    assert said == ["Axes 1 and 2 healthy", "axis 1: reason 1"]
+    axes[0]["excused"] = True  # its line stands above
+    assert [line.plain for line in verdict_lines({"axes": axes})].count("axis 1: reason 1") == 1
+
+
 def test_an_unhealthy_axis_is_explained() -> None:
     verdict = {
         "axes": [
