@@ -12,6 +12,8 @@ class Night:
     """The joint is at fault by the night's own verdict, or not as it was by the chart."""
     gross: bool = False
     """So much so that one night is enough."""
+    differs: bool = False
+    """By its own p-value, whatever excuses that: it is no sign that an alarm is over."""
     calm: bool = True
     """Whether it may end an alarm: not while what is left of it lies near the limit."""
     judged: bool = True
@@ -35,19 +37,22 @@ def episodes(nights: Sequence[Night], needed: int, among: int) -> list[Episode]:
         In time order.
     needed, among
         An alarm is raised in the night in which `needed` of the last `among` judged nights have a
-        signal; it is cleared in the first calm night in which none of the last `among` has.
+        signal; it is cleared in the first calm night in which none of the last `among` has, or
+        differs.
     """
     found: list[Episode] = []
-    recent: list[bool] = []
+    recent: list[Night] = []
     raised: int | None = None
     for index, night in enumerate(nights):
         if not night.judged:
             continue
-        recent = [*recent, night.signal][-among:]
+        recent = [*recent, night][-among:]
         if raised is None:
-            if night.gross or (night.signal and sum(recent) >= needed):
+            if night.gross or (night.signal and sum(one.signal for one in recent) >= needed):
                 raised = index
-        elif night.calm and not any(recent) and len(recent) == among:
+            continue
+        quiet = night.calm and not any(one.signal or one.differs for one in recent)
+        if quiet and len(recent) == among:
             found.append(Episode(raised, index))
             raised = None
     if raised is not None:

@@ -21,7 +21,7 @@ OVER = {
     for rank, kind in enumerate(
         (
             *("lost", "ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
-            *("excused", "missing", "cleared", "gathering"),
+            *("missing", "cleared", "excused", "gathering"),
         )
     )
 }

@@ -5,7 +5,7 @@ import pytest
 from opamc_cli.decision.trend.alarm import Episode, Night, episodes
 
 S, N, U = Night(True), Night(False), Night(False, judged=False)
-NEAR = Night(False, calm=False)
+NEAR, ODD = Night(False, calm=False), Night(False, differs=True)
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,10 @@ NEAR = Night(False, calm=False)
         ([S, S, N, N, NEAR, NEAR, S, N, N], [Episode(1, None)]),
         ([S, S, NEAR, NEAR, N], [Episode(1, 4)]),
         ([NEAR, NEAR, NEAR], []),
+        # nor does a night that differs by itself, for whatever reason
+        ([S, S, ODD, N, N], [Episode(1, None)]),
+        ([S, S, ODD, N, N, N], [Episode(1, 5)]),
+        ([ODD, ODD, ODD], []),
     ],
 )
 def test_two_of_three_nights_make_an_alarm(nights, expected):

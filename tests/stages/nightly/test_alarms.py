@@ -7,6 +7,7 @@ import pytest
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
+from opamc_cli.stages.nightly.alarms.trend import trend_phrase
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, NightRow
 
@@ -25,6 +26,7 @@ def nights_of(states, distances=None):
             "distance": 0.0 if distances is None else distances[day - 1],
             "common": 0.0,
             "effect": 0.0,
+            "p_value": 0.5,
             "temperature_c": None,
             "cause": None,
             "reason": "no motion",
@@ -193,6 +195,17 @@ def test_an_alarm_does_not_end_while_the_chart_is_near_its_limit():
     assert [cleared(left) for left in (0.0, 0.1, 0.3)] == [22, 22, None]
 
 
+def test_an_alarm_stands_while_the_joint_differs_whatever_excuses_it():
+    """Wear that stays as it is becomes the usual of the chart, and the hall excuses the night."""
+    series = nights_of(["healthy"] * 5 + ["fault"] * 3 + ["healthy"] * 12)
+    for row in series[8:16]:
+        row.update(reason=EXCUSED, p_value=0.002)
+    found = settled(series)
+    assert [one.cleared for one in found.alarms] == ["2026-03-19"]
+    # the alarm says it, and no line besides
+    assert [one.kind for one in found.events] == ["alarm", "reminder", "cleared"]
+
+
 def settled(series, nights=(), declared=()):
     return settle_robot("r1", series, nights, declared, AlarmConfig(), 0.4, 6)
 
@@ -278,6 +291,22 @@ def test_few_nights_that_grow_by_more_than_nights_differ_grow():
     )
 
 
+def test_a_step_is_no_growth_and_what_is_reached_is_not_forecast():
+    trend = {"distance": [5.1, 5.0, 5.3], "reach": None}
+    assert trend_phrase(trend, 0.4).startswith("distance from the baseline has leapt, too few")
+    grows = {
+        "per_night": 0.01,
+        "low": 0.001,
+        "high": 0.02,
+        "level": 0.2,
+        "distance": [0.1, 0.05, 0.2],
+    }
+    assert trend_phrase(grows | {"reach": [8, 80]}, 0.4).endswith("in 8 to 80 nights")
+    assert trend_phrase(grows | {"reach": [8, 165]}, 0.4).endswith("in 8 nights at the earliest")
+    now = "now at fault level (0.4), distance from the baseline grows by 11 % (5.1 to 22) a night"
+    assert trend_phrase(grows | {"reach": [8, 165]}, 0.4, reached=True) == now
+
+
 def test_temperature_is_taken_off_the_trend_where_it_is_logged():
     rng = np.random.default_rng(4)
     distances = 0.1 * np.clip(np.arange(30) - 10, 0, None)
@@ -299,7 +328,8 @@ def nights_excused(*excused, of=12):
     """Return a healthy joint's nights, of which some differ by no more than conditions may do."""
     rows = nights_of(["healthy"] * of)
     for day, row in enumerate(rows, start=1):
-        row["reason"] = f"{EXCUSED}differs by {day}" if day in excused else "No change."
+        if day in excused:
+            row.update(reason=EXCUSED, p_value=0.0011 * day, distance=np.log(day))
     return rows
 
 
@@ -307,11 +337,14 @@ def test_a_joint_that_conditions_alone_excuse_is_told_and_again_after_some_night
     """Whatever lies between: warm days come and go."""
     (told,) = settled(nights_excused(4)).events
     assert (told.time, told.kind) == ("2026-03-04", "excused")
-    assert told.text == "axis 2: not told from unusual conditions in 2026-03-04: differs by 4"
+    assert told.text == (
+        "axis 2: not told from unusual conditions in 2026-03-04 (p 0.0044, 4 times as far as a "
+        "healthy session): a fault that looks alike would not be told"
+    )
     found = settled(nights_excused(2, 4, 5, 8, 9, 10)).events
     assert [one.time[-2:] for one in found] == ["02", "09"]
     (text,) = {one.text for one in found}
-    assert "in 6 nights from 2026-03-02 to 2026-03-10: differs by 10" in text
+    assert "in 6 nights from 2026-03-02 to 2026-03-10 (p 0.011, 10 times as far" in text
     assert settled(nights_excused()).events == ()
 
 

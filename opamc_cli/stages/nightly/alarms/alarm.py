@@ -49,7 +49,9 @@ def alarm_of(
         """Return the trend by what was known in a night, and the words of it."""
         lately = measured(rows[max(0, night + 1 - MOST_NIGHTS) : night + 1])
         trend = trend_of(lately, since, joint.fault_effect, joint.baseline_nights)
-        return trend, f"{_state_phrase(rows[night])}; {trend_phrase(trend, joint.fault_effect)}"
+        reached = (rows[night]["effect"] or 0.0) >= joint.fault_effect
+        words = trend_phrase(trend, joint.fault_effect, reached)
+        return trend, f"{_state_phrase(rows[night])}; {words}"
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)

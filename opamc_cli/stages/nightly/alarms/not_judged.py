@@ -1,5 +1,6 @@
 """What to say of nights that were not judged, or not for sure: not every night the same."""
 
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
@@ -38,8 +39,11 @@ def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
         span = last["night"]
         if len(nights) > 1:
             span = f"{len(nights)} nights from {nights[0]} to {span}"
-        text = f"{name}: not told from unusual conditions in {span}: "
-        text += last["reason"].removeprefix(EXCUSED)
+        text = f"{name}: not told from unusual conditions in {span}"
+        if last["p_value"] is not None and last["distance"] is not None:
+            far = f"{math.exp(last['distance']):.2g} times as far as a healthy session"
+            text += f" (p {last['p_value']:.2g}, {far})"
+        text += ": a fault that looks alike would not be told"
         yield Event(nights[index], last["robot"], last["axis"], "excused", text)
 
 

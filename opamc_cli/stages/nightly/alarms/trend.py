@@ -11,6 +11,13 @@ from opamc_cli.decision.trend.slope import Slope, nights_until, robust_slope, sl
 from opamc_cli.decision.trend.temperature import without_temperature
 from opamc_cli.stages.nightly.alarms.course import days, distances
 
+LEAP = math.log(2.0)
+"""Growth of the log distance a night beyond which it is a step: a sensor's noise that grew in one
+night was said to grow "by 16850 % a night"."""
+
+MOST_AHEAD = 10
+"""Times as late as the earliest night: "in 4 to 190 nights" tells nobody when to plan."""
+
 
 def trend_of(
     rows: Sequence[Mapping[str, Any]], since: str, fault_effect: float, baseline_nights: int
@@ -53,15 +60,22 @@ def _rounded(slope: Slope) -> list[float]:
     return [round(one, 6) for one in (slope.per_night, slope.low, slope.high)]
 
 
-def trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
-    """Say where a joint is heading: its effect may move with the weather, its distance less."""
+def trend_phrase(trend: Mapping[str, Any], limit: float, reached: bool = False) -> str:
+    """Say where a joint is heading: its effect may move with the weather, its distance less.
+
+    Of a night whose own effect has `reached` the limit nothing says when it will.
+    """
     if not trend:
         return "too few nights for a trend"
     reach, level = trend["reach"], f"fault level ({limit:g})"
     farther = "no trend"
-    if trend["distance"][1] > 0:
+    if trend["distance"][1] > LEAP:
+        farther = "distance from the baseline has leapt"
+    elif trend["distance"][1] > 0:
         usual, least, most = (_percent(one) for one in trend["distance"])
         farther = f"distance from the baseline grows by {usual} % ({least} to {most}) a night"
+    if reach != [0, 0] and reached:
+        return f"now at {level}, {farther}"
     if reach == [0, 0]:
         grows = farther
         if trend.get("low", 0) > 0:
@@ -71,9 +85,13 @@ def trend_phrase(trend: Mapping[str, Any], limit: float) -> str:
         why = "the effect too unevenly" if "level" in trend else "too few nights"
         unsure = f", {why} to say when it reaches {level}"
         return farther + (unsure if trend["distance"][1] > 0 else "")
+    soon, late = reach
+    when = f"{soon} to {late} nights"
+    if late > MOST_AHEAD * max(soon, 1):
+        when = f"{soon} nights at the earliest"
     return (
         f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
-        f"night, reaches {level} in {reach[0]} to {reach[1]} nights"
+        f"night, reaches {level} in {when}"
     )
 
 
