@@ -22,7 +22,7 @@ from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import is_excused, reasons
+from opamc_cli.stages.verdict.reasons import AT_REST, is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit
@@ -356,15 +356,21 @@ def policy_of(config: ScoreConfig) -> Policy:
 def believed(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Mapping[str, Any] | None:
-    """Drop a harmless cause of what it does not move.
+    """Drop a harmless cause, or a sensor's noise, of what it does not move.
 
-    Grease, payload and offsets act slowly: they do not excuse what the spectrum alone has found.
-    Nor does grease, where it did move the course, what the spectrum shows far more clearly.
+    Noise or hum that is there at rest has no course: where that has changed, the spectrum must know
+    noise far better; a line of the mains is told by its frequency. Grease,
+    payload and offsets act slowly: they do not excuse what the spectrum alone has found. Nor does
+    grease, where it did move the course, what the spectrum shows far more clearly.
     """
-    if cause is None or not cause.get("harmless"):
+    noise = cause is not None and AT_REST in cause.get("evidence", ())
+    if cause is None or not (noise or cause.get("harmless")):
         return cause
     heard = judgement.witnesses
     course_p, spectrum_p = heard.get("profile", 0.0), heard.get("spectrum", 1.0)
+    if noise:
+        own = course_p > config.false_alarm_rate or spectrum_p < course_p**AS_SURE
+        return cause if own or cause.get("harmless") else None
     if course_p > config.false_alarm_rate:
         return None
     slow_p = min(course_p, heard.get("amplitude", 1.0))
