@@ -103,10 +103,10 @@ class Bundle:
         """Return one of the baseline's sessions as the target of the others."""
         return self.of_sessions([i for i in range(self.n_baseline) if i != session], [session])
 
-    def without(self, name: str) -> "Bundle":
-        """Return the same without one of the baseline's sessions."""
+    def without(self, names: Sequence[str]) -> "Bundle":
+        """Return the same without some of the baseline's sessions."""
         n = self.n_baseline
-        kept = [i for i in range(n) if self.baseline_sessions[i] != name]
+        kept = [i for i in range(n) if self.baseline_sessions[i] not in names]
         return self.of_sessions(kept, range(n, n + len(self.cells[0].target)))
 
     @property

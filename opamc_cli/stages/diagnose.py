@@ -26,7 +26,9 @@ from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs import Run, find_runs
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.sources import RunSource, check_comparable, other_robot
+from opamc_cli.storage.tables import read_table
 
 FILES = (
     files.VERDICT,
@@ -171,6 +173,10 @@ def _diagnose(
     if differing:
         watch, cause = progress("cause"), _cause()
         moving = [cause.moving_samples(side.patterns) for side in (sides.baseline, sides.target)]
+        strokes = [
+            cause.strokes_of(read_table(one.segments, "segment", SEGMENTS))
+            for one in (normal, other)
+        ]
         for done, axis in enumerate(differing):
             watch(done, len(differing))
             times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
@@ -182,6 +188,7 @@ def _diagnose(
                     config.joint,
                     times,
                     kept,
+                    [moves.get(axis, {}) for moves in strokes],
                 )
             except (ArithmeticError, LookupError, ValueError) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings

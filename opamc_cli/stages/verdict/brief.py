@@ -10,6 +10,7 @@ from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
 from opamc_cli.stages.verdict.reasons import (
+    SENSOR_NOISE,
     SMALLER_PART,
     excuses_little,
     explains_little,
@@ -130,6 +131,8 @@ def _called(unit: str) -> str:
 
 def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
     n = judgement.n_baseline_sessions
+    if cause is not None and cause.get("effect") == SENSOR_NOISE:
+        return "A gear's fault shows in motion alone: the noise is there at standstill, too."
     if n < FEW_SESSIONS:
         return (
             f"Only {n} baseline session{'' if n == 1 else 's'}: how much healthy ones differ is "

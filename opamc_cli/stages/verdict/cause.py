@@ -8,6 +8,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
+from opamc_cli.decision.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
 from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Change, explain_change
 from opamc_cli.joint.change.reading import Cause
@@ -20,8 +21,12 @@ from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
+from opamc_cli.stages.verdict.reasons import AT_REST, SENSOR_NOISE, excuses_little, lies_outside
 from opamc_cli.storage.runs import Run
 from opamc_cli.storage.sources import RunSource
+
+Spans = Sequence[tuple[int, int]]
+"""Samples (start, stop), half-open."""
 
 MAX_RUNS = 8
 """Runs of each side that are looked at, the newest ones: how healthy sessions differ is not known
@@ -57,6 +62,12 @@ MUCH = 9.0
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
+HUM = "mains_hum"
+NOISE = (
+    "noise or hum of the current sensor, which has grown as much while the joint stands still: "
+    "check the sensor, its cable and the amplifier"
+)
+
 
 def explain(
     axis: int,
@@ -65,6 +76,7 @@ def explain(
     config: JointConfig,
     moving: Mapping[str, tuple[int, int]] | None = None,
     kept: KeptResults | None = None,
+    strokes: Sequence[Mapping[str, Spans]] = ({}, {}),
 ) -> dict[str, Any] | None:
     """Trace the change of one joint to an effect of the library.
 
@@ -81,31 +93,42 @@ def explain(
         the position is logged it says so itself, of strokes too that no pattern was taken from.
     kept
         Where the motion of the baseline's recordings may lie.
+    strokes
+        All samples between which the axis moves, by run of either side: where no position is logged
+        they tell standstill.
 
     Returns
     -------
     dict or None
-        The `cause` of verdict.json; None where nothing in the library explains the change, or
-        where the runs do not hold what a model of the joint needs.
+        The `cause` of verdict.json: an effect of the library, or noise of the sensor that is there
+        at standstill, too; None where neither explains the change, or where the runs do not hold
+        what a model of the joint needs.
 
     Raises
     ------
     ConfigError
         If an effect of the user's own cannot be used.
     """
-    sides = []
+    sides, noises = [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
-    for sources in (baseline, target):
-        recordings = _recordings(axis, sources[-MAX_RUNS:], seconds, moving or {}, rate_hz)
+    for sources, moves in zip((baseline, target), strokes, strict=True):
+        recordings, noise = _recordings(
+            axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
+        )
         if not recordings:
             return None
         sides.append(recordings)
+        noises.append(noise)
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
     library = library_of(config)
     with users_effects_named():
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
-        return _entry(change)
+        found = _entry(change)
+    grown = growth_at_rest(*noises)
+    if grown is None or (found is not None and not _heard_at_rest(found)):
+        return found
+    return _of_sensor(grown, found)
 
 
 def library_of(config: JointConfig) -> Library:
@@ -130,14 +153,24 @@ def moving_samples(patterns: pa.Table) -> dict[int, dict[str, tuple[int, int]]]:
     return found
 
 
+def strokes_of(segments: pa.Table) -> dict[int, dict[str, list[tuple[int, int]]]]:
+    """Return, by axis and run, the samples between which the motions of a segment table are."""
+    found: dict[int, dict[str, list[tuple[int, int]]]] = {}
+    for row in segments.select(["axis", "run", "start", "stop"]).to_pylist():
+        runs = found.setdefault(row["axis"], {})
+        runs.setdefault(row["run"], []).append((row["start"], row["stop"]))
+    return found
+
+
 def _recordings(
     axis: int,
     sources: Sequence[RunSource],
     seconds: float,
     moving: Mapping[str, tuple[int, int]],
+    strokes: Mapping[str, Spans],
     rate_hz: float,
-) -> list[Recording]:
-    found = []
+) -> tuple[list[Recording], list[Fluctuation]]:
+    found, noises = [], []
     for source in sources:
         # seconds are those of a log of this rate: a slower one costs no more for being longer
         read_hz = max(rate_hz, LEAST_HZ)
@@ -151,9 +184,26 @@ def _recordings(
                 start, stop = max(first - beside, 0), min(last + beside, first + most)
                 recording = replace(read_recording(run, axis, start, stop), rate_hz=rate_hz)
                 found.append(interpolated(recording, LEAST_HZ))
+            noise = _fluctuation(recording, start, strokes.get(source.name, ()))
+            noises += [] if noise is None else [noise]
         except OpamcError:
             continue  # the run served the chain but not a model, which needs motion beside current
-    return found
+    return found, noises
+
+
+def _fluctuation(recording: Recording, start: int, strokes: Spans) -> Fluctuation | None:
+    """Measure a recording's noise, whose first sample is `start` of the run."""
+    position = recording.position_rad
+    if position is None:
+        if not strokes:
+            return None
+        moves = np.zeros(recording.size)
+        for first, last in strokes:
+            moves[max(first - start, 0) : max(last - start, 0)] = 1.0
+        position = np.cumsum(moves)
+    phases = recording.phases_a
+    current = recording.current_a if phases is None else phases
+    return None if current is None else fluctuation(current, position, recording.rate_hz)
 
 
 def _moves(run: Run, axis: int) -> tuple[int, int] | None:
@@ -189,6 +239,43 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "evidence": dict(first.evidence),
         "why": _why(first, change),
         "others": [{key: getattr(cause, key) for key in OF_OTHERS} for cause in others],
+    }
+
+
+def _heard_at_rest(cause: Mapping[str, Any]) -> bool:
+    """Whether a cause may be what a sensor's noise or hum looks like: friction is slow."""
+    return cause["effect"] in ("ripple", HUM) or (lies_outside(cause) and excuses_little(cause))
+
+
+def _of_sensor(noise: Growth, found: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a sensor's noise as the cause, or the hum that was found, with what is there at rest.
+
+    Noise makes a joint neither healthy nor faulty.
+    """
+    why = (
+        f"While the joint stands still the current fluctuates {noise.times:.2g} times as much as "
+        f"in the baseline, which is {noise.share:.0%} of what it has grown by in motion; a fault "
+        "of the gear shows in motion alone."
+    )
+    if found is not None and found["effect"] == HUM and not excuses_little(found):
+        evidence = {**found["evidence"], AT_REST: noise.times}
+        return {**found, "evidence": evidence, "why": [*found["why"], why]}
+    others = [] if found is None else [{key: found[key] for key in OF_OTHERS}, *found["others"]]
+    return {
+        "effect": SENSOR_NOISE,
+        "domain": "time",
+        "parameters": {},
+        "interpretation": NOISE,
+        "share": noise.share,
+        "p_value": None,
+        "ties": [],
+        "harmless": False,
+        "origin": "measurement",
+        "explained": noise.share,
+        "clear": False,
+        "evidence": {AT_REST: noise.times},
+        "why": [why],
+        "others": others,
     }
 
 

@@ -38,6 +38,12 @@ SUSPICION = 0.1
 LEAST_SAID = 0.01
 """Change of all of a current that is told: 0 % beside a place that fell to a seventh is absurd."""
 
+SENSOR_NOISE = "sensor_noise"
+"""What a cause is called that no effect of a joint is: it is there while the joint stands still."""
+
+AT_REST = "times_at_rest"
+"""In a cause's evidence: by how much the current's fluctuation at standstill has grown with it."""
+
 SMALLER_PART = "A smaller part of the change is {}."
 CHECK_FIRST = (
     "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
@@ -98,7 +104,7 @@ def reasons(
         if outside and excuses_little(cause):
             known = [SMALLER_PART]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
-        if outside and judgement.state == "fault":
+        if outside and judgement.state == "fault" and cause.get("effect") != SENSOR_NOISE:
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
         sentences += [INSPECT, CANNOT_TELL]
@@ -120,7 +126,10 @@ def excuses_little(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause outside the joint holds too little to look there before the gear.
 
     With a fault beside it, or less than half of the change by harmless causes, it is not harmless.
+    A sensor's noise excuses nothing, but is to be looked for before the gear.
     """
+    if cause.get("effect") == SENSOR_NOISE:
+        return False
     return explains_little(cause) or not cause.get("harmless")
 
 

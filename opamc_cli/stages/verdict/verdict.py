@@ -19,10 +19,10 @@ from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
-from opamc_cli.stages.recordings.sessions import Sessions, started
+from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import is_excused, reasons
+from opamc_cli.stages.verdict.reasons import AT_REST, is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit
@@ -34,6 +34,15 @@ AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
 course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
 cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
+
+ODD_ONE = (
+    "differs from the others on {} as no healthy one does, and is left out there; look at it, and "
+    "take it out of the baseline if it was not healthy"
+)
+WORN_END = (
+    "differ from those before them on {} as no healthy ones do, and are left out there; look at "
+    "them, and take them out of the baseline if the joint had begun to wear"
+)
 
 
 @dataclass(frozen=True)
@@ -61,8 +70,8 @@ class Decided:
     """The same by each of several target sessions alone."""
     alone: Mapping[int, LoneSession] = field(default_factory=dict)
     """Those by which an axis is judged, since they are worse than all together."""
-    odd: Mapping[int, str] = field(default_factory=dict)
-    """Sessions of the baseline without which an axis is judged: no healthy one differs as much."""
+    odd: Mapping[int, Sequence[str]] = field(default_factory=dict)
+    """Sessions of the baseline without which an axis is judged: no healthy ones differ as much."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
         """Return the axes whose change asks for a cause."""
@@ -83,21 +92,21 @@ class Decided:
     def baseline_sources(self, axis: int) -> Sequence[RunSource]:
         """Return the baseline's recordings that an axis is held against."""
         of_run = self.sides.sessions[0].of_run
-        odd = self.odd.get(axis)
-        return [s for s in self.sides.baseline.sources if of_run[s.name] != odd]
+        odd = self.odd.get(axis, ())
+        return [s for s in self.sides.baseline.sources if of_run[s.name] not in odd]
 
     def odd_ones(self) -> list[InputError]:
         """Say which sessions of the baseline were left out."""
-        by_session: dict[str, list[int]] = {}
-        for axis, session in sorted(self.odd.items()):
-            by_session.setdefault(session, []).append(axis)
+        by_sessions: dict[Sequence[str], list[int]] = {}
+        for axis, sessions in sorted(self.odd.items()):
+            by_sessions.setdefault(sessions, []).append(axis)
+        of_baseline = self.sides.sessions[0]
         return [
             InputError(
-                f"{self.sides.sessions[0].named(session)} of the baseline differs from the others "
-                f"on {_axes_named(axes)} as no healthy one does, and is left out there; look at "
-                "it, and take it out of the baseline if it was not healthy"
+                f"{_and([of_baseline.named(session) for session in sessions])} of the baseline "
+                + (ODD_ONE if len(sessions) == 1 else WORN_END).format(_axes_named(axes))
             )
-            for session, axes in by_session.items()
+            for sessions, axes in by_sessions.items()
         ]
 
     def target_runs(self) -> dict[int, list[str]]:
@@ -150,6 +159,11 @@ class Decided:
         ]
 
 
+def _and(names: Sequence[str]) -> str:
+    *first, last = names
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def _axes_named(axes: Sequence[int]) -> str:
     return f"{'axis' if len(axes) == 1 else 'axes'} {', '.join(map(str, axes))}"
 
@@ -162,9 +176,9 @@ def decide(sides: Sides, config: Config) -> Decided:
     policy = policy_of(config.score)
     known = bundles(sides)
     judgements = judge(known, policy)
-    odd = odd_sessions(known, judgements, policy)
+    odd = odd_sessions(known, judgements, policy, in_time(sides.baseline, sides.sessions[0]))
     if odd:
-        known |= {axis: known[axis].without(session) for axis, session in odd.items()}
+        known |= {axis: known[axis].without(sessions) for axis, sessions in odd.items()}
         judgements = judge(known, policy)
     each, alone = each_session(known, policy), {}
     for axis, by_session in each.items():
@@ -173,6 +187,15 @@ def decide(sides: Sides, config: Config) -> Decided:
             alone[axis] = worst
             known[axis], judgements[axis] = worst.bundle, worst.judgement
     return Decided(sides, known, judgements, each, alone, odd)
+
+
+def in_time(side: Side, sessions: Sessions) -> list[str]:
+    """Return a side's sessions, the oldest first: nights are named by it, and files often are."""
+    times = {source.name: started(source.info.started_at) for source in side.sources}
+    if sessions.told_by != (BY_SESSION,) or None in times.values():
+        return sorted(set(sessions.of_run.values()))
+    by_time = sorted((t, sessions.of_run[name]) for name, t in times.items() if t is not None)
+    return list(dict.fromkeys(session for _, session in by_time))
 
 
 def _concern(judgement: Judgement) -> tuple[int, float]:
@@ -333,15 +356,21 @@ def policy_of(config: ScoreConfig) -> Policy:
 def believed(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Mapping[str, Any] | None:
-    """Drop a harmless cause of what it does not move.
+    """Drop a harmless cause, or a sensor's noise, of what it does not move.
 
-    Grease, payload and offsets act slowly: they do not excuse what the spectrum alone has found.
-    Nor does grease, where it did move the course, what the spectrum shows far more clearly.
+    Noise or hum that is there at rest has no course: where that has changed, the spectrum must know
+    noise far better; a line of the mains is told by its frequency. Grease,
+    payload and offsets act slowly: they do not excuse what the spectrum alone has found. Nor does
+    grease, where it did move the course, what the spectrum shows far more clearly.
     """
-    if cause is None or not cause.get("harmless"):
+    noise = cause is not None and AT_REST in cause.get("evidence", ())
+    if cause is None or not (noise or cause.get("harmless")):
         return cause
     heard = judgement.witnesses
     course_p, spectrum_p = heard.get("profile", 0.0), heard.get("spectrum", 1.0)
+    if noise:
+        own = course_p > config.false_alarm_rate or spectrum_p < course_p**AS_SURE
+        return cause if own or cause.get("harmless") else None
     if course_p > config.false_alarm_rate:
         return None
     slow_p = min(course_p, heard.get("amplitude", 1.0))

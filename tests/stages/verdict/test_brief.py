@@ -7,6 +7,8 @@ import pytest
 
 from opamc_cli.decision.judge import Bundle
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
+from opamc_cli.stages.nightly.workers.judge import _axis
+from opamc_cli.stages.report import wording
 from opamc_cli.stages.verdict.brief import brief
 
 
@@ -52,3 +54,19 @@ def test_a_harmless_cause_of_a_small_part_sends_nobody_away_from_the_gear(
     told = brief(judged, Bundle([], {}), cause | {"explained": explained})
     assert told["inspect"].startswith(first)
     assert "colder grease" in told["inspect"]
+
+
+def test_a_sensor_s_noise_sends_nobody_to_the_gear():
+    cause = {"effect": "sensor_noise", "interpretation": "noise: check the sensor"}
+    cause |= {"origin": "measurement", "harmless": False, "share": 0.9, "explained": 0.9}
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, Bundle([], {}), cause)
+    assert told["inspect"] == "Check before the gear: noise: check the sensor."
+    assert "at standstill, too" in told["against"]
+    entry = {"axis": 1, "state": "fault", "cause": cause}
+    assert wording.inspection(entry) == "Check the sensor; do that before opening the gear."
+    assert _axis(entry, None).cause == "sensor_noise"
+    # the same of an effect of the library that explains as little of a fault stands beside it
+    assert _axis(entry | {"cause": cause | {"effect": "mains_hum"}}, None).cause is None

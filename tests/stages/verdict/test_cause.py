@@ -8,6 +8,7 @@ import pyarrow as pa
 import pytest
 
 from opamc_cli.config.models import JointConfig
+from opamc_cli.decision.at_rest import Growth
 from opamc_cli.errors import ConfigError
 from opamc_cli.joint.change.explain import Change
 from opamc_cli.joint.change.reading import Cause
@@ -145,6 +146,71 @@ def pushed(folder, extra_a, rest=0):
     return found
 
 
+def paused(folder, noise_a, ripple_a=0.0, logged=True):
+    """Write four sessions of strokes with pauses: with a sensor's noise and a ripple."""
+    rng = np.random.default_rng(2)
+    still, way = np.zeros(100), 0.6 * (1 - np.cos(np.linspace(0, np.pi, 150)))
+    q = np.concatenate([still, *[way, still + 1.2, way[::-1], still] * 3])
+    speed = np.gradient(q) * 100
+    spans = [(100 + 250 * n, 250 + 250 * n) for n in range(6)]
+    found = []
+    for k in range(4):
+        torque = (1 + 0.02 * rng.normal()) * np.tanh(speed / 0.02) + 0.8 * np.sin(q)
+        torque += ripple_a * np.sin(150 * q) * (speed != 0)
+        sizes = noise_a * rng.normal(size=(q.size, 3))
+        columns = {"axis1_current": (torque + sizes[:, 0]).astype(np.float32)}
+        columns["axis1_position" if logged else "axis1_velocity"] = q if logged else speed
+        path = folder / f"{k}.parquet"
+        save_run(path, RunInfo(sampling_rate_hz=100.0), columns)
+        with Run(path, path.stem) as run:
+            found.append(RunSource(path.stem, path, "", run.n_samples, run.info))
+    return found, {str(k): spans for k in range(4)}
+
+
+@pytest.mark.parametrize("logged", [True, False], ids=["position", "spans of motion"])
+def test_noise_that_is_there_at_standstill_is_the_sensor_s(tmp_path, logged):
+    """It was a worn gear; the joint is not called healthy for it, nor at fault."""
+    before, strokes = paused(tmp_path / "before", 0.03, logged=logged)
+    after, _ = paused(tmp_path / "after", 0.12, logged=logged)
+    found = cause.explain(1, before, after, JointConfig(), strokes=(strokes, strokes))
+    assert (found["effect"], found["origin"]) == ("sensor_noise", "measurement")
+    assert not found["harmless"]
+    assert found["share"] > 0.5
+    assert found["evidence"]["times_at_rest"] == pytest.approx(4, rel=0.1)
+    assert "fluctuates 4" in found["why"][0]
+    if not logged:  # nobody knows where it stands
+        assert (cause.explain(1, before, after, JointConfig()) or {}).get("effect") != (
+            "sensor_noise"
+        )
+
+
+@pytest.mark.parametrize("noise_a", [0.03, 0.12])
+def test_a_ripple_is_not_the_sensor_s_whatever_its_noise(tmp_path, noise_a):
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", noise_a, ripple_a=0.4)
+    found = cause.explain(1, before, after, JointConfig())
+    assert (found["effect"], found["origin"]) == ("ripple", "joint")
+
+
+def test_hum_that_is_heard_at_standstill_stays_hum():
+    """By that it is believed though no course has changed; see `believed`."""
+    hum = Cause(effect="mains_hum", parameters={"frequency_hz": 50.0}, interpretation="hum",
+                p_value=0.0, ties=(), evidence={}, share=0.9, origin="measurement")  # fmt: skip
+    for explained, effect in ((0.9, "mains_hum"), (0.3, "sensor_noise")):
+        found = cause._entry(Change((hum,), explained, True))
+        told = cause._of_sensor(Growth(times=3.0, share=0.8), found)
+        assert (told["effect"], told["evidence"]) == (effect, {"times_at_rest": 3.0})
+        assert "fluctuates 3 times" in told["why"][-1]
+    assert [other["effect"] for other in told["others"]] == ["mains_hum"]
+
+
+def test_motions_of_a_segment_table_are_kept_one_by_one():
+    table = pa.table(
+        {"axis": [1, 1, 2], "run": list("aab"), "start": [3, 9, 5], "stop": [6, 12, 8]}
+    )
+    assert cause.strokes_of(table) == {1: {"a": [(3, 6), (9, 12)]}, 2: {"b": [(5, 8)]}}
+
+
 def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
     found = []
     for rest in (150, 1500):
@@ -177,7 +243,7 @@ def test_a_spike_of_the_position_hides_no_motion(tmp_path):
         columns["axis1_position"] = columns["axis1_position"].copy()
         columns["axis1_position"][1000] = 1e6
         save_run(source.path, source.info, columns)
-    found = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), 100.0)
+    found, _ = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), {}, 100.0)
     assert [recording.size for recording in found] == [2600] * 3
 
 
