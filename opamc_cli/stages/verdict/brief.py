@@ -133,6 +133,9 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
     n = judgement.n_baseline_sessions
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
+    others = () if cause is None else cause.get("others", ())
+    if any(one["effect"] == SENSOR_NOISE for one in others):
+        return "The current fluctuates more at standstill, too: check its sensor and cable as well."
     if n < FEW_SESSIONS:
         return (
             f"Only {n} baseline session{'' if n == 1 else 's'}: how much healthy ones differ is "

@@ -126,9 +126,13 @@ def explain(
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
         found = _entry(change)
     grown = growth_at_rest(*noises)
-    if grown is None or (found is not None and not _heard_at_rest(found)):
+    if grown is None:
         return found
-    return _of_sensor(grown, found)
+    if found is None or _heard_at_rest(found):
+        return _of_sensor(grown, found)
+    noise = _of_sensor(grown, None)
+    others = [*found["others"], {key: noise[key] for key in OF_OTHERS}]
+    return {**found, "others": others, "why": [*found["why"], *noise["why"]]}
 
 
 def library_of(config: JointConfig) -> Library:

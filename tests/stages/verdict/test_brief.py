@@ -56,6 +56,17 @@ def test_a_harmless_cause_of_a_small_part_sends_nobody_away_from_the_gear(
     assert "colder grease" in told["inspect"]
 
 
+def test_a_sensor_s_noise_beside_friction_is_told():
+    cause = {"effect": "viscous", "interpretation": "friction", "origin": "joint"}
+    cause |= {"harmless": False, "share": 0.9, "others": [{"effect": "sensor_noise"}]}
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, Bundle([], {}), cause)
+    assert told["inspect"] == "Inspect the joint for friction."
+    assert "at standstill, too: check its sensor" in told["against"]
+
+
 def test_a_sensor_s_noise_sends_nobody_to_the_gear():
     cause = {"effect": "sensor_noise", "interpretation": "noise: check the sensor"}
     cause |= {"origin": "measurement", "harmless": False, "share": 0.9, "explained": 0.9}

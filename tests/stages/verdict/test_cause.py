@@ -146,7 +146,7 @@ def pushed(folder, extra_a, rest=0):
     return found
 
 
-def paused(folder, noise_a, ripple_a=0.0, logged=True):
+def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True):
     """Write four sessions of strokes with pauses: with a sensor's noise and a ripple."""
     rng = np.random.default_rng(2)
     still, way = np.zeros(100), 0.6 * (1 - np.cos(np.linspace(0, np.pi, 150)))
@@ -155,7 +155,7 @@ def paused(folder, noise_a, ripple_a=0.0, logged=True):
     spans = [(100 + 250 * n, 250 + 250 * n) for n in range(6)]
     found = []
     for k in range(4):
-        torque = (1 + 0.02 * rng.normal()) * np.tanh(speed / 0.02) + 0.8 * np.sin(q)
+        torque = friction * (1 + 0.02 * rng.normal()) * np.tanh(speed / 0.02) + 0.8 * np.sin(q)
         torque += ripple_a * np.sin(150 * q) * (speed != 0)
         sizes = noise_a * rng.normal(size=(q.size, 3))
         columns = {"axis1_current": (torque + sizes[:, 0]).astype(np.float32)}
@@ -190,6 +190,15 @@ def test_a_ripple_is_not_the_sensor_s_whatever_its_noise(tmp_path, noise_a):
     after, _ = paused(tmp_path / "after", noise_a, ripple_a=0.4)
     found = cause.explain(1, before, after, JointConfig())
     assert (found["effect"], found["origin"]) == ("ripple", "joint")
+
+
+def test_noise_beside_friction_is_told_beside_it(tmp_path):
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", 0.12, friction=2.0)
+    found = cause.explain(1, before, after, JointConfig())
+    assert found["effect"] in cause.FRICTION
+    assert [other["effect"] for other in found["others"]] == ["sensor_noise"]
+    assert "fluctuates 4" in found["why"][-1]
 
 
 def test_hum_that_is_heard_at_standstill_stays_hum():
