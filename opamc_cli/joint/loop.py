@@ -208,6 +208,7 @@ def _opened(
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
+        unknown |= not at_noise and any(not one.term.effect.unnamed for one in refused)
         verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None

@@ -221,6 +221,19 @@ def test_a_payload_that_only_sealed_data_know_is_not_called_nothing():
     assert loop.rmse_after_a > 2 * loop.after.rmse(sealed=False)
 
 
+def test_what_is_found_and_taken_back_is_not_called_nothing():
+    plain, lacking = (
+        joint_of("cyclic", shape, strength=5.0) for shape in (None, SHAPES["stribeck"])
+    )
+    sealed = close(plain).before.dataset.sharp.sealed
+    hidden = lacking.current_a - plain.current_a
+    current_a = plain.current_a + np.where(sealed, -1.0, 1.0) * hidden
+    loop = close(replace(plain, current_a=current_a))
+    assert (loop.steps, loop.predicts, loop.ceiling.certain) == ((), True, False)
+    assert loop.verdict == "not-in-library"
+    assert "does not hold on the sealed data" in {one.why_not for one in loop.rejected}
+
+
 def test_names_hold_where_a_function_of_time_does_not(monkeypatch):
     swaying = Term(unnamed_library()["unnamed_time"], {"degree": 8.0})
     monkeypatch.setattr(loop_module, "worth_their_price", lambda chain: extended(chain, swaying))

@@ -19,9 +19,8 @@ motions that was run three times, every fourth block is the same motion, which n
 have shown, and the last may be all that there is of a payload, a temperature or a speed."""
 FEWEST_RUNS = 4
 """Sealed as wholes: of two, a way there and a way back, one alone would show no friction."""
-FEWEST_PER_BLOCK = 20
-"""Samples: some four per coefficient of the declared effects."""
-FEWEST_MOVING = BLOCKS * FEWEST_PER_BLOCK
+FEWEST_MOVING = 20 * BLOCKS
+"""Samples: in a block some four per coefficient of the declared effects."""
 
 
 @dataclass(frozen=True)
@@ -86,16 +85,13 @@ def group_samples(
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
-    little moves to seal anything off. Groups are cycles, if there are six; else recordings, if
-    there are four; else blocks of equal moving time. Of every twelve the third, sixth and tenth are
-    sealed.
+    little moves to seal anything off. Groups are cycles, if there are six, else recordings, if four,
+    else blocks of equal moving time. Of every twelve the third, sixth and tenth are sealed.
     """
     runs = [(start, stop, name) for (start, stop), name in zip(bounds, run_names, strict=True)]
     cycles = [] if period is None else [one for run in runs for one in _cycles(*run, period)]
-    for kind, pieces, fewest in (
-        ("cycles", cycles, FEWEST_CYCLES),
-        ("recordings", runs, FEWEST_RUNS),
-    ):
+    kinds = ("cycles", cycles, FEWEST_CYCLES), ("recordings", runs, FEWEST_RUNS)
+    for kind, pieces, fewest in kinds:
         moves = [piece for piece in pieces if moving[piece[0] : piece[1]].sum() >= 0.1 * rate_hz]
         if len(moves) >= fewest:
             group = np.full(moving.size, -1, dtype=np.int64)
