@@ -85,8 +85,8 @@ def group_samples(
     """Split recordings into groups and seal some of them, before anything else is looked at.
 
     Of moving samples, bool (n,); `period` is that of a cycle, if the motion repeats. None where too
-    little moves to seal anything off. Groups are cycles, if there are six, else recordings, if four,
-    else blocks of equal moving time. Of every twelve the third, sixth and tenth are sealed.
+    little moves to seal anything off. Groups are cycles, if there are six; else runs, if there are
+    four; else blocks of equal moving time. Of every twelve the third, sixth and tenth are sealed.
     """
     runs = [(start, stop, name) for (start, stop), name in zip(bounds, run_names, strict=True)]
     cycles = [] if period is None else [one for run in runs for one in _cycles(*run, period)]
