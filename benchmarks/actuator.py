@@ -15,6 +15,7 @@ import argparse
 import tempfile
 from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import combinations
 from math import comb
 from pathlib import Path
@@ -26,7 +27,8 @@ from numpy.typing import NDArray
 from sklearn.ensemble import IsolationForest
 
 from opamc_cli.config import load_config
-from opamc_cli.decision.judge import Bundle, Judgement, judge
+from opamc_cli.decision.judge import Bundle, Judgement
+from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
@@ -90,7 +92,7 @@ class Machine:
         sides = Sides(part(self.sides[HEALTHY], baseline), part(self.sides[state], target))
         bundle = bundles(sides)[1]
         kept = {name: one for name, one in bundle.witnesses.items() if name != without}
-        return judge({1: Bundle(bundle.cells, kept)})[1], bundle
+        return judge_without_odd({1: replace(bundle, witnesses=kept)})[1][1], bundle
 
 
 def part(side: Side, runs: Sequence[str]) -> Side:

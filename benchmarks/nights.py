@@ -26,7 +26,7 @@ from scipy.stats import kstest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.decision.judge import judge
+from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles
@@ -184,7 +184,7 @@ def judged(
     for one in targets:
         bundle = bundles(Sides(own, by_files(made[f"target-{one.name}"], by_file)))[AXIS]
         kept = {name: kind for name, kind in bundle.witnesses.items() if name not in without}
-        judgement = judge({AXIS: replace(bundle, witnesses=kept)})[AXIS]
+        judgement = judge_without_odd({AXIS: replace(bundle, witnesses=kept)})[1][AXIS]
         found[one] = (judgement.p_value, judgement.state)
     return found
 

@@ -21,6 +21,23 @@ baselines lose their end, by 1 and by 10 % three (docs/decision.md)."""
 UNHEALTHY = ("changed", "fault")
 
 
+def judge_without_odd(
+    bundles: Mapping[int, Bundle], policy: Policy | None = None, in_time: Sequence[str] = ()
+) -> tuple[dict[int, Bundle], dict[int, Judgement], dict[int, tuple[str, ...]]]:
+    """Judge a robot's joints, each without the sessions of its baseline that no healthy ones are.
+
+    Returns
+    -------
+    tuple
+        Bundles without these sessions, what `judge` makes of them, and the sessions, by axis.
+    """
+    policy = policy or Policy()
+    judgements = judge(bundles, policy)
+    odd = odd_sessions(bundles, judgements, policy, in_time)
+    kept = dict(bundles) | {axis: bundles[axis].without(names) for axis, names in odd.items()}
+    return kept, judge(kept, policy) if odd else judgements, odd
+
+
 def odd_sessions(
     bundles: Mapping[int, Bundle],
     judgements: Mapping[int, Judgement],

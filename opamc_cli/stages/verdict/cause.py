@@ -130,9 +130,9 @@ def explain(
         return found
     if found is None or _heard_at_rest(found):
         return _of_sensor(grown, found)
-    noise = _of_sensor(grown, None)
-    others = [*found["others"], {key: noise[key] for key in OF_OTHERS}]
-    return {**found, "others": others, "why": [*found["why"], *noise["why"]]}
+    sensor = _of_sensor(grown, None)
+    others = [*found["others"], {key: sensor[key] for key in OF_OTHERS}]
+    return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
 
 
 def library_of(config: JointConfig) -> Library:

@@ -13,8 +13,8 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.each_session import LoneSession, each_session
-from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy, judge
-from opamc_cli.decision.odd_session import odd_sessions
+from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
+from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
@@ -174,12 +174,9 @@ def decide(sides: Sides, config: Config) -> Decided:
     Of the options those of section `score` are used.
     """
     policy = policy_of(config.score)
-    known = bundles(sides)
-    judgements = judge(known, policy)
-    odd = odd_sessions(known, judgements, policy, in_time(sides.baseline, sides.sessions[0]))
-    if odd:
-        known |= {axis: known[axis].without(sessions) for axis, sessions in odd.items()}
-        judgements = judge(known, policy)
+    known, judgements, odd = judge_without_odd(
+        bundles(sides), policy, in_time(sides.baseline, sides.sessions[0])
+    )
     each, alone = each_session(known, policy), {}
     for axis, by_session in each.items():
         worst = max(by_session, key=lambda one: _concern(one.judgement), default=None)
