@@ -14,14 +14,9 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.signal.align import align
-from opamc_cli.signal.identification import (
-    UNIDENTIFIED,
-    MatchRule,
-    SegmentFeatures,
-    find_reference,
-    identify,
-    identify_anywhere,
-)
+from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
+from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
+from opamc_cli.signal.cycles.reference import find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
 from opamc_cli.stages.chain.kept import KeptResults, remembered

@@ -6,72 +6,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFeatures
+
 UNIDENTIFIED = -1
-
-SAME_PROGRAM = 0.05
-"""Relative difference of durations and speeds below which a cycle is another one's motion, whatever
-it draws. Of half of its segments: the edges of short ones move with the current."""
-
-REPEATED = 2.0
-"""Squared distance of segments, in their spreads, within which a shift repeats a series: of the
-true shift it is below 0.01 in a noisy closed loop and up to 1.7 in a joint of the testbed that
-hardly draws a current, of others it is 2.1 to 28."""
-
-Floats = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-
-
-@dataclass(frozen=True)
-class SegmentFeatures:
-    """What identification knows of a series of segments, in time order; each of shape (n,)."""
-
-    variance: Floats
-    """Variance of the current, A², > 0."""
-    duration_s: Floats
-    """Length, s."""
-    f_max_hz: Floats
-    """Largest fundamental frequency reached, Hz."""
-    direction: Ints
-    """-1, 0 (unknown) or 1."""
-    pause_s: Floats
-    """Standstill before the segment, s; NaN where the recording starts too late to know."""
-
-    def __len__(self) -> int:
-        """Return the number of segments."""
-        return len(self.variance)
-
-    def part(self, start: int, stop: int) -> "SegmentFeatures":
-        """Return the segments start..stop (half-open)."""
-        return self.take(np.arange(start, stop))
-
-    def take(self, indices: Ints) -> "SegmentFeatures":
-        """Return some segments."""
-        return SegmentFeatures(
-            self.variance[indices],
-            self.duration_s[indices],
-            self.f_max_hz[indices],
-            self.direction[indices],
-            self.pause_s[indices],
-        )
-
-
-@dataclass(frozen=True)
-class MatchRule:
-    """When a series of segments is the reference cycle once more."""
-
-    min_similarity: float = 0.9
-    """Least cosine similarity of the variance vectors, 0..1."""
-    duration_tolerance: float = 0.35
-    f_max_tolerance: float = 0.25
-    """With `duration_tolerance`: largest relative difference of each segment from its reference."""
-    use_direction: bool = True
-    """Whether known directions must agree."""
-    middle_tolerance: float | None = None
-    """Within which half of the segments have to be."""
-
-    def by_motion(self) -> "MatchRule":
-        """Return the rule for a current that is like nothing: a gross fault changes every one."""
-        return replace(self, min_similarity=0.0, middle_tolerance=SAME_PROGRAM)
 
 
 @dataclass(frozen=True)
@@ -177,84 +114,6 @@ def identify_anywhere(
             motion = np.where(taken, order[turned.motion], UNIDENTIFIED)
             best, most = replace(turned, motion=motion), worth
     return best
-
-
-def find_reference(
-    segments: SegmentFeatures, rule: MatchRule, segments_per_cycle: int | None = None
-) -> tuple[int, int]:
-    """Find a reference cycle in a series of segments by its own repetition.
-
-    Parameters
-    ----------
-    segments
-        In time order, at least one.
-    rule
-        As for `identify`.
-    segments_per_cycle
-        Motions in a cycle, where known.
-
-    Returns
-    -------
-    tuple of int
-        Half-open interval (start, stop) of segments: the first full cycle.
-    """
-    n = segments_per_cycle or period(segments)
-    n = min(n, len(segments))
-    starts = range(len(segments) - n + 1)[: max(n, 1)]
-    # the first of the shifts that yield the most cycles; of equal ones, the one after the
-    # longest pause: a program waits between its cycles, if anywhere. Where motions are alike, the
-    # series may hold more cycles beside a shift than at it: that one would not know itself again
-    counts = []
-    for start in starts:
-        found = identify(segments.part(start, start + n), segments, rule)
-        itself = np.array_equal(found.motion[start : start + n], np.arange(n))
-        counts.append(int(found.cycle.max(initial=-1)) if itself else UNIDENTIFIED)
-    most = [s for s, count in zip(starts, counts, strict=True) if count == max(counts)]
-    pauses = [_median_pause(segments.pause_s[s::n]) for s in most]
-    start = most[int(np.argmax(pauses))] if _clearly_longer(pauses) else most[0]
-    return start, start + n
-
-
-def period(segments: SegmentFeatures) -> int:
-    """Return the smallest number of segments after which the series repeats itself.
-
-    For every shift the squared differences of log variance, log duration, log f_d,max and
-    direction are summed, each in units of its own spread over the series, and their median
-    taken, so that a few missing or extra segments do not matter. The smallest shift wins whose
-    median is within a factor of the best one's. Differences below 5 % count as none. A shift by
-    more than half of the series counts where no shorter one repeats it and two pairs are left;
-    what nothing repeats is one period.
-    """
-    m = len(segments)
-    if m < 2:
-        return max(m, 1)
-    columns = []
-    for values in (segments.variance, segments.duration_s, segments.f_max_hz):
-        logs = np.log(np.maximum(values, 1e-12))
-        columns.append(logs / max(float(logs.std()), 0.05))
-    turning = segments.direction.astype(np.float64)
-    columns.append(2.0 * turning)
-    features = np.column_stack(columns)
-    distance = np.array(
-        [np.median(((features[k:] - features[:-k]) ** 2).sum(axis=1)) for k in range(1, m)]
-    )
-    by_half, beyond = distance[: m // 2], distance[m // 2 : -1]
-    if by_half.min() <= REPEATED:
-        return 1 + int(np.argmax(by_half <= max(4.0 * float(by_half.min()), 0.5)))
-    if beyond.size and beyond.min() <= REPEATED:
-        return 1 + m // 2 + int(beyond.argmin())
-    return m
-
-
-def _median_pause(pauses: Floats) -> float:
-    known = pauses[np.isfinite(pauses)]
-    return float(np.median(known)) if known.size else 0.0
-
-
-def _clearly_longer(pauses: list[float]) -> bool:
-    # dwell times jitter: a longest pause that is only a little longer says nothing
-    ordered = sorted(pauses, reverse=True)
-    return len(ordered) > 1 and ordered[0] > 1.5 * ordered[1]
 
 
 def _agreement(
