@@ -28,6 +28,11 @@ class SegmentFeatures:
     pause_s: Floats
     """Standstill before the segment, s; NaN where the recording starts too late to know."""
 
+    @property
+    def way(self) -> Floats:
+        """How far each segment goes at most, in turns of its carrier: speed times length."""
+        return self.f_max_hz * self.duration_s
+
     def __len__(self) -> int:
         """Return the number of segments."""
         return len(self.variance)

@@ -1,11 +1,11 @@
 """Identification of cycles and motions by the similarity of variance vectors."""
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from opamc_cli.signal.cycles.alignment import MISSING, aligned_windows, small
 from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFeatures
 
 UNIDENTIFIED = -1
@@ -59,9 +59,10 @@ def identify(
 
     Variances are positive, so two cycles of alike motions are similar at every shift. A window
     is therefore a cycle only if each of its segments also agrees with its reference in
-    duration, f_d,max and direction. Of the windows that pass, the most that do not overlap are
-    taken, and among equally many those of the largest similarity. What fits nothing stays
-    unidentified.
+    duration, f_d,max and direction. A window may lack a small segment of the reference, or have one
+    more between its motions (`opamc_cli.signal.cycles.alignment`), and is compared without. Of the
+    windows that pass, the most that do not overlap are taken, among equally many those with the
+    most motions, then those of the largest similarity. What fits nothing stays unidentified.
 
     Parameters
     ----------
@@ -81,14 +82,18 @@ def identify(
     cycle = np.full(m, UNIDENTIFIED, dtype=np.int64)
     motion = np.full(m, UNIDENTIFIED, dtype=np.int64)
     best_similarity = np.zeros(m)
-    similarity = sliding_similarity(reference.variance, segments.variance)
-    for k, value in enumerate(similarity):
+    for k, value in enumerate(sliding_similarity(reference.variance, segments.variance)):
         best_similarity[k : k + n] = np.maximum(best_similarity[k : k + n], value)
-    fits = (similarity >= rule.min_similarity) & _agreement(reference, segments, rule)
-    for index, k in enumerate(_most_windows(fits, similarity, n)):
-        cycle[k : k + n] = index
-        motion[k : k + n] = np.arange(n)
-        best_similarity[k : k + n] = similarity[k]
+    if not n:
+        return Identification(cycle, motion, best_similarity)
+    windows = _windows(reference, segments, rule)
+    similarity = _similarity(reference.variance, segments.variance, windows)
+    fits = similarity >= rule.min_similarity
+    for index, k in enumerate(_most_windows(windows, fits, similarity)):
+        motions = np.flatnonzero(windows[k] != MISSING)
+        own = windows[k, motions]
+        cycle[own], motion[own] = index, motions
+        best_similarity[own] = similarity[k]
     return Identification(cycle, motion, best_similarity)
 
 
@@ -116,51 +121,74 @@ def identify_anywhere(
     return best
 
 
-def _agreement(
-    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
-) -> npt.NDArray[np.bool_]:
-    """Tell of every window whether each of its segments agrees with its reference by itself."""
-    n = len(reference)
-    if len(segments) < n or n == 0:
-        return np.zeros(0, dtype=bool)
+def _windows(reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule) -> Ints:
+    """Return windows each of whose segments agrees with its reference by itself.
 
-    def windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return np.lib.stride_tricks.sliding_window_view(values, n)
-
-    agree = np.ones((len(segments) - n + 1, n), dtype=bool)
+    Shape (k, n), in the order of their first segments: which segment each motion is.
+    """
+    n, m = len(reference), len(segments)
+    agree = np.ones((m, n), dtype=bool)
+    beyond = []
     for have, want, tolerance in (
         (segments.duration_s, reference.duration_s, rule.duration_tolerance),
         (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
     ):
-        difference = np.abs(windows(have) - want)
+        difference = np.abs(have[:, np.newaxis] - want)
         agree &= difference <= tolerance * want
         if rule.middle_tolerance is not None:
-            beyond = difference - rule.middle_tolerance * want
-            agree &= np.median(beyond, axis=1, keepdims=True) <= 0
+            beyond.append(difference - rule.middle_tolerance * want)
     if rule.use_direction:
-        agree &= windows(segments.direction) * reference.direction >= 0
-    return np.asarray(agree.all(axis=1))
+        agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
+    extra, optional = small(segments, reference), small(reference, reference)
+    if extra.any() or optional.any():
+        windows = aligned_windows(agree, extra, optional)
+    else:
+        windows = np.arange(max(m - n + 1, 0))[:, np.newaxis] + np.arange(n)
+        windows = windows[agree[windows, np.arange(n)].all(axis=1)]
+    there = windows != MISSING
+    fits = there.any(axis=1)
+    for values in beyond:
+        own = np.where(there, values[windows, np.arange(n)], np.nan)
+        fits[fits] &= np.nanmedian(own[fits], axis=1) <= 0
+    fitting: Ints = windows[fits]
+    return fitting
 
 
-def _most_windows(fits: npt.NDArray[np.bool_], similarity: Floats, n: int) -> list[int]:
-    """Choose windows that do not overlap: the most of them, then the most similar."""
-    m = len(fits)
-    # best[k]: (count, total similarity, first chosen window or -1) for windows k and later
-    best: list[tuple[int, float]] = [(0, 0.0)] * (m + n + 1)
-    take = [False] * m
-    for k in range(m - 1, -1, -1):
+def _similarity(reference_variance: Floats, variance: Floats, windows: Ints) -> Floats:
+    """Cosine similarity of each window with the motions of the reference that it has; (k,)."""
+    there = windows != MISSING
+    own, wanted = np.where(there, variance[windows], 0.0), np.where(there, reference_variance, 0.0)
+    norms = np.linalg.norm(own, axis=1) * np.linalg.norm(wanted, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        similarity = (own * wanted).sum(axis=1) / norms
+    return np.clip(np.where(norms > 0, similarity, 0.0), 0.0, 1.0)
+
+
+def _most_windows(windows: Ints, fits: npt.NDArray[np.bool_], similarity: Floats) -> list[int]:
+    """Choose windows that do not overlap: the most, with the most motions, then the most similar.
+
+    Windows, shape (k, n), come in the order of their first segments.
+    """
+    found = (windows != MISSING).sum(axis=1).tolist()
+    stops = windows.max(axis=1, initial=MISSING) + 1
+    starts = np.where(windows == MISSING, stops[:, np.newaxis], windows).min(axis=1)
+    after = np.searchsorted(starts, stops).tolist()
+    # best[k]: windows, motions and total similarity of the best choice among window k and later
+    best: list[tuple[int, int, float]] = [(0, 0, 0.0)] * (len(windows) + 1)
+    take = [False] * len(windows)
+    for k in range(len(windows) - 1, -1, -1):
         best[k] = best[k + 1]
         if fits[k]:
-            after = best[min(k + n, m)]
-            with_k = (after[0] + 1, after[1] + float(similarity[k]))
+            count, motions, total = best[after[k]]
+            with_k = (count + 1, motions + found[k], total + float(similarity[k]))
             # at equal worth the earlier window: cycles count from the recording's start
-            if with_k >= (best[k + 1][0], best[k + 1][1] - 1e-12):
+            if with_k >= (*best[k + 1][:2], best[k + 1][2] - 1e-12):
                 best[k], take[k] = with_k, True
     chosen, k = [], 0
-    while k < m:
+    while k < len(windows):
         if take[k]:
             chosen.append(k)
-            k += n
+            k = after[k]
         else:
             k += 1
     return chosen

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from opamc_cli.signal.cycles.features import Floats, MatchRule, SegmentFeatures
+from opamc_cli.signal.cycles.alignment import small
+from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify
 
 REPEATED = 2.0
@@ -15,6 +16,9 @@ def find_reference(
     segments: SegmentFeatures, rule: MatchRule, segments_per_cycle: int | None = None
 ) -> tuple[int, int]:
     """Find a reference cycle in a series of segments by its own repetition.
+
+    Small segments that are not in every cycle hide the repetition: where the others, looked at
+    alone, tell more of themselves, theirs is the cycle.
 
     Parameters
     ----------
@@ -30,6 +34,39 @@ def find_reference(
     tuple of int
         Half-open interval (start, stop) of segments: the first full cycle.
     """
+    found = _repeating(segments, rule, segments_per_cycle)
+    large = np.flatnonzero(~small(segments, segments))
+    if segments_per_cycle or large.size == len(segments):
+        return found
+    start, stop = _repeating(segments.take(large), rule, None)
+    own = int(large[start]), int(large[stop]) if stop < large.size else int(large[-1]) + 1
+    (told, regular), (of_large, _) = (_told(segments, large, cycle, rule) for cycle in (found, own))
+    # small ones that are always there may tell apart two halves of a program
+    return own if of_large > told or (of_large == told and not regular) else found
+
+
+def _told(
+    segments: SegmentFeatures, which: Ints, cycle: tuple[int, int], rule: MatchRule
+) -> tuple[float, bool]:
+    """Share of some segments that a cycle tells, and whether none is extra or missing.
+
+    None if it finds itself alone, or not itself.
+    """
+    start, stop = cycle
+    found = identify(segments.part(start, stop), segments, rule)
+    itself = np.array_equal(found.motion[start:stop], np.arange(stop - start))
+    if not itself or found.cycle.max() < 1:
+        return 0.0, False
+    told = found.cycle > UNIDENTIFIED
+    within = np.flatnonzero(told)
+    extra = not told[within[0] : within[-1]].all()
+    missing = np.count_nonzero(told) < (stop - start) * (found.cycle.max() + 1)
+    return float(np.mean(told[which])), not extra and not missing
+
+
+def _repeating(
+    segments: SegmentFeatures, rule: MatchRule, segments_per_cycle: int | None
+) -> tuple[int, int]:
     n = segments_per_cycle or period(segments)
     n = min(n, len(segments))
     starts = range(len(segments) - n + 1)[: max(n, 1)]

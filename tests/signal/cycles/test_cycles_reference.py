@@ -1,3 +1,5 @@
+from itertools import combinations
+
 import numpy as np
 import pytest
 
@@ -78,3 +80,41 @@ def test_differences_of_half_a_squared_spread_are_no_period(height, n):
     logs = [*range(height), *range(height, 0, -1)] * 3
     rows = [(np.exp(x), 1.0, 314.0, 1, 0.3) for x in logs]
     assert period(series(rows, noise=0)) == n
+
+
+# a creep at a stop, of 2 % of the way of the others
+CREEP = (0.4, 0.2, 40.0, -1, 0.02)
+
+
+def with_creeps(places, n_cycles=6):
+    """Return cycles of which some have a creep before their third motion."""
+    rows = [
+        row
+        for k in range(n_cycles)
+        for row in ([*CYCLE[:2], CREEP, *CYCLE[2:]] if k in places else CYCLE)
+    ]
+    return series(rows, seed=sum(places))
+
+
+@pytest.mark.parametrize("n", range(7))
+def test_creeps_in_any_cycles_hide_no_motion(n):
+    """Of all choices of cycles but every other one, which is a longer cycle (below)."""
+    for places in set(combinations(range(6), n)) - {(0, 2, 4), (1, 3, 5)}:
+        segments = with_creeps(places)
+        start, stop = find_reference(segments, RULE)
+        found = identify(segments.part(start, stop), segments, RULE)
+        large = segments.f_max_hz > 100
+        assert found.cycle[large].tolist() == np.repeat(range(6), 4).tolist(), places
+        assert (found.motion[start:stop] == np.arange(stop - start)).all()
+
+
+def test_a_small_motion_that_is_in_every_cycle_is_in_the_reference():
+    start, stop = find_reference(with_creeps(range(6)), RULE)
+    assert (start, stop) == (0, 5)
+
+
+def test_small_motions_may_tell_longer_cycles_apart():
+    """Two halves of a program that are alike but for it stay two: every large motion is told."""
+    for places in ((0, 2, 4), (1, 3, 5)):
+        start, stop = find_reference(with_creeps(places), RULE)
+        assert stop - start == 9
