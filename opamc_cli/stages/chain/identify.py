@@ -370,14 +370,16 @@ def _executions(parts: Sequence[_Axis], rule: MatchRule) -> bool:
         return False
     first = parts[0].features
     at_edge = _column(parts[0].rows, "edge").astype(bool)
-    large = ~small(first, first)
+    # at an edge a small segment is the beginning of a motion that is cut
+    asked = ~small(first, first) | at_edge
     for part in parts[1:]:
         own = part.features
         found = identify(first, own, rule)
         told = found.motion > UNIDENTIFIED
         there = np.zeros(len(first), dtype=bool)
         there[found.motion[told]] = True
-        if found.cycle.max() > 0 or not (told | small(own, first)).all() or not there[large].all():
+        known = told | (small(own, first) & ~_column(part.rows, "edge").astype(bool))
+        if found.cycle.max() > 0 or not known.all() or not there[asked].all():
             return False
         of_edge = told & at_edge[found.motion]
         ratio = own.duration_s[of_edge] / first.duration_s[found.motion[of_edge]]

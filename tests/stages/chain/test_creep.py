@@ -10,11 +10,11 @@ from opamc_cli.storage.runs import RunInfo, save_run
 
 RATE_HZ = 250.0
 CYCLES = 4
-STOPS = (0.0, 0.9, 0.2, 1.1)
+STOPS = (0.0, 0.9, 0.5, 2.0)
 """Places to which the joint moves in turn, rad."""
 
 
-def save(path, seed, creeps=(), way=0.02, first_rest=150):
+def save(path, seed, creeps=(), way=0.02, first_rest=150, stop=None):
     """Four motions round and round; after the second of some cycles the joint creeps on.
 
     It comes back with the next motion, as where another joint has pulled at it.
@@ -23,7 +23,7 @@ def save(path, seed, creeps=(), way=0.02, first_rest=150):
     pieces, at = [np.full(first_rest, STOPS[0])], STOPS[0]
     for cycle in range(CYCLES):
         for number, to in enumerate((*STOPS[1:], STOPS[0])):
-            n = round(200 + 100 * abs(to - at))
+            n = round(100 + 250 * abs(to - at))
             pieces += [at + (to - at) * (0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n))]
             at, rest = to, 100
             if number == 1 and cycle in creeps:
@@ -37,7 +37,7 @@ def save(path, seed, creeps=(), way=0.02, first_rest=150):
     save_run(
         path,
         RunInfo(sampling_rate_hz=RATE_HZ),
-        {"axis1_current": current, "axis1_position": position},
+        {"axis1_current": current[:stop], "axis1_position": position[:stop]},
     )
 
 
@@ -90,3 +90,15 @@ def test_a_motion_of_a_tenth_of_the_others_way_is_one_of_the_program(tmp_path):
     assert found == [CREPT] * 2
     assert motions(tmp_path / "target", tmp_path / "t", reference)[1] == [CREPT]
     assert motions(tmp_path / "other", tmp_path / "o", reference)[1] == [[-1] * 4 * CYCLES]
+
+
+def test_a_motion_of_which_an_edge_leaves_little_is_no_creep(tmp_path):
+    """Nor are recordings whole executions of the program that are cut there."""
+    save(tmp_path / "whole/1.parquet", 1)
+    reference, _ = motions(tmp_path / "whole", tmp_path / "w")
+    eleventh, twelfth = (pq.read_table(reference).to_pylist()[k] for k in (10, 11))
+    for number, after in enumerate((eleventh["stop"] + 50, twelfth["start"] + 45)):
+        save(tmp_path / f"cut/{number}.parquet", number, stop=after)
+    _, (without, cut) = motions(tmp_path / "cut", tmp_path / "c")
+    assert without == [*PLAIN[:8], -1, -1, -1]
+    assert cut == [*without, -1]
