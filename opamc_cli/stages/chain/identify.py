@@ -14,14 +14,10 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.signal.align import align
-from opamc_cli.signal.identification import (
-    UNIDENTIFIED,
-    MatchRule,
-    SegmentFeatures,
-    find_reference,
-    identify,
-    identify_anywhere,
-)
+from opamc_cli.signal.cycles.alignment import small
+from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
+from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
+from opamc_cli.signal.cycles.reference import find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
 from opamc_cli.stages.chain.kept import KeptResults, remembered
@@ -306,7 +302,7 @@ def _own_references(
         cycle = features.part(start, stop)
         found = identify(cycle, features, rule).cycle
         count = int(found.max(initial=-1)) + 1
-        repeats = count > 1 and np.mean(found >= 0) >= REPEATS
+        repeats = count > 1 and np.mean(found[~small(features, cycle)] >= 0) >= REPEATS
         if edges and not repeats and config.segments_per_cycle is None:
             start, stop, cycle, count = 0, len(features), features, 1
         # one recording may be odd, or show nothing twice: others tell whether it is the program
@@ -321,7 +317,42 @@ def _own_references(
                 worth,
                 _Reference(part.source, cycle, spans, cycle.f_max_hz, edges),
             )
-    return {axis: reference for axis, (_, reference) in best.items()}
+    return {
+        axis: _without_chance(reference, [part for part in parts if part.axis == axis], rule)
+        for axis, (_, reference) in best.items()
+    }
+
+
+def _without_chance(reference: _Reference, parts: Sequence[_Axis], rule: MatchRule) -> _Reference:
+    """Leave out small segments that are not in every cycle: they would be compared by chance."""
+    cycle = reference.features
+    doubtful = small(cycle, cycle)
+    if not doubtful.any():
+        return reference
+    always = np.ones(len(cycle), dtype=bool)
+    for part in parts:
+        found = identify_anywhere(cycle, part.features.take(_usable(part, reference)), rule)
+        n_cycles = found.cycle.max(initial=UNIDENTIFIED) + 1
+        always &= np.bincount(found.motion + 1, minlength=len(cycle) + 1)[1:] >= n_cycles
+    kept = np.flatnonzero(always | ~doubtful)
+    rest = replace(
+        reference,
+        features=cycle.take(kept),
+        spans=tuple(reference.spans[i] for i in kept),
+        carrier_hz=reference.carrier_hz[kept],
+    )
+    # where both halves of a program are alike, only what is small may tell them apart
+    [own] = [part for part in parts if part.source == reference.source]
+    usable = _usable(own, reference)
+    motion = identify_anywhere(rest.features, own.features.take(usable), rule).motion
+    places = [_span(own.rows, i) for i in usable.tolist()]
+    found_again = [m == motion[places.index(span)] for m, span in enumerate(rest.spans)]
+    return rest if all(found_again) else reference
+
+
+def _usable(part: _Axis, reference: _Reference) -> npt.NDArray[np.int64]:
+    """Return the indices of segments that are whole: at an edge if those of the reference are."""
+    return np.arange(part.rows.num_rows) if reference.edges else _whole(part)
 
 
 def _holds(part: _Axis, cycle: SegmentFeatures, rule: MatchRule) -> bool:
@@ -339,11 +370,19 @@ def _executions(parts: Sequence[_Axis], rule: MatchRule) -> bool:
         return False
     first = parts[0].features
     at_edge = _column(parts[0].rows, "edge").astype(bool)
+    # at an edge a small segment is the beginning of a motion that is cut
+    asked = ~small(first, first) | at_edge
     for part in parts[1:]:
         own = part.features
-        if len(own) != len(first) or (identify(first, own, rule).cycle < 0).any():
+        found = identify(first, own, rule)
+        told = found.motion > UNIDENTIFIED
+        there = np.zeros(len(first), dtype=bool)
+        there[found.motion[told]] = True
+        known = told | (small(own, first) & ~_column(part.rows, "edge").astype(bool))
+        if found.cycle.max() > 0 or not known.all() or not there[asked].all():
             return False
-        ratio = own.duration_s[at_edge] / first.duration_s[at_edge]
+        of_edge = told & at_edge[found.motion]
+        ratio = own.duration_s[of_edge] / first.duration_s[found.motion[of_edge]]
         if (np.abs(ratio - 1) > SAME_DURATION).any():
             return False
     return True
@@ -400,8 +439,7 @@ def _identify_part(job: _Job) -> pa.Table:
     f_max_hz = np.full(n, np.nan)
     samples = np.zeros(n, dtype=np.int64)
     is_reference = np.zeros(n, dtype=bool)
-    # motions at the recording's edge are whole if those of the reference are
-    whole = np.arange(n) if reference is not None and reference.edges else _whole(part)
+    whole = _whole(part) if reference is None else _usable(part, reference)
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = identify_anywhere(reference.features, own, rule)

@@ -12,7 +12,10 @@ from opamc_cli.stages.verdict.agreement.whole import not_whole
 
 def side(role, spans):
     rows = [
-        {"run": run, "axis": 1, "cycle": cycle, "start": start, "stop": stop}
+        {
+            **{"run": run, "axis": 1, "cycle": cycle, "start": start, "stop": stop},
+            **{"reference": False, "edge": False},
+        }
         for run, cycle, start, stop in spans
     ]
     measured = [
@@ -35,6 +38,41 @@ def test_a_recording_that_is_much_shorter_is_told_so_first(stop, says):
     (why,) = unjudged(side("baseline", nights), target).axes[1]
     assert says in why
     assert why.startswith("The target: ")
+
+
+def moved(role, motions, fits):
+    """Return a recording of four cycles, of motions of some hundred samples at 100 Hz each."""
+    rows, stop = [], 0
+    for cycle in range(4):
+        for motion, length in enumerate(motions):
+            start, stop = stop + 50, stop + 50 + 100 * length
+            rows.append(
+                {
+                    **{"run": role, "axis": 1, "cycle": cycle if fits else -1, "motion": motion},
+                    **{"start": start, "stop": stop, "sampling_rate_hz": 100.0, "edge": False},
+                    **{"variance": 1.0, "f_max_hz": 9.0, "direction": 1},
+                    "reference": fits and cycle == 0,
+                }
+            )
+    measured = [SimpleNamespace(run=role, path=Path(role), axis=1, moves=True)]
+    return Side(role, measured, (), pa.Table.from_pylist(rows))
+
+
+@pytest.mark.parametrize(
+    ("motions", "says"),
+    [
+        ([2, 9, 4, 16], "one motion less: the baseline's motion 3, which lasts 6 s, is not there;"),
+        (
+            [2, 9, 4, 6, 1, 16],
+            "one motion more than the baseline's, its number 4, which lasts 1 s;",
+        ),
+        ([3, 5, 10, 20, 7], "another program or speed"),
+    ],
+)
+def test_a_motion_more_or_less_in_each_cycle_is_told(motions, says):
+    baseline = moved("baseline", [2, 9, 4, 6, 16], fits=True)
+    (why,) = unjudged(baseline, moved("target", motions, fits=False)).axes[1]
+    assert says in why
 
 
 def recorded(role, **runs):

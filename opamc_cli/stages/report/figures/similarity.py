@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from opamc_cli.signal.identification import sliding_similarity
+from opamc_cli.signal.cycles.identification import sliding_similarity
 from opamc_cli.stages.report.figures.figure import Figure, canvas, finish, style
 from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS
+from opamc_cli.stages.chain.identify import match_rule
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.segment import SegmentOutcome
 from opamc_cli.stages.verdict.agreement.exchanged import exchanged
@@ -90,6 +91,7 @@ class Agreement:
                 self.found[role],
                 read_table(path, "identify", MOTIONS),
                 record_at(path).get(OTHER_SPEEDS, {}),
+                match_rule(self.config),
             )
             for role, path in (("baseline", baseline), ("target", target))
         ]

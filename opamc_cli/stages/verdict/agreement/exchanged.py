@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from opamc_cli.config.models import IdentifyConfig
-from opamc_cli.signal.identification import identify
+from opamc_cli.signal.cycles.identification import identify
 from opamc_cli.stages.chain.identify import match_rule, segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured

@@ -10,8 +10,11 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
+from opamc_cli.signal.cycles.changed import OneOff, one_off
+from opamc_cli.signal.cycles.features import MatchRule
 from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.stages.chain.compared.speeds import of_another_speed
+from opamc_cli.stages.chain.identify import segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 from opamc_cli.stages.verdict.evidence import session_names
@@ -35,6 +38,8 @@ class Side:
     """Rows of the motion table."""
     slowness: Mapping[str, float] = field(default_factory=dict)
     """By run of another speed, how many times as long as the baseline's its motions last."""
+    rule: MatchRule = field(default_factory=MatchRule)
+    """When segments are a cycle."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""
@@ -166,9 +171,7 @@ def _lost(axis: int, side: Side, baseline: Side) -> dict[str, str]:
         elif pc.max(rows["cycle"]).as_py() < 0:
             ratio = side.slowness.get(measured.run)
             lost[measured.run] = (
-                _unfitting(axis, rows, _shortest(axis, baseline))
-                if ratio is None
-                else of_another_speed(ratio)
+                _unfitting(axis, rows, baseline) if ratio is None else of_another_speed(ratio)
             )
     return lost
 
@@ -185,7 +188,8 @@ def _idle(axis: int, side: Side) -> dict[str, str]:
     return idle
 
 
-def _unfitting(axis: int, rows: pa.Table, usual: int) -> str:
+def _unfitting(axis: int, rows: pa.Table, baseline: Side) -> str:
+    usual = _shortest(axis, baseline)
     count = f"all {rows.num_rows} segments" if rows.num_rows > 1 else "the only segment"
     unknown = f"{count} of axis {axis} fit no motion of the baseline's cycle"
     lasts = _lasts(rows)
@@ -195,10 +199,31 @@ def _unfitting(axis: int, rows: pa.Table, usual: int) -> str:
             f"{lasts / usual:.0%} as long as those of the shortest one, and {unknown}; record a "
             "whole cycle"
         )
+    differs = _one_off(axis, rows, baseline)
+    if differs is not None:
+        lasts_s = f"which lasts {differs.duration_s:.2g} s"
+        what = (
+            f"one motion more than the baseline's, its number {differs.motion}, {lasts_s}"
+            if differs.gained
+            else f"one motion less: the baseline's motion {differs.motion}, {lasts_s}, is not there"
+        )
+        return (
+            f"{unknown}: each of its cycles has {what}; all others fit. If the program was changed "
+            "on purpose, record a new baseline"
+        )
     return (
         f"{unknown}: another program or speed, another joint's channels, no cycle that repeats, or "
         "a fault that changes the motion itself"
     )
+
+
+def _one_off(axis: int, rows: pa.Table, baseline: Side) -> OneOff | None:
+    cycles = baseline.motions.filter(baseline.motions["reference"])
+    reference = cycles.filter(pc.equal(cycles["axis"], axis))
+    whole = rows.filter(pc.invert(rows["edge"]))
+    if not reference.num_rows or not whole.num_rows:
+        return None
+    return one_off(segment_features(reference), segment_features(whole), baseline.rule)
 
 
 def _shortest(axis: int, side: Side) -> int:

@@ -1,0 +1,1 @@
+"""Cycles of a program, and which motion of it a segment is."""

@@ -1,0 +1,71 @@
+"""What segments are identified by, and within which limits."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+SAME_PROGRAM = 0.05
+"""Relative difference of durations and speeds below which a cycle is another one's motion, whatever
+it draws. Of half of its segments: the edges of short ones move with the current."""
+
+Floats = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class SegmentFeatures:
+    """What identification knows of a series of segments, in time order; each of shape (n,)."""
+
+    variance: Floats
+    """Variance of the current, A², > 0."""
+    duration_s: Floats
+    """Length, s."""
+    f_max_hz: Floats
+    """Largest fundamental frequency reached, Hz."""
+    direction: Ints
+    """-1, 0 (unknown) or 1."""
+    pause_s: Floats
+    """Standstill before the segment, s; NaN where the recording starts too late to know."""
+
+    @property
+    def way(self) -> Floats:
+        """How far each segment goes at most, in turns of its carrier: speed times length."""
+        return self.f_max_hz * self.duration_s
+
+    def __len__(self) -> int:
+        """Return the number of segments."""
+        return len(self.variance)
+
+    def part(self, start: int, stop: int) -> "SegmentFeatures":
+        """Return the segments start..stop (half-open)."""
+        return self.take(np.arange(start, stop))
+
+    def take(self, indices: Ints) -> "SegmentFeatures":
+        """Return some segments."""
+        return SegmentFeatures(
+            self.variance[indices],
+            self.duration_s[indices],
+            self.f_max_hz[indices],
+            self.direction[indices],
+            self.pause_s[indices],
+        )
+
+
+@dataclass(frozen=True)
+class MatchRule:
+    """When a series of segments is the reference cycle once more."""
+
+    min_similarity: float = 0.9
+    """Least cosine similarity of the variance vectors, 0..1."""
+    duration_tolerance: float = 0.35
+    f_max_tolerance: float = 0.25
+    """With `duration_tolerance`: largest relative difference of each segment from its reference."""
+    use_direction: bool = True
+    """Whether known directions must agree."""
+    middle_tolerance: float | None = None
+    """Within which half of the segments have to be."""
+
+    def by_motion(self) -> "MatchRule":
+        """Return the rule for a current that is like nothing: a gross fault changes every one."""
+        return replace(self, min_similarity=0.0, middle_tolerance=SAME_PROGRAM)
