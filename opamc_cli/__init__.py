@@ -17,7 +17,7 @@ if TYPE_CHECKING:
         segment,
     )
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"
 __all__ = [
     "close_loop",
     "diagnose",
