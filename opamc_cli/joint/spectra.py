@@ -1,16 +1,12 @@
 """Order and frequency spectra of a residual, from samples that are uniform in time only."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins
 
-OVERSAMPLING = 4
-MOST_BINS = 2**21
-BINS_PER_WAVE = 16
 FEWEST_SAMPLES = 50
 MOST_TIME = 8
 """Pieces of a recording are put on its clock if it is at most so many times as long."""
@@ -46,42 +42,6 @@ def highest_folded(track: Track) -> float:
     # The highest order is what NYQUIST_SHARE of half the rate is at the median speed.
     per_hz = highest / (NYQUIST_SHARE * 0.5 * track.rate_hz)
     return max(highest, min(FOLDED * highest, FOLDED_HZ * per_hz))
-
-
-@dataclass(frozen=True)
-class AngleBins:
-    """Bins of an angle, and the orders of their spectrum, oversampled four times."""
-
-    width_rad: float
-    travel_rad: float
-    """Over which they lie; a longer one is wound up."""
-    orders: Floats
-    """Cycles per revolution, up to the highest; (k,)."""
-
-    @classmethod
-    def of(cls, travel_rad: float, top: float) -> "AngleBins":
-        """Lay bins over a travel, fine enough for the highest order.
-
-        A sample's angle is off by half a bin at most: 16 bins per shortest wave lose 1.3 %. A very
-        long travel is wound up by whole turns.
-        """
-        width, travel = 2 * np.pi / top / BINS_PER_WAVE, travel_rad + 1e-9
-        if travel / width > MOST_BINS:
-            travel = 2 * np.pi * max(int(MOST_BINS * width / (2 * np.pi)), 1)
-        step = 2 * np.pi / (cls._length(travel, width) * width)
-        return cls(width, travel, step * np.arange(int(top / step), dtype=np.float64))
-
-    @staticmethod
-    def _length(travel_rad: float, width_rad: float) -> int:
-        count = int(np.ceil(travel_rad / width_rad)) + 1
-        return int(next_fast_len(OVERSAMPLING * count, real=True))
-
-    def power(self, angle_rad: Floats, values: Floats) -> Floats:
-        """Power over the orders, (k,), of samples at angles from zero on, both (n,)."""
-        places = (angle_rad % self.travel_rad / self.width_rad).astype(np.int64)
-        length = self._length(self.travel_rad, self.width_rad)
-        power: Floats = np.abs(rfft(np.bincount(places, values), length)[: self.orders.size]) ** 2
-        return power
 
 
 def order_spectrum(

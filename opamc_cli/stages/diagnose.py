@@ -194,8 +194,8 @@ def _diagnose(
                 # a verdict must not be lost because its explanation failed on odd recordings
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
-            if found is not None and found["share"] >= LEAST_SHARE:
-                causes[axis] = found
+            if found is not None:  # empty: sought in vain
+                causes[axis] = found if found.get("share", 0.0) >= LEAST_SHARE else {}
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,

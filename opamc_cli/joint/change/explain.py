@@ -102,7 +102,11 @@ def explain_change(
     if not compared.sums(()).power[~late].any():
         return Change((), 0.0, False, why_not="no current in the baseline")
     population = learn(compared, terms, SESSIONS_DIFFER if cycles else 0.0)
-    compared = with_model(compared, population)
+    compared = plain = with_model(compared, population)
+    if not cycles:
+        compared = compared.less_repeated(terms)
+        population = learn(compared, terms)
+        compared = with_model(compared, population)
 
     slow = find_slow_causes(compared, population, library)
     residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
@@ -145,7 +149,7 @@ def explain_change(
     others = [cause for cause in causes if cause.origin != "environment"]
     excused = len(others) < len(causes) and not serious
     shift = slow[-1].shift if slow else None
-    if excused and rest_growth(compared, population, shift) >= GROWTH:
+    if excused and rest_growth(plain, population, shift) >= GROWTH:
         causes = others
     harmless = sum(cause.share for cause in causes if cause.harmless)
     return Change(

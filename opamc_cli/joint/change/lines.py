@@ -1,24 +1,22 @@
 """Order spectra of units, stroke by stroke, and the lines that grew."""
 
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
 
-from opamc_cli.joint.change.moderated import moderated_t
+from opamc_cli.decision.significance.moderated import moderated_t
 from opamc_cli.joint.change.slow import Shift, shift_current
-from opamc_cli.joint.change.units import Compared, own_fit
+from opamc_cli.joint.change.units import Compared, own_fit, stretches
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
 from opamc_cli.joint.spectra import (
     FEWEST_SAMPLES,
     LOWEST_ORDER,
-    OVERSAMPLING,
-    AngleBins,
     highest_order,
     vertex,
 )
+from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins
 
 SHORTEST_STROKE = 0.4
 """Cycles of the lowest order that is looked for: a turn of the motor."""
@@ -93,10 +91,9 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     # not end a stroke: the angle is known on both sides of them.
     logged = "logged" in track.channels
     side = track.direction if logged else np.where(rows, track.direction, 0.0)
-    edges = np.flatnonzero((np.diff(side) != 0) | (np.diff(track.group) != 0)) + 1
     shortest_rad = SHORTEST_STROKE * 2 * np.pi / LOWEST_ORDER[track.angle_kind]
     found = []
-    for first, last in pairwise([0, *edges, side.size]):
+    for first, last in stretches(side, track.group):
         counted = first + np.flatnonzero(rows[first:last])
         if side[first] == 0 or not counted.size:
             continue

@@ -54,6 +54,8 @@ STEEPEST_PER_C = 0.06
 
 SMALLEST_WARMTH_C, LARGEST_COLD_FACTOR = 2.0, 2.0
 
+LESS_FRICTION = "less friction, and no warmth that explains it: look for a lost preload, or wear-in"
+
 
 @dataclass(frozen=True, kw_only=True)
 class SlowCause(Cause):
@@ -111,6 +113,11 @@ class Grease:
         little = 1 / LARGEST_COLD_FACTOR < 1 + self.wet < LARGEST_COLD_FACTOR
         return not self.logged and self.mostly_wet and little
 
+    def warms(self, shift: Shift) -> bool:
+        """Whether friction falls by a shift, and warmth may be behind it, as far as is known."""
+        warm = not self.logged if self.warmer_c is None else self.warmer_c > 0
+        return warm and shift.falls > 0
+
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
         """Name it."""
         parameters: Parameters = {} if self.warmer_c is None else {"warmer_c": self.warmer_c}
@@ -118,6 +125,11 @@ class Grease:
             "colder or warmer grease: friction that grows with speed has changed (no temperature "
             "was logged: compare at equal temperature, and look at the grease if it remains)"
         )
+        if shift.falls:
+            meaning = (
+                "less friction, as in warmer grease or a joint that has run in (no temperature was "
+                "logged: compare at equal temperature, and look for a lost preload if it remains)"
+            )
         if self.warmer_c is not None:
             word = f"{'warmer' if self.warmer_c > 0 else 'colder'} grease"
             meaning = f"{word} (by {abs(self.warmer_c):.0f} °C; stiffer when cold), not a fault"
@@ -175,11 +187,11 @@ def find_slow_causes(
 def _one_grease(found: list[SlowCause], grease: Grease) -> list[SlowCause]:
     """Cold grease stiffens dry friction too, if less than viscous friction: that is one cause."""
     names = [cause.effect for cause in found]
-    pair = {"thermal_viscous", "coulomb"}
-    if not pair <= set(names) or not grease.mostly_wet:
+    alike = {"thermal_viscous", "coulomb"} if grease.mostly_wet else {"thermal_viscous"}
+    places = [place for place, name in enumerate(names) if name in alike]
+    if len(places) < 2 or "thermal_viscous" not in names:
         return found
-    first, last = sorted(names.index(name) for name in pair)
-    one = [*found]
+    first, last, one = places[0], places[1], [*found]
     one[first] = replace(found[names.index("thermal_viscous")], shift=found[first].shift)
     # Each cause's shift holds those before it: what comes before the later one takes it over.
     one[last - 1] = replace(one[last - 1], shift=found[last].shift)
@@ -199,9 +211,13 @@ def _next(
     for term in candidates:
         guesses[term.effect.name] = guesses.get(term.effect.name, 0) + 1
     best: dict[str, tuple[float, Shift]] = {}
+    declared = dict(zip(population.names, population.mean, strict=True))
     for shift in shifts(compared, population, chosen, candidates):
         name = shift.terms[-1].effect.name
-        if name in best:
+        # What falls by more than there was of it is no friction.
+        if name in best or (
+            name in FRICTION and shift.falls and shift.falls > declared.get(name, np.inf)
+        ):
             continue
         if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
             part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
@@ -247,8 +263,10 @@ def _next(
     if first == "payload_change":
         parameters, meaning = {}, "another payload (check the tool, not the gear)"
     names = (first, *ties)
-    if not GREASE.isdisjoint(names) and "thermal_viscous" in library and grease.plausible:
+    wet = not GREASE.isdisjoint(names) and grease.plausible
+    if "thermal_viscous" in library and (wet or grease.warms(shift)):
         return grease.cause(shift, p_value, names)
+    meaning = LESS_FRICTION if shift.falls else meaning
     return SlowCause(
         effect=first,
         parameters=parameters,

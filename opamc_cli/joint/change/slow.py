@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.change.moderated import moderated_covariance, shift_p
+from opamc_cli.decision.significance.moderated import moderated_covariance, shift_p
 from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.fit.model import Term, currents
 from opamc_cli.joint.fit.parts import Sums
@@ -65,6 +65,13 @@ class Shift:
     def last(self) -> "Shift":
         """The last term's part alone."""
         return replace(self, terms=self.terms[-1:], coefficients=self.coefficients[-self.width :])
+
+    @property
+    def falls(self) -> float:
+        """By how much the last term is less, where it is friction all over the travel; else 0."""
+        effect = self.terms[-1].effect
+        everywhere = effect.resists and not effect.at_a_place
+        return everywhere * max(-float(self.last.coefficients[0]), 0.0)
 
 
 def learn(compared: Compared, terms: tuple[Term, ...], between: float = 0.0) -> Population:

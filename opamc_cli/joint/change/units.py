@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -11,10 +12,18 @@ from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
-from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, coarsen, joined
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, Joint, Track, coarsen, joined
+from opamc_cli.signal.course import repeated_course
 from opamc_cli.signal.motion.smoothing import CORNER_WINDOW, averaging_kernel
 
 FEWEST_SAMPLES = 10
+MOSTLY = 0.5
+"""Share of the samples that must have a stroke alike for the load of other axes to be told."""
+
+COURSE_TURNS = {"motor": 1.0, "joint": 0.05}
+"""Turns of the machine angle between corners of that load's course: of a ripple, whose lowest order
+that matters is one a turn of the motor, next to nothing is in it. With 2.5 a third more of an arm's
+load was left; the same was named."""
 
 LOST = 2.0
 """Phases whose torque axis was followed wrongly leave this many times the usual residual."""
@@ -50,15 +59,65 @@ class Compared:
     def only(self, units: Bools) -> "Compared":
         """Leave units out, those that are not among (units,)."""
         number = np.append(np.where(units, np.cumsum(units) - 1, -1), -1)
-        grids = []
-        for grid in (self.dataset.fine, self.dataset.coarse):
-            group = number[grid.track.group]
-            moving = grid.track.moving & (group >= 0)
-            grids.append(grid_of(replace(grid.track, group=group, moving=moving), whole=True))
-        fine, coarse = grids
+        tracks = []
+        for track in (self.track, self.dataset.coarse.track):
+            group = number[track.group]
+            tracks.append(replace(track, group=group, moving=track.moving & (group >= 0)))
+        return self.along(tracks, self.after[units])
+
+    def along(self, tracks: Sequence[Track], after: Bools) -> "Compared":
+        """Put other tracks on the fine and on the coarse grid."""
+        fine, coarse = (grid_of(track, whole=True) for track in tracks)
         # Another dataset, for what was kept is of the other units.
         dataset = Dataset(fine, coarse, self.dataset.factor, self.dataset.grouping)
-        return Compared(dataset, self.after[units])
+        return Compared(dataset, after)
+
+    def enough(self) -> "Compared":
+        """Leave units out of which one of the grids shows next to nothing."""
+        shown = np.ones(self.after.size, dtype=bool)
+        for grid in (self.dataset.fine, self.dataset.coarse):
+            members = grid.track.group[grid.fit]
+            shown &= np.bincount(members, minlength=shown.size) >= FEWEST_SAMPLES
+        return self.only(shown)
+
+    def less_repeated(self, terms: Sequence[Term]) -> "Compared":
+        """Take out what terms leave of all baseline units alike: the load of other axes, above all.
+
+        Strokes that no other unit of the baseline has are left out; where that is most of the
+        motion, or nobody knows the place, nothing is taken.
+        """
+        spacing = 2 * np.pi * COURSE_TURNS.get(self.track.angle_kind, 0.0)
+        if "logged" not in self.track.channels or not spacing:
+            return self
+        tracks = []
+        for fine, grid in ((True, self.dataset.fine), (False, self.dataset.coarse)):
+            track, unit = grid.track, grid.track.group
+            late = np.append(self.after, False)[unit]
+            ways = [one for one in stretches(track.direction, unit) if track.direction[one[0]]]
+            # Of each unit's own fit: what its terms differ by is not to be shared.
+            columns = np.concatenate([self.dataset.columns(term, fine) for term in terms], axis=1)
+            own = own_fit(self, terms, fine)[0][:, : columns.shape[1]]
+            left = track.current_a - np.einsum("nk,nk->n", columns, own[unit])
+            left = np.where(grid.fit, left, np.nan)
+            course = repeated_course(track.machine_angle_rad, left, ways, unit, ~late, spacing)
+            known = np.isfinite(course)
+            if min(np.mean(known[grid.fit & side]) for side in (late, ~late)) < MOSTLY:
+                return self
+            course, usual = np.where(known, course, 0.0), known * track.model_a
+            # The current sensor's gain scales what the others ask, too.
+            power, moment = (
+                np.bincount(unit + 1, (usual + course) * one)
+                for one in (usual + course, track.current_a)
+            )
+            current = track.current_a - (moment / np.maximum(power, 1e-300))[unit + 1] * course
+            tracks.append(replace(track, current_a=current, moving=track.moving & known))
+        return self.along(tracks, self.after).enough()
+
+
+def stretches(side: Floats, group: Ints) -> list[tuple[int, int]]:
+    """Half-open stretches of one direction and one group, both (n,)."""
+    edges = np.flatnonzero((np.diff(side) != 0) | (np.diff(group) != 0)) + 1
+    return list(pairwise([0, *edges.tolist(), side.size]))
 
 
 Tracked = tuple[Track, Grouping]
@@ -114,12 +173,8 @@ def side_by_side(before: Sequence[Track], after: Sequence[Track]) -> Compared:
     factor = max(int(track.rate_hz / COARSE_RATE_HZ), int(width), 1)
     coarse = coarsen(track, factor)
     fine = replace(track, moving=track.moving & track.clear)
-    enough = np.ones(late.size, dtype=bool)
-    for grid in (fine, coarse):
-        members = grid.group[grid.moving & (grid.group >= 0)]
-        enough &= np.bincount(members, minlength=late.size) >= FEWEST_SAMPLES
     grouping = Grouping(track.group, (), (), "units")
-    return Compared(Dataset(grid_of(fine), grid_of(coarse), factor, grouping), late).only(enough)
+    return Compared(Dataset(grid_of(fine), grid_of(coarse), factor, grouping), late).enough()
 
 
 def own_fit(

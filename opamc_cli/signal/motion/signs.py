@@ -48,8 +48,9 @@ def lacks_sign(current: NDArray[np.floating], velocity_rad_s: NDArray[np.floatin
     Returns
     -------
     bool or None
-        False where it has both signs, the joint does not reverse, or it accelerates or rests as
-        under a load. None where the joint reverses under a current of one sign and neither tells.
+        False where it has both signs, the joint does not reverse, it never comes near zero, or it
+        accelerates or rests as under a load. None where the joint reverses under a current of one
+        sign and neither tells.
 
     Notes
     -----
@@ -62,7 +63,7 @@ def lacks_sign(current: NDArray[np.floating], velocity_rad_s: NDArray[np.floatin
     x = np.asarray(current, dtype=np.float64)
     v = np.asarray(velocity_rad_s, dtype=np.float64)
     known = np.isfinite(x) & np.isfinite(v)
-    if not known.any() or _has_both_signs(x[known]):
+    if not known.any() or _has_both_signs(x[known]) or _keeps_off_zero(x):
         return False
     fastest = float(np.quantile(np.abs(v[known]), 0.99))
     forth, back = known & (v > MOVING_SHARE * fastest), known & (v < -MOVING_SHARE * fastest)
@@ -82,6 +83,17 @@ def _has_both_signs(x: NDArray[np.float64]) -> bool:
     """Tell a signed current from a modulus that resampling made overshoot at its corner."""
     lowest, highest = float(x.min()), float(x.max())
     return min(-lowest, highest) > OVERSHOOT_SHARE * max(-lowest, highest)
+
+
+def _keeps_off_zero(x: NDArray[np.float64]) -> bool:
+    """Tell whether to change its sign a current had to step farther than it ever does.
+
+    Of 576 signed currents of an arm's simulator, at 25 to 500 Hz, twice the smallest size was 0.2
+    of the largest step of their modulus at most; of 126 under a load that outweighs all else, 0.67
+    to 5.6.
+    """
+    size = np.abs(x)
+    return 2.0 * float(np.nanmin(size)) > float(np.nanmax(np.abs(np.diff(size)), initial=0.0))
 
 
 def _grows_with_the_speed(

@@ -1,1 +1,1 @@
-"""Transforms of a stream: analytic signal, wavelets, short-time spectra."""
+"""Transforms of a stream: analytic signal, wavelets, short-time and order spectra."""

@@ -36,10 +36,12 @@ def brief(
     cause: Mapping[str, Any] | None,
     unit: str = "A",
     which: str | None = None,
+    *,
+    in_vain: bool = False,
 ) -> dict[str, Any] | None:
     """Return what a maintainer needs of an unhealthy joint; None for any other.
 
-    `which` says which of several target sessions show it.
+    `which` says which of several target sessions show it; `in_vain`, that a cause was sought.
 
     Returns
     -------
@@ -54,7 +56,7 @@ def brief(
         "evidence": [*([which] if which else []), *_evidence(judgement, bundle, unit)][
             :MOST_EVIDENCE
         ],
-        "against": _against(judgement, cause),
+        "against": _against(judgement, cause, in_vain),
     }
 
 
@@ -129,7 +131,7 @@ def _called(unit: str) -> str:
     return "torque" if unit == "Nm" else "current"
 
 
-def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
+def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: bool) -> str:
     n = judgement.n_baseline_sessions
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
@@ -150,6 +152,8 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None) -> str:
         return "The named cause explains less than half of the change."
     if cause is not None and cause.get("ties"):
         return f"The recordings cannot tell it from: {cause['ties'][0]}."
+    if in_vain:
+        return "No effect of the library explains it: repeat under the baseline's conditions."
     return (
         "Another payload, program, gain or temperature looks alike: repeat under the same "
         "conditions."

@@ -12,6 +12,7 @@ from opamc_cli.decision.at_rest import Fluctuation, Growth, fluctuation, growth_
 from opamc_cli.errors import OpamcError
 from opamc_cli.joint.change.explain import Change, explain_change
 from opamc_cli.joint.change.reading import Cause
+from opamc_cli.joint.change.search import LESS_FRICTION
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -101,7 +102,7 @@ def explain(
     -------
     dict or None
         The `cause` of verdict.json: an effect of the library, or noise of the sensor that is there
-        at standstill, too; None where neither explains the change, or where the runs do not hold
+        at standstill, too; empty where neither explains the change, None where the runs do not hold
         what a model of the joint needs.
 
     Raises
@@ -127,7 +128,7 @@ def explain(
         found = _entry(change)
     grown = growth_at_rest(*noises)
     if grown is None:
-        return found
+        return {} if found is None and change.why_not is None else found
     if found is None or _heard_at_rest(found):
         return _of_sensor(grown, found)
     sensor = _of_sensor(grown, None)
@@ -287,11 +288,12 @@ def _interpretation(cause: Cause) -> str:
     """Say what a cause means, and of friction whether it has grown, and by how much."""
     change = cause.evidence.get("relative_change")
     unsure = cause.effect in FRICTION and not FRICTION.isdisjoint(cause.ties)
-    meaning = ANY_FRICTION if unsure else cause.interpretation
+    own = cause.interpretation
+    meaning = ANY_FRICTION if unsure and own != LESS_FRICTION else own
     if change is None:
         return meaning
-    if not -1 < change < MUCH:
-        return f"{meaning}; it {'has grown much' if change > 0 else 'is gone'}"
+    if change >= MUCH:
+        return f"{meaning}; it has grown much"
     way = "grown" if change > 0 else "fallen"
     return f"{meaning}; it has {way} by {abs(change):.0%}"
 

@@ -49,6 +49,10 @@ CHECK_FIRST = (
     "It looks like {}. Check that before the gear, and record a new baseline if it is meant to "
     "stay."
 )
+IN_VAIN = (
+    "A cause was sought: no effect of the library explains the change (play in the gear and blows "
+    "of a bearing have none of their own there)."
+)
 CANNOT_TELL = (
     "The current says that the torque's course has changed, not what changed it: another payload, "
     "program, controller gain or temperature changes it too. Repeat the recording under the "
@@ -63,6 +67,8 @@ def reasons(
     sources: Mapping[str, Sequence[RunSource]],
     cause: Mapping[str, Any] | None = None,
     limits: ScoreConfig | None = None,
+    *,
+    in_vain: bool = False,
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -78,6 +84,8 @@ def reasons(
         The cause found for the change, if any.
     limits
         What a change has to exceed; None: the defaults.
+    in_vain
+        Whether a cause was sought, and none found.
 
     Returns
     -------
@@ -107,7 +115,7 @@ def reasons(
         if outside and judgement.state == "fault" and cause.get("effect") != SENSOR_NOISE:
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
-        sentences += [INSPECT, CANNOT_TELL]
+        sentences += [*[IN_VAIN] * in_vain, INSPECT, CANNOT_TELL]
     return [*sentences, *_short(cells)]
 
 

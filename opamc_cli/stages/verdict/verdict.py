@@ -227,7 +227,8 @@ def write(
     out
         Folder of verdict.json.
     causes
-        Cause of the change by axis, from closing the loop of the joint's model.
+        Cause of the change by axis, from closing the loop of the joint's model; empty where it was
+        sought in vain.
     complete
         Adds what is known of the diagnosis besides: joints that cannot be judged, notes, tables.
     """
@@ -258,7 +259,8 @@ def content(
     unit = current_unit([source for side in sides for source in side.sources])
     axes = []
     for axis, judgement in decided.judgements.items():
-        cause = believed(judgement, causes.get(axis), config.score)
+        in_vain = causes.get(axis) == {}
+        cause = believed(judgement, causes.get(axis) or None, config.score)
         final = _with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
@@ -287,7 +289,7 @@ def content(
         lacking = _not_compared(axis, decided)
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
-        said = reasons(final, bundle, motions, runs, cause, config.score)
+        said = reasons(final, bundle, motions, runs, cause, config.score, in_vain=in_vain)
         if which:  # after what the state does not tell
             said.insert(int(excused), which)
         axes.append(
@@ -310,7 +312,7 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "brief": brief(final, bundle, cause, unit, which),
+                "brief": brief(final, bundle, cause, unit, which, in_vain=in_vain),
                 "reasons": said,
             }
         )

@@ -237,7 +237,7 @@ def test_a_travel_of_more_bins_than_memory_allows_is_wound_up_by_whole_turns(
 ):
     tone = np.where(counted, np.cos(3 * units.track.machine_angle_rad), 0.0)
     whole = order_spectra(units, tone)
-    monkeypatch.setattr("opamc_cli.joint.spectra.MOST_BINS", whole.orders.size // 8)
+    monkeypatch.setattr("opamc_cli.signal.transform.angle_bins.MOST_BINS", whole.orders.size // 8)
     wound = order_spectra(units, tone)
     assert wound.orders.size < whole.orders.size / 2
     for spectra in (whole, wound):

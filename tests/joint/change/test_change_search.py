@@ -81,7 +81,9 @@ def test_friction_that_grows_with_the_speed_may_be_grease_where_no_temperature_i
     assert "viscous" in cause.ties
     # By a factor of two at most.
     assert causes_of(lambda q, v, a, t: 0.5 * v)[0].effect == "viscous"
-    assert causes_of(lambda q, v, a, t: -0.2 * v)[0].effect == "viscous"
+    # Less may be warmth, however much.
+    less = causes_of(lambda q, v, a, t: -0.2 * v)[0]
+    assert (less.effect, less.ties[0]) == ("thermal_viscous", "viscous")
     assert causes_of(thick, library=only("viscous"))[0].effect == "viscous"
 
 
@@ -129,6 +131,43 @@ def test_grease_of_another_temperature_is_stiffer_when_cold_and_not_by_more(
     if effect == "thermal_viscous":
         assert cause.parameters["warmer_c"] == pytest.approx(-colder, abs=0.1)
         assert "viscous" in cause.ties
+
+
+@pytest.mark.parametrize(
+    ("colder", "effect", "word"),
+    [
+        (None, "thermal_viscous", "less friction, as in warmer grease"),
+        (-15.0, "thermal_viscous", "warmer grease (by 15 °C"),
+        (0.0, "coulomb", search.LESS_FRICTION),  # as warm as ever
+    ],
+)
+def test_friction_that_falls_is_warmth_first_where_that_can_be(colder, effect, word):
+    """Grease amount and seals were to be checked where a hall was 22 degrees warmer."""
+    (cause,) = causes_of(lambda q, v, a, t: -0.2 * np.sign(v), colder=colder)
+    assert cause.effect == effect
+    assert word in cause.interpretation
+    assert cause.shift.falls == pytest.approx(0.2, abs=0.03)
+    assert cause.evidence["relative_change"] == pytest.approx(-0.4, abs=0.06)
+
+
+def test_dry_and_wet_friction_that_fall_are_one_cause():
+    found = causes_of(lambda q, v, a, t: -0.2 * np.sign(v) - 0.2 * v, spread=0.0)
+    assert [cause.effect for cause in found].count("thermal_viscous") == 1
+
+
+def test_what_falls_by_more_than_there_was_of_it_is_no_friction():
+    def less(q, v, a, t):
+        return -1.3 * COEFFICIENTS[3] * np.sign(v)
+
+    assert causes_of(less, library=only("coulomb", "viscous", "thermal_viscous")) == []
+
+
+def test_a_bump_that_is_gone_is_no_friction_that_falls():
+    def gone(q, v, a, t):
+        return -0.6 * np.sign(v) * np.exp(-(((q - np.median(q)) / 0.05) ** 2))
+
+    (cause, *_) = causes_of(gone, library=only("position_drag", "thermal_viscous"))
+    assert (cause.effect, cause.shift.falls) == ("position_drag", 0.0)
 
 
 def test_cold_grease_that_stiffens_dry_friction_a_little_is_one_cause():

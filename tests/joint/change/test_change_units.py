@@ -18,10 +18,12 @@ from sessions import (
     with_track,
 )
 
+from opamc_cli.joint.change.lines import fast_residuals
+from opamc_cli.joint.change.slow import learn, with_model
 from opamc_cli.joint.change.units import followed, own_fit, read_side, side_by_side
 from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.track import block_mean
+from opamc_cli.joint.motion.track import Joint, block_mean
 from opamc_cli.signal.motion.smoothing import CORNER_WINDOW, SHORTEST_WINDOW, averaging_kernel
 
 
@@ -155,3 +157,57 @@ def test_what_fits_badly_is_left_out(noisy, left):
     after = followed(by_phases(noisy), TERMS).after
     assert (np.count_nonzero(~after), np.count_nonzero(after)) == left
     assert followed(by_phases(noisy, after=0), TERMS).after.size == 3 - (2 in noisy)
+
+
+def beside(load, extra=None, before=4, after=2, joint=JOINT):
+    """Units of both sides under another axis's load, which the declared effects do not hold."""
+    sides = []
+    for seed, count, more in ((1, before, None), (2, after, extra)):
+        made = recordings(count, more, seed, spread=0.0)
+        v = np.gradient(made[0].position_rad)
+        asked = load * np.sin(5 * made[0].position_rad) * np.sign(v)
+        sides.append([replace(one, current_a=one.current_a + asked) for one in made])
+    units = side_by_side(*(read_side(side, joint, cycles=False) for side in sides))
+    return with_model(units, learn(units, TERMS))
+
+
+@pytest.mark.parametrize("joint", [JOINT, Joint()])
+def test_what_repeats_with_the_motion_is_taken_out(joint):
+    units = beside(0.5, joint=joint)
+    found = units.less_repeated(TERMS)
+    assert found.after.tolist() == units.after.tolist()
+    before, left = (own_fit(one, TERMS)[1] for one in (units, found))
+    assert before.min() > 0.05
+    assert left.max() < (0.02**2 if joint is JOINT else 0.1 * before.min())
+
+
+def test_what_the_target_has_besides_and_a_ripple_stay():
+    units = beside(0.5, lambda q, v, a, t: 0.2 * np.sign(v) + 0.1 * np.cos(2 * 50.0 * q))
+    found = units.less_repeated(TERMS)
+    dry = own_fit(found, TERMS)[0][:, 3]
+    assert dry[found.after] - dry[~found.after].mean() == pytest.approx(0.2, abs=0.02)
+    residual = fast_residuals(found, TERMS, None)
+    wave = np.exp(2j * found.track.machine_angle_rad)
+    rows = [rows_of(found, unit, True) for unit in (0, -1)]
+    held = [2 * abs(np.mean(wave[one] * residual[one])) for one in rows]
+    assert held == pytest.approx([0.0, 0.1], abs=0.02)
+
+
+def test_what_repeats_follows_the_sensor_s_gain():
+    units = beside(0.5)
+    late = np.append(units.after, False)
+    track = units.track
+    louder = with_track(units, current_a=track.current_a * np.where(late[track.group], 1.1, 1.0))
+    left = own_fit(louder.less_repeated(TERMS), TERMS, fine=True)[1]
+    assert left[units.after].max() < 1.3 * left[~units.after].max()
+
+
+def test_nothing_is_taken_where_strokes_do_not_repeat_or_nobody_knows_the_place():
+    units = beside(0.5)
+    phases = with_track(units, channels=frozenset({"phases"}))
+    assert phases.less_repeated(TERMS) is phases
+    late = np.append(units.after, False)
+    track = units.track
+    shifted = track.machine_angle_rad + np.where(late[track.group], 40.0, 0.0)
+    elsewhere = with_track(units, machine_angle_rad=shifted)
+    assert elsewhere.less_repeated(TERMS) is elsewhere

@@ -73,6 +73,19 @@ def test_a_modulus_is_told_where_the_joint_is_held_at_rest_by_its_friction():
     assert lacks_sign(np.abs(current[moving]), v[moving]) is True
 
 
+def test_a_current_that_never_comes_near_zero_has_not_changed_its_sign():
+    """Under a heavy load another axis's motion may look like growth with the speed."""
+    v, _ = held_joint()
+    coupled = 50 * np.gradient(np.abs(v))
+    assert lacks_sign(5.0 + coupled, v) is False
+    assert lacks_sign(-5.0 - coupled, v) is False
+    # twice the smallest size is less than the largest step: it may have stepped over zero
+    step = float(np.abs(np.diff(coupled)).max())
+    lifted = coupled - coupled.min()
+    assert lacks_sign(lifted + 0.49 * step, v) is True
+    assert lacks_sign(lifted + 0.51 * step, v) is False
+
+
 def test_an_overshoot_of_resampling_is_no_sign():
     v, current = held_joint()
     size = np.abs(current)

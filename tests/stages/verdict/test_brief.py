@@ -81,3 +81,11 @@ def test_a_sensor_s_noise_sends_nobody_to_the_gear():
     assert _axis(entry, None).cause == "sensor_noise"
     # the same of an effect of the library that explains as little of a fault stands beside it
     assert _axis(entry | {"cause": cause | {"effect": "mains_hum"}}, None).cause is None
+
+
+def test_that_a_cause_was_sought_in_vain_is_said():
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = [brief(judged, Bundle([], {}), None, in_vain=sought)["against"] for sought in (1, 0)]
+    assert ["No effect of the library" in one for one in told] == [True, False]

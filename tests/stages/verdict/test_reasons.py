@@ -29,6 +29,10 @@ def test_a_joint_that_unusual_conditions_excuse_is_told_so():
         one = replace(judged, state=state, unusual_log_ratio=unusual)
         text = " ".join(reasons(one, Bundle(own), entries, {"baseline": [], "target": []}))
         said[state, unusual] = "Conditions were unusual" in text
+        sides = {"baseline": [], "target": []}
+        sought = " ".join(reasons(one, Bundle(own), entries, sides, in_vain=True))
+        assert ("A cause was sought: no effect" in sought) == (state == "fault")
+        assert "A cause was sought" not in text
     assert said == {("healthy", 0.2): False, ("healthy", 2.0): True, ("fault", 2.0): False}
 
 

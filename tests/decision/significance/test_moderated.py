@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import f as fisher
 from scipy.stats import t as student
 
-from opamc_cli.joint.change.moderated import moderated_covariance, moderated_t, shift_p
+from opamc_cli.decision.significance.moderated import moderated_covariance, moderated_t, shift_p
 
 BORROWED = 4.0
 

@@ -1,9 +1,10 @@
 """Means of two small samples compared, with a variance that borrows from elsewhere."""
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import fdtrc, stdtr  # scipy.stats takes a second to load
 
-from opamc_cli.joint.motion.track import Floats
+Floats = NDArray[np.float64]
 
 PRIOR_WEIGHT = 4.0
 """Degrees of freedom that the borrowed variance is worth."""
