@@ -21,7 +21,8 @@ import pyarrow.parquet as pq
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
 from opamc_cli.stages.chain.to_patterns import run_chain
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.testbed.robot import Recording, simulate
 
 ROOT = Path(__file__).parents[1]

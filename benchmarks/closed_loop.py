@@ -17,7 +17,8 @@ from sources.closed_loop_joint import FAULTS, ClosedLoopJoint, draw_joint, recor
 
 from opamc_cli import api
 from opamc_cli.errors import OpamcError
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 JOINTS = 3
 FAULTY = 2

@@ -40,7 +40,9 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.recordings.identified import aligned_span
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import RunSource, sources_record

@@ -2,7 +2,7 @@
 
 python benchmarks/encoding.py
 
-The reason for the one that `opamc_cli.storage.runs.write_run` uses. Times are processor seconds of
+The reason for the one that `opamc_cli.storage.runs.writing` uses. Times are processor seconds of
 one thread, the best of five.
 """
 
@@ -14,7 +14,7 @@ from pathlib import Path
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 
 SAMPLE = Path(__file__).parents[1] / "data" / "samples" / "normal" / "session-000.parquet"
 

@@ -18,7 +18,8 @@ import numpy as np
 
 from opamc_cli.config.cell import load_cell
 from opamc_cli.stages.nightly.start import run as stage
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 RUNS = 4
 BASELINE = 6

@@ -30,7 +30,8 @@ from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
 from opamc_cli.testbed.parameters import Robot
 from opamc_cli.testbed.robot import simulate

@@ -23,7 +23,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, write_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
 
 ROOT = Path(__file__).parents[1]
 OUT = ROOT / "benchmarks" / "out" / "pipeline"

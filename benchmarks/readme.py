@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"

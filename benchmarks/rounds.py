@@ -22,7 +22,8 @@ from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 NIGHTS = 6
 HALL_K = 5.0

@@ -25,7 +25,8 @@ from opamc_cli.stages.chain import score
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict import verdict
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.testbed.robot import simulate
 

@@ -34,7 +34,8 @@ from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.verdict.verdict import decide
 from opamc_cli.storage.history.rows import AlarmRow
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.testbed.robot import simulate
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -24,7 +24,9 @@ from opamc_cli.stages.chain import segment as motions
 from opamc_cli.stages.model import model as joint_model
 from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.files.result import result
-from opamc_cli.storage.runs import Run, RunInfo, find_runs
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import TABLES
 from opamc_cli.storage.tables import read_table as read_stage_table

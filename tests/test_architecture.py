@@ -119,7 +119,7 @@ def test_a_channel_is_added(tmp_path):
         "assert 'axis1_vibration: {source: gear_vib_1, unit: m/s2}' in guessed, guessed\n"
         "Path('map.yaml').write_text(guessed.replace('unit: m/s2}', 'unit: gn}'))\n"
         "assert run([Path('log.csv')], load_map(Path('map.yaml')), Path('runs')).errors == ()\n"
-        "with opamc_cli.storage.runs.Run(Path('runs/log.parquet')) as found:\n"
+        "with opamc_cli.storage.runs.run.Run(Path('runs/log.parquet')) as found:\n"
         "    print(read_recording(found, 1).vibration_m_s2[[0, -1]].tolist())\n"
     )
     assert json.loads(python(folder, "-c", code)) == pytest.approx([0.0, 0.499 * 9.80665])

@@ -24,7 +24,8 @@ from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
-from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.sources import RunSource, check_comparable, other_robot

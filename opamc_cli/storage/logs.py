@@ -23,7 +23,8 @@ import pyarrow.fs
 from pydantic import TypeAdapter
 
 from opamc_cli.errors import InputError, OpamcError
-from opamc_cli.storage.runs import Run, RunInfo
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
 
 BLOCK_BYTES = 1 << 22
 

@@ -9,7 +9,8 @@ from typing import Any
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.files.result import published
-from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
+from opamc_cli.storage.runs.metadata import RunInfo, RunMetadata
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.tables import table_record
 

@@ -28,7 +28,8 @@ from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.files.json_documents import LARGEST, Document, parsed
 from opamc_cli.storage.files.parquet import read_schema, read_whole
 from opamc_cli.storage.files.result import published
-from opamc_cli.storage.runs import RunMetadata, file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
+from opamc_cli.storage.runs.metadata import RunMetadata
 from opamc_cli.storage.schemas.tables import LIMITS, MAY_BE_NULL
 
 TABLE_KEY = b"opamc_table"

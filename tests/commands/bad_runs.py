@@ -8,7 +8,9 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 RATE_HZ = 1000.0
 INFO = RunInfo(sampling_rate_hz=RATE_HZ, robot="R1", program="pick")

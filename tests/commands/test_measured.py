@@ -10,7 +10,8 @@ from opamc_cli.__main__ import main
 from opamc_cli.errors import ExitCode
 from opamc_cli.signal.motion.reported import velocity_from_position
 from opamc_cli.signal.motion.signs import lacks_sign
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "itsc_phase_current"

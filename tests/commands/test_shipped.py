@@ -10,7 +10,7 @@ import pytest
 
 from opamc_cli.__main__ import main
 from opamc_cli.config.shipped import shipped_folder
-from opamc_cli.storage.runs import find_runs
+from opamc_cli.storage.runs.finding import find_runs
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pyarrow as pa
 
-from opamc_cli.storage.runs import RunInfo
+from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.sources import RunSource, sources_record
 from opamc_cli.storage.tables import write_table

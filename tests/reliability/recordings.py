@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 RATE_HZ = 1000.0
 INFO = RunInfo(sampling_rate_hz=RATE_HZ, robot="R1", program="pick")

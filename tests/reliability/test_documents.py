@@ -12,7 +12,8 @@ from recordings import record
 from opamc_cli.config.yaml.values import MOST_VALUES, YamlError, plain_values, yaml_of
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.json_documents import parsed
-from opamc_cli.storage.runs import Run, RunInfo, RunMetadata
+from opamc_cli.storage.runs.metadata import RunInfo, RunMetadata
+from opamc_cli.storage.runs.run import Run
 
 SCALARS = (
     st.none()

@@ -18,7 +18,7 @@ from recordings import columns, record
 from opamc_cli.__main__ import _have_caches
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.recordings.axis_recording import read_recording
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from tests.marks import long
 
 QUICK = ("--set", "joint.explain=false", "--quiet")

@@ -8,7 +8,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import ExitCode
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from tests.marks import long
 
 pytestmark = pytest.mark.usefixtures("undrawn")

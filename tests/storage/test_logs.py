@@ -15,7 +15,8 @@ from opamc_cli.storage.logs import (
     find_logs_and_strays,
     read_facts,
 )
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 
 
 @pytest.mark.parametrize(

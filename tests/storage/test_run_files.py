@@ -8,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, Run, RunInfo, find_runs, save_run, write_run
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, save_run, write_run
 
 INFO = RunInfo(2048.0, "R1", "pick", 50.0, 1.0, "2022-10-26T08:17:21Z", "ab" * 32)
 

@@ -8,17 +8,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import InputError
-from opamc_cli.storage import runs
-from opamc_cli.storage.runs import (
-    Run,
-    RunInfo,
-    file_sha256,
-    find_runs,
-    know_sha256,
-    passed_over,
-    save_run,
-    write_run,
-)
+from opamc_cli.storage.runs import run as run_module
+from opamc_cli.storage.runs import writing
+from opamc_cli.storage.runs.finding import find_runs, passed_over
+from opamc_cli.storage.runs.hashes import file_sha256, know_sha256
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run, write_run
 
 INFO = RunInfo(100.0)
 
@@ -135,15 +131,15 @@ def test_samples_beyond_a_thousand_million_are_missing(tmp_path):
 
 def test_row_groups_of_a_bounded_size(tmp_path, monkeypatch):
     path = saved(tmp_path / "r.parquet")
-    monkeypatch.setattr(runs, "MOST_GROUP_SAMPLES", 10)
+    monkeypatch.setattr(run_module, "MOST_GROUP_SAMPLES", 10)
     Run(path)
-    monkeypatch.setattr(runs, "MOST_GROUP_SAMPLES", 9)
+    monkeypatch.setattr(run_module, "MOST_GROUP_SAMPLES", 9)
     with pytest.raises(InputError, match="a row group has 10 samples, at most 9"):
         Run(path)
 
 
 def test_two_row_groups_of_each_column_are_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(runs, "ROW_GROUP_SAMPLES", 10)
+    monkeypatch.setattr(writing, "ROW_GROUP_SAMPLES", 10)
     run = Run(saved(tmp_path / "r.parquet", axis1_a=np.arange(40.0), axis1_b=np.arange(40.0)))
     read = []
     whole = run._read_groups
@@ -165,7 +161,8 @@ def test_two_row_groups_of_each_column_are_kept(tmp_path, monkeypatch):
 def test_time_agrees_within_half_a_sample_and_a_thousandth(
     tmp_path, monkeypatch, step, rate_off, ok
 ):
-    monkeypatch.setattr(runs, "ROW_GROUP_SAMPLES", 1000)
+    monkeypatch.setattr(writing, "ROW_GROUP_SAMPLES", 1000)
+    monkeypatch.setattr(run_module, "ROW_GROUP_SAMPLES", 1000)
     steps = np.full(2999, 1 / (1 - rate_off))
     steps[999] = step  # between two blocks
     if step != 1:

@@ -10,7 +10,8 @@ from typer.testing import CliRunner
 from opamc_cli.__main__ import app, main
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.errors import ConfigError, ExitCode
-from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.run import Run
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 SMALL = """

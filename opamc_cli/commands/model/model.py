@@ -110,7 +110,7 @@ def close(
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result
-    from opamc_cli.storage.runs import find_runs
+    from opamc_cli.storage.runs.finding import find_runs
 
     forgo_pandas()
     output = Output(as_json, quiet)
@@ -189,7 +189,7 @@ def _on_axes(
     """Do one step on every axis that was asked for, print what came of it, and end."""
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.storage.files.lock import output_lock
-    from opamc_cli.storage.runs import find_runs
+    from opamc_cli.storage.runs.finding import find_runs
 
     declared = load_joint_model(model, overrides or ())
     with output_lock(out), _naming(model), output.steps() as steps:

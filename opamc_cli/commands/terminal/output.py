@@ -45,7 +45,7 @@ class Output:
 
     def passed_over(self, paths: Sequence[Path]) -> None:
         """Print which folders of runs hold recordings that are none: they are not judged."""
-        from opamc_cli.storage.runs import passed_over
+        from opamc_cli.storage.runs.finding import passed_over
 
         for text in passed_over(paths):
             complain(text)

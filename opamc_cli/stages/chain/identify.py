@@ -23,7 +23,7 @@ from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS

@@ -24,7 +24,7 @@ from opamc_cli.config.models import Section
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain.segments.rows import AxisSegments
 from opamc_cli.storage.files.atomic import atomic_path
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.sources import RunSource
 
 Job = TypeVar("Job")

@@ -14,7 +14,8 @@ from opamc_cli.stages.chain.segments.carrier import carrier_segments
 from opamc_cli.stages.chain.segments.joint import joint_segments
 from opamc_cli.stages.chain.segments.rows import AxisSegments
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.storage.runs import Run, find_runs
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.sources import RunSource, sources_record

@@ -16,7 +16,7 @@ from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.processes.freed_memory import keep_freed_memory
 from opamc_cli.stages.processes.parallel import Watch, map_items
 from opamc_cli.stages.recordings.axis_recording import axes_of
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 Result = TypeVar("Result")
 Runs = Sequence[tuple[str, Path]]

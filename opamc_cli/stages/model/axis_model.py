@@ -20,7 +20,7 @@ from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import same_clock
 
 HELD = 0.5

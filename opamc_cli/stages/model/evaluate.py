@@ -22,7 +22,7 @@ from opamc_cli.stages.model.axis_model import declared_effects, library_of, reco
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import ensure_directory, write_json
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 
 FAMILIAR = 10.0

@@ -30,7 +30,7 @@ from opamc_cli.stages.model.tables import (
 )
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import ensure_directory, write_json, write_text
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
 from opamc_cli.storage.tables import write_table

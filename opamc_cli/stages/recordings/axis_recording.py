@@ -15,7 +15,8 @@ from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed, speed_rat
 from opamc_cli.signal.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
-from opamc_cli.storage.runs import Array, Run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import Array
 from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
 
 UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", 0.5 / np.pi: "rev/s", np.pi / 180: "deg"}

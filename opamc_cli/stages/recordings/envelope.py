@@ -9,7 +9,8 @@ import numpy.typing as npt
 from opamc_cli.errors import InputError
 from opamc_cli.signal.offset import mean_over_turns
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, envelope
-from opamc_cli.storage.runs import AxisChannels, Run
+from opamc_cli.storage.runs.columns import AxisChannels
+from opamc_cli.storage.runs.run import Run
 
 EnvelopeKind = Literal["auto", "clarke", "hilbert", "reported"]
 

@@ -31,15 +31,10 @@ from opamc_cli.storage.ingest.source import Array, Block, Name, Selection, Sourc
 from opamc_cli.storage.ingest.time.dates import utc_text
 from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
-from opamc_cli.storage.runs import (
-    LARGEST_SAMPLE,
-    METADATA_KEY,
-    ROW_GROUP_SAMPLES,
-    Run,
-    RunInfo,
-    file_sha256,
-    write_run,
-)
+from opamc_cli.storage.runs.hashes import file_sha256
+from opamc_cli.storage.runs.metadata import METADATA_KEY, RunInfo
+from opamc_cli.storage.runs.run import LARGEST_SAMPLE, Run
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
 from opamc_cli.storage.schemas.channels import quantity_of, same_clock
 
 _TIME = "time"

@@ -15,7 +15,8 @@ from opamc_cli.config.testbed import TestbedConfig
 from opamc_cli.errors import ConfigError
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.atomic import write_text
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.tables import write_table
 from opamc_cli.testbed.effects import KINDS

@@ -7,7 +7,7 @@ from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.focus import Focus, pooled_features
 from opamc_cli.stages.report.onset import Onset, find_onset
 from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs
-from opamc_cli.storage.runs import RunInfo
+from opamc_cli.storage.runs.metadata import RunInfo
 
 CONDITIONS = (
     ("robot", "robot {}"),

@@ -23,7 +23,7 @@ from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.stages.verdict.reasons import AT_REST, SENSOR_NOISE, excuses_little, lies_outside
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.sources import RunSource
 
 Spans = Sequence[tuple[int, int]]

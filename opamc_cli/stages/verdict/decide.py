@@ -18,7 +18,7 @@ from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.findings import read_findings
 from opamc_cli.stages.verdict.header import header
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import other_robot
 

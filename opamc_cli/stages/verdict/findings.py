@@ -16,7 +16,7 @@ from opamc_cli.config.reading import read_text
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.files.json_documents import MOST_BYTES
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 
 ROLES = ("baseline", "target")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from opamc_cli import __version__
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.sources import RunSource
 
 SCHEMA_VERSION = 1

@@ -15,7 +15,7 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
 from opamc_cli.stages.recordings.identified import aligned_span
 from opamc_cli.stages.tuning import sweep
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.tables import record_at
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"

@@ -8,7 +8,7 @@ from opamc_cli.config import load_config
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.agreement import duplicates
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples" / "normal"
 RUNS = [SAMPLES / f"session-{i:03d}.parquet" for i in range(3)]

@@ -11,7 +11,8 @@ from carriers import Move, record
 from opamc_cli.config import Config
 from opamc_cli.errors import InputError
 from opamc_cli.stages.chain import segment
-from opamc_cli.storage.runs import RunInfo, save_run, write_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run, write_run
 from opamc_cli.storage.schemas import files
 
 SHARED = Path(__file__).parents[4] / "shared" / "data"

@@ -7,7 +7,8 @@ import pytest
 from opamc_cli.config import load_config
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import spectrum
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas.tables import PLACE
 
 RATE_HZ = 250.0

@@ -11,7 +11,8 @@ import pytest
 from cell_logs import night
 
 from opamc_cli.errors import ExitCode
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 
 @pytest.fixture

@@ -8,7 +8,8 @@ import numpy as np
 from cell_logs import night
 
 from opamc_cli.errors import ExitCode
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from tests.stages.nightly.changed_logs import set_clock, states
 
 

@@ -17,7 +17,8 @@ from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 
 @pytest.fixture

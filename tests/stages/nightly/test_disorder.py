@@ -19,7 +19,8 @@ from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from tests.stages.nightly.changed_logs import add_night, set_clock, states
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})

@@ -12,7 +12,8 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.inputs.one_rate import at_named_rates, named_rates
 from opamc_cli.stages.nightly.inputs.recordings import Recording
 from opamc_cli.storage.logs import Facts, LogFile
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 
 @pytest.fixture

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
-from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 RATE_HZ = 2048.0
 OFFSETS_A = (0.2, -0.15, 0.07)

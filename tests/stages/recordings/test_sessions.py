@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from opamc_cli.stages.recordings.sessions import in_words, lie_in_folders, night_of, sessions_of
-from opamc_cli.storage.runs import RunInfo
+from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.sources import RunSource
 
 

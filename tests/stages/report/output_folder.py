@@ -15,7 +15,9 @@ from opamc_cli.decision.divergence.jensen_shannon import (
 )
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.signal.transform.analytic import clarke, envelope
-from opamc_cli.storage.runs import Run, RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas.tables import (
     FEATURES,
     MOTIONS,

@@ -140,7 +140,7 @@ def test_the_verdict_comes_first_and_says_where_why_and_what_to_do(page: str) ->
 
 
 def test_provenance_holds_every_input(made: Path, page: str) -> None:
-    from opamc_cli.storage.runs import file_sha256
+    from opamc_cli.storage.runs.hashes import file_sha256
 
     runs = made.parent.rglob("run*.parquet")
     for path in [*made.rglob("*.parquet"), *made.rglob("*.json"), *runs]:

@@ -14,7 +14,10 @@ from opamc_cli.joint.change.explain import Change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
 from opamc_cli.stages.verdict import cause
-from opamc_cli.storage.runs import Run, RunInfo, find_runs, save_run
+from opamc_cli.storage.runs.finding import find_runs
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
 from tests.marks import long
 

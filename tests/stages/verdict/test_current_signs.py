@@ -6,7 +6,8 @@ import pytest
 
 from opamc_cli.stages.verdict.agreement.findings import findings, reference_of
 from opamc_cli.stages.verdict.agreement.measured import LONGEST_LOOK, measure
-from opamc_cli.storage.runs import RunInfo, save_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
 
 RATE_HZ = 100.0

@@ -8,7 +8,8 @@ import jsonschema
 import pytest
 
 from opamc_cli.__main__ import main
-from opamc_cli.storage.runs import Run, save_run
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import save_run
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
 

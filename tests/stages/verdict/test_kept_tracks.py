@@ -12,7 +12,7 @@ from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.model import kept_tracks
 from opamc_cli.stages.recordings.axis_recording import read_recording
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 SAMPLE = Path(__file__).parents[3] / "data" / "samples" / "normal" / "session-000.parquet"
 

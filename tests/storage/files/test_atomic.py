@@ -9,7 +9,7 @@ import pytest
 
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import atomic_path, ensure_directory, write_text
-from opamc_cli.storage.runs import find_runs
+from opamc_cli.storage.runs.finding import find_runs
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path):
@@ -32,7 +32,8 @@ KILLED = """
 import signal, sys, time
 import numpy as np
 import pyarrow as pa
-from opamc_cli.storage.runs import RunInfo, write_run
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import write_run
 # a shell starts background jobs, and so what they start, with SIGINT ignored
 signal.signal(signal.SIGINT, signal.default_int_handler)
 schema = pa.schema([("axis1_a", pa.float32())])

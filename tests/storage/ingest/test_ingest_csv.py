@@ -9,7 +9,8 @@ import pytest
 from opamc_cli.errors import ConfigError, InputError, UsageError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.map.load import load_map
-from opamc_cli.storage.runs import Run, file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
+from opamc_cli.storage.runs.run import Run
 
 
 def run_map(tmp_path, text, files, out="out"):

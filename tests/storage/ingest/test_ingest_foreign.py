@@ -11,7 +11,7 @@ from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
 from opamc_cli.storage.ingest.map.load import load_map
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 LATE = 0.6
 """Of a sample's period: what the logger's clock comes early or late by, from end to end."""

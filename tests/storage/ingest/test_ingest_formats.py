@@ -10,7 +10,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.map.load import load_map
 from opamc_cli.storage.ingest.source import BLOCK_ROWS
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 RNG = np.random.default_rng(11)
 N = BLOCK_ROWS + 1000  # more than one block

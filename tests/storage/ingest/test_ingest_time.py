@@ -8,7 +8,7 @@ import pytest
 from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.map.load import load_map
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 
 
 def ingested(tmp_path, rows, time, extra=""):

@@ -15,7 +15,7 @@ from opamc_cli.decision.divergence.discriminant import FEATURE_NAMES, LinearDisc
 from opamc_cli.errors import InputError
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.files.json_documents import LARGEST, MOST_BYTES, Document, parsed
-from opamc_cli.storage.runs import file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
 
 CONDITIONS = ("f_max_hz",)
 

@@ -38,7 +38,9 @@ from opamc_cli.stages.chain.segments.rows import (
     read_variance,
 )
 from opamc_cli.stages.recordings.beyond import sized
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, AxisChannels, Run
+from opamc_cli.storage.runs.columns import AxisChannels
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 
 FRAME_S = 0.008
 CARRIER_SHARE = 0.4

@@ -22,7 +22,8 @@ from opamc_cli.stages.chain.segments.rows import (
     mean_variance,
 )
 from opamc_cli.stages.recordings.beyond import limited
-from opamc_cli.storage.runs import AxisChannels, Run
+from opamc_cli.storage.runs.columns import AxisChannels
+from opamc_cli.storage.runs.run import Run
 
 USUAL_GEAR_RATIO = 100.0
 """Stands in for an unknown ratio in f_d,max, which motions are then compared by: strain wave gears

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from opamc_cli.storage.runs import ROW_GROUP_SAMPLES, AxisChannels, Run
+from opamc_cli.storage.runs.columns import AxisChannels
+from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 
 EDGE_S = 0.05
 """A motion that begins or ends this near to the recording's edge may have been cut by it."""

@@ -26,7 +26,7 @@ from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
 from opamc_cli.storage.history.rows import EXCUSED
 from opamc_cli.storage.logs import fetch
-from opamc_cli.storage.runs import know_sha256
+from opamc_cli.storage.runs.hashes import know_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.tables import read_table

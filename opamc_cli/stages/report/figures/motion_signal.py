@@ -28,7 +28,7 @@ from opamc_cli.stages.report.figures.palette import colour
 from opamc_cli.stages.report.focus import Focus
 from opamc_cli.stages.report.results.columns import Columns, extremes, n_rows, select
 from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInputs
-from opamc_cli.storage.runs import Run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.sources import RunSource
 
 MARGIN_S = 1.0

@@ -13,7 +13,8 @@ from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.report.results.columns import Columns, n_rows, select, to_columns
 from opamc_cli.storage.files.json_documents import read_json
 from opamc_cli.storage.files.parquet import read_schema
-from opamc_cli.storage.runs import Run, file_sha256
+from opamc_cli.storage.runs.hashes import file_sha256
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files, tables
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import read_table, table_record

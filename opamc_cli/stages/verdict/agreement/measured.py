@@ -11,7 +11,8 @@ import pyarrow as pa
 
 from opamc_cli.signal.quality import clipped_share
 from opamc_cli.stages.chain.kept import KeptResults, remembered
-from opamc_cli.storage.runs import AxisChannels, Run
+from opamc_cli.storage.runs.columns import AxisChannels
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.sources import RunSource
 
 LOOKS = 8

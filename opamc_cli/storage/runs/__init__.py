@@ -1,0 +1,1 @@
+"""The run format: one recording = one Parquet file, one row per sample."""
