@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 ENOUGH_SESSIONS = 4
 """Of the baseline: with fewer, limits are so wide that the reasons of each joint say so."""
 
+DIFFERS = 0.01
+"""Corrected p-value up to which a healthy joint has changed, too little or no more than others."""
+
 STYLES = {"healthy": "green", "changed": "yellow", "fault": "bold red", "unknown": "dim"}
 
 
@@ -80,12 +83,11 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     -------
     list of Text
         One line if all is well, one more of few baseline sessions, and of each healthy joint that
-        is worth an eye; a faulty joint has five at most.
+        has changed; a faulty joint has five at most.
     """
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
-    from opamc_cli.stages.verdict.reasons import SUSPICION
 
     unhealthy = doubtful(verdict)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
@@ -115,7 +117,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     for entry in verdict.get("axes", ()):
         p = entry.get("p_adjusted")
         known = isinstance(p, int | float) and entry not in unhealthy and entry.get("reasons")
-        if known and p <= SUSPICION:
+        if known and p <= DIFFERS:
             text = printable(f"axis {entry.get('axis')}: {entry['reasons'][0]}")
             lines.append(Text(text, style="dim"))
     sessions = (verdict.get("baseline") or {}).get("sessions")

@@ -48,10 +48,10 @@ def test_all_healthy_is_one_line() -> None:
     assert text == "Axes 1-6 healthy (largest health index 3, axis 6)\n"
 
 
-def test_a_healthy_axis_that_is_worth_an_eye_has_a_line() -> None:
+def test_a_healthy_axis_that_has_changed_has_a_line() -> None:
     axes = [
         axis(n, "healthy", reasons=[f"reason {n}"], p_adjusted=p)
-        for n, p in enumerate((0.09, 0.11), 1)
+        for n, p in enumerate((0.009, 0.011), 1)
     ]
     said = [line.plain for line in verdict_lines({"axes": axes})]
     assert said == ["Axes 1 and 2 healthy", "axis 1: reason 1"]
