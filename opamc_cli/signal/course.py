@@ -108,18 +108,31 @@ def _of_other_units(
 ) -> NDArray[np.float64]:
     """Course of the strokes of one kind at each of their samples."""
     place = (angle - angle.min()) / spacing
-    weights = np.maximum(1 - np.abs(place[:, None] - np.arange(place.max() // 1 + 2)), 0.0)
-    members = {one: weights[unit == one] for one in np.unique(unit)}
-    grams = {one: part.T @ part for one, part in members.items()}
-    moments = {one: part.T @ values[unit == one] for one, part in members.items()}
+    corner = place.astype(np.intp)
+    # A sample lies between two corners of the polygon, and weighs on both.
+    sides = ((corner, 1.0 - (place - corner)), (corner + 1, place - corner))
+    size = int(corner.max()) + 2
+    sums = {}
+    for one in np.unique(unit):
+        own = unit == one
+        gram, moment = np.zeros((size, size)), np.zeros(size)
+        for k, weight in sides:
+            moment += np.bincount(k[own], (weight * values)[own], size)
+            for beside, other in sides:
+                np.add.at(gram, (k[own], beside[own]), (weight * other)[own])
+        sums[one] = gram, moment
     sources = set(unit[source].tolist())
     course = np.full(angle.size, np.nan)
-    for one, part in members.items():
+    for one in sums:
         others = sources - {one}
         if others:
-            gram = np.sum([grams[other] for other in others], axis=0)
-            moment = np.sum([moments[other] for other in others], axis=0)
+            gram = np.sum([sums[other][0] for other in others], axis=0)
+            moment = np.sum([sums[other][1] for other in others], axis=0)
             found = np.linalg.lstsq(gram, moment, rcond=1e-9)[0]
-            unknown = gram.sum(axis=0) < LEAST_WEIGHT
-            course[unit == one] = np.where((part[:, unknown] > 0).any(axis=1), np.nan, part @ found)
+            found[gram.sum(axis=0) < LEAST_WEIGHT] = np.nan
+            own = unit == one
+            # An unknown corner of no weight is none.
+            course[own] = sum(
+                np.where(weight[own] > 0, weight[own] * found[k[own]], 0.0) for k, weight in sides
+            )
     return course
