@@ -44,16 +44,20 @@ def resonant(wave, rate_hz, resonance_hz=12.0, damping=0.2):
     return lfilter(*bilinear((2 * damping * w, w * w), (1, 2 * damping * w, w * w), rate_hz), wave)
 
 
-@pytest.mark.parametrize("seed", [long(8)])
-def test_a_ripple_that_the_velocity_loop_shapes_is_one_line(seed):
-    made = simulate(seed, (), 0.0, rate=500.0, kind="quintic")
-    wave = np.cos(2 * made.gear_ratio * made.position + 0.4)
-    current = made.current + 8 * made.noise_rms * resonant(wave, made.rate_hz)
-    _, loop = close_recording(made, current, seed=seed)
-    assert [step.term.effect.name for step in loop.steps] == ["ripple"]
-    assert loop.steps[0].term.parameters["order"] == pytest.approx(2.0, abs=1e-6)
-    assert loop.verdict == "closed"
-    assert loop.rmse_after_a < 1.1 * made.noise_rms
+@pytest.mark.long
+def test_a_ripple_that_the_velocity_loop_shapes_is_one_line():
+    left = []
+    for seed in (5, 6, 8):
+        made = simulate(seed, (), 0.0, rate=500.0, kind="quintic")
+        wave = np.cos(2 * made.gear_ratio * made.position + 0.4)
+        current = made.current + 8 * made.noise_rms * resonant(wave, made.rate_hz)
+        _, loop = close_recording(made, current, seed=seed)
+        assert [step.term.effect.name for step in loop.steps] == ["ripple"]
+        assert loop.steps[0].term.parameters["order"] == pytest.approx(2.0, abs=1e-6)
+        assert loop.verdict == "closed"
+        left.append(loop.rmse_after_a / made.noise_rms)
+    # Of the two sealed cycles of seven each: noise alone scatters by some 5 %.
+    assert np.mean(left) < 1.1
 
 
 @pytest.mark.long

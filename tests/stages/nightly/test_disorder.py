@@ -209,7 +209,8 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
     places = {}
     for index in (0, 1, 2):
         folder = logs / "r1" / night(index)
-        for name in ("second", "third"):
+        # nights that differ in number: none lacks any
+        for name in ("second", "third")[: 1 + (index < 2)]:
             set_clock(folder / "cycle.parquet", f"{night(index)}T23:0{len(name) - 5}:00+00:00")
             places[index, name] = folder / f"{name}.parquet"
             if "runs" in rule:

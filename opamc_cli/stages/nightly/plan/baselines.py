@@ -71,7 +71,8 @@ class Baselines:
             return Comparison(program, condition, targets, missing=self._never_there(key))
         left = [n for n in members if n in self._there[key]]
         gone = ", ".join(n for n in members if n not in left)
-        there = {one.night for one in self._now.fixed} if key[2] == rule.runs else self._nights
+        picked = key[2] == rule.runs
+        there = {one.night for one in self._now.fixed} if picked else self._nights
         how = "are gone" if there.isdisjoint({*members} - {*left}) else "cannot be used any more"
         if gone and len(left) < LEAST_NIGHTS:
             why = (
@@ -91,7 +92,7 @@ class Baselines:
         used, lost = self._used[key]
         name = baseline_name(name, condition)
         of = tuple(members)
-        return Comparison(program, condition, targets, used, name, "", of, bool(gone), lost)
+        return Comparison(program, condition, targets, used, name, "", of, bool(gone), lost, picked)
 
     def say_gone(self, recordings: Sequence[Recording]) -> None:
         """Have it said that a baseline has lost recordings that a night was judged with."""

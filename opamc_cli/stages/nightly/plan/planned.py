@@ -30,16 +30,19 @@ class Comparison:
     """Whether some of these have none any more."""
     gone: tuple[Recording, ...] = ()
     """Recordings that the others once had beside those that are left."""
+    picked: bool = False
+    """Whether the baseline is of recordings that a user has named, not of nights."""
 
     @property
     def lacking(self) -> str:
         """Say that the night has fewer recordings than each of the baseline's; empty: it has not.
 
-        Of a baseline of one night, or of nights that differ, nobody knows how many there are to be.
+        Of a baseline of one night, of nights that differ, or of recordings that a user has picked,
+        nobody knows how many there are to be.
         """
-        nights = Counter(one.night for one in self.baseline)
+        nights = Counter(one.night for one in (*self.baseline, *self.gone))
         usual, have = set(nights.values()), len(self.targets)
-        if len(nights) < 2 or len(usual) > 1 or have >= min(usual):
+        if self.picked or len(nights) < 2 or len(usual) > 1 or have >= min(usual):
             return ""
         recordings = "1 recording" if have == 1 else f"{have} recordings"
         program = f" of program {self.program!r}" * bool(self.program)
