@@ -2,23 +2,13 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from made_cycles import CYCLE, series
 
 from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import identify
 from opamc_cli.signal.cycles.reference import find_reference, period
 
 RULE = MatchRule()
-
-# one cycle of four motions: variance, duration, f_max, direction, pause before
-CYCLE = [(4.0, 1.0, 314.0, 1, 0.5), (3.5, 0.6, 300.0, 1, 0.3), (4.2, 1.0, 314.0, -1, 0.3),
-         (3.3, 0.6, 300.0, -1, 0.3)]  # fmt: skip
-
-
-def series(rows, noise=0.02, seed=0):
-    rng = np.random.default_rng(seed)
-    values = np.array(rows, dtype=float)
-    values[:, :3] *= 1 + noise * rng.normal(size=(len(rows), 3))
-    return SegmentFeatures(*values[:, :3].T, values[:, 3].astype(int), values[:, 4])
 
 
 @pytest.mark.parametrize("seed", range(5))
