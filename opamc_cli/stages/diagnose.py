@@ -8,7 +8,7 @@ from types import ModuleType
 from typing import Any
 
 from opamc_cli.config import Config
-from opamc_cli.errors import ExitCode, InputError, OpamcError
+from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
 from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.discriminants import LatentModels
@@ -191,12 +191,18 @@ def _diagnose(
                     kept,
                     [moves.get(axis, {}) for moves in strokes],
                 )
-            except (ArithmeticError, LookupError, ValueError) as error:
+            except (
+                ArithmeticError,
+                LookupError,
+                ValueError,
+                InputError,
+                NotEnoughDataError,
+            ) as error:
                 # a verdict must not be lost because its explanation failed on odd recordings
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
-            if found is not None:  # empty: sought in vain
-                causes[axis] = found if found.get("share", 0.0) >= LEAST_SHARE else {}
+            # empty: sought in vain
+            causes[axis] = found if found.get("share", 0.0) >= LEAST_SHARE else {}
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,

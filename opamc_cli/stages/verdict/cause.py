@@ -9,7 +9,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
-from opamc_cli.errors import OpamcError
+from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import Change, explain_change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
@@ -78,7 +78,7 @@ def explain(
     moving: Mapping[str, tuple[int, int]] | None = None,
     kept: KeptResults | None = None,
     strokes: Sequence[Mapping[str, Spans]] = ({}, {}),
-) -> dict[str, Any] | None:
+) -> dict[str, Any]:
     """Trace the change of one joint to an effect of the library.
 
     Parameters
@@ -100,25 +100,26 @@ def explain(
 
     Returns
     -------
-    dict or None
+    dict
         The `cause` of verdict.json: an effect of the library, or noise of the sensor that is there
-        at standstill, too; empty where neither explains the change, None where the runs do not hold
-        what a model of the joint needs.
+        at standstill, too; empty where neither explains the change.
 
     Raises
     ------
     ConfigError
         If an effect of the user's own cannot be used.
+    InputError, NotEnoughDataError
+        If a side does not hold what a model of the joint needs.
     """
     sides, noises = [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
     for sources, moves in zip((baseline, target), strokes, strict=True):
-        recordings, noise = _recordings(
+        recordings, noise, errors = _recordings(
             axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
         )
         if not recordings:
-            return None
+            raise errors[0]
         sides.append(recordings)
         noises.append(noise)
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
@@ -128,7 +129,9 @@ def explain(
         found = _entry(change)
     grown = growth_at_rest(*noises)
     if grown is None:
-        return {} if found is None and change.why_not is None else found
+        if found is None and change.why_not is not None:
+            raise NotEnoughDataError(change.why_not)
+        return found or {}
     if found is None or _heard_at_rest(found):
         return _of_sensor(grown, found)
     sensor = _of_sensor(grown, None)
@@ -174,8 +177,10 @@ def _recordings(
     moving: Mapping[str, tuple[int, int]],
     strokes: Mapping[str, Spans],
     rate_hz: float,
-) -> tuple[list[Recording], list[Fluctuation]]:
-    found, noises = [], []
+) -> tuple[list[Recording], list[Fluctuation], list[OpamcError]]:
+    found: list[Recording] = []
+    noises: list[Fluctuation] = []
+    errors: list[OpamcError] = []
     for source in sources:
         # seconds are those of a log of this rate: a slower one costs no more for being longer
         read_hz = max(rate_hz, LEAST_HZ)
@@ -191,9 +196,10 @@ def _recordings(
                 found.append(interpolated(recording, LEAST_HZ))
             noise = _fluctuation(recording, start, strokes.get(source.name, ()))
             noises += [] if noise is None else [noise]
-        except OpamcError:
-            continue  # the run served the chain but not a model, which needs motion beside current
-    return found, noises
+        except OpamcError as error:
+            # the run served the chain but not a model, which needs motion beside current
+            errors.append(error)
+    return found, noises, errors
 
 
 def _fluctuation(recording: Recording, start: int, strokes: Spans) -> Fluctuation | None:

@@ -7,12 +7,14 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
+from opamc_cli.config import load_config
 from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.at_rest import Growth
-from opamc_cli.errors import ConfigError
+from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.joint.change.explain import Change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
+from opamc_cli.stages import diagnose
 from opamc_cli.stages.verdict import cause
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.metadata import RunInfo
@@ -197,6 +199,29 @@ def test_noise_that_is_there_at_standstill_is_the_sensor_s(tmp_path, logged):
         )
 
 
+def test_why_no_cause_could_be_sought_is_told(tmp_path):
+    """A speed of the wrong sign is refused by the model alone: the cause went without a word."""
+    sides = []
+    for side, ripple_a in (("normal", 0.0), ("fault", 0.6)):
+        found, _ = paused(tmp_path / side, 0.03, ripple_a=ripple_a)
+        for source in found:
+            with Run(source.path) as run:
+                columns = run.read(["axis1_current", "axis1_position"])
+            speed = -100 * np.gradient(columns["axis1_position"])
+            save_run(source.path, source.info, columns | {"axis1_velocity": speed})
+        sides.append(found)
+    why = "one of them has the wrong sign"
+    with pytest.raises(InputError, match=why):
+        cause.explain(1, *sides, JointConfig())
+    outcome = diagnose.run(
+        [tmp_path / "normal"], [tmp_path / "fault"], load_config(), tmp_path / "out"
+    )
+    (judged,) = outcome.verdict["axes"]
+    assert (judged["state"] in ("changed", "fault"), judged["cause"]) == (True, None)
+    (note,) = [note for note in outcome.notes if why in note]
+    assert note.startswith("axis 1: no cause could be sought (")
+
+
 @pytest.mark.parametrize("noise_a", [0.03, 0.12])
 def test_a_ripple_is_not_the_sensor_s_whatever_its_noise(tmp_path, noise_a):
     before, _ = paused(tmp_path / "before", 0.03)
@@ -265,7 +290,7 @@ def test_a_spike_of_the_position_hides_no_motion(tmp_path):
         columns["axis1_position"] = columns["axis1_position"].copy()
         columns["axis1_position"][1000] = 1e6
         save_run(source.path, source.info, columns)
-    found, _ = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), {}, 100.0)
+    found, *_ = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), {}, 100.0)
     assert [recording.size for recording in found] == [2600] * 3
 
 
