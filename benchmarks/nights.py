@@ -197,7 +197,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="seed of the first robot")
     parser.add_argument("--files", type=int, nargs="*", default=list(FILES))
     parser.add_argument("--severities", type=float, nargs="*", default=list(SEVERITIES))
-    parser.add_argument("--friction", type=float, nargs="*", default=[], help="1.3: 30 % more")
+    parser.add_argument("--friction", type=float, nargs="*", default=[], help="1.3: 30 %% more")
     parser.add_argument("--by-file", action="store_true")
     parser.add_argument("--without", nargs="*", default=[], help="witnesses that are not asked")
     parser.add_argument("--quick", action="store_true")
