@@ -1,6 +1,7 @@
 """The one place where the panel calls the package's loop."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from opamc_cli.joint.effects.library import built_in_library
@@ -57,11 +58,13 @@ def close(
     ]
     library = built_in_library()
     terms = tuple((library[name], None) for name in declared)
-    fit = best_fit(laid, Joint(*gear) if gear else Joint(), lambda _: terms, without_rules)
+    joint = Joint(*gear) if gear else Joint()
+    anew = partial(best_fit, laid, joint, lambda _: terms, without_rules)
+    fit = anew()
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)
-    loop = close_loop(fit, library, seed, without_rules)
+    loop = close_loop(fit, library, seed, without_rules, anew)
     return Closed(
         loop.rmse_before_a,
         loop.rmse_after_a,

@@ -1,6 +1,6 @@
 """Fit a declared model, parameters that are not given included."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -35,11 +35,13 @@ def best_fit(
     joint: Joint,
     declared: Callable[[Dataset], Declared],
     without_rules: Collection[str] = (),
+    found: Sequence[Term] = (),
 ) -> Fit | None:
     """Fit a declared model to recordings, differentiated in the way that predicts best.
 
-    The recordings are in time order, all at one rate; the rule "windows" may be switched off. None
-    where too little moves to seal anything off.
+    The recordings are in time order, all at one rate; the rule "windows" may be switched off. What
+    was `found` beside the declared model is not fitted, but has its say in how to differentiate.
+    None where too little moves to seal anything off.
     """
     track, grouping = grouped_track(recordings, joint)
     if grouping is None or not is_moving(track):
@@ -47,7 +49,8 @@ def best_fit(
     dataset = dataset_of(track, grouping)
     model = declared(dataset)
     ways = [] if "windows" in without_rules else smoothings(recordings)
-    smoothing = _best_of(ways, excerpts(recordings, track), joint, model) if ways else None
+    known = (*model, *((term.effect, term) for term in found))
+    smoothing = _best_of(ways, excerpts(recordings, track), joint, known) if ways else None
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
         dataset = dataset_of(track, grouping)

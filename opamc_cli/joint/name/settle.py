@@ -66,12 +66,16 @@ def ties_of(best: Chain, name: str, others: Sequence[Trial]) -> tuple[str, ...]:
 
 
 def worth_their_price(chain: Chain) -> Chain:
-    """Drop functions and lines that are not worth their price, at the load of the whole chain."""
+    """Drop functions and lines that are not worth their price, at the load of the whole chain.
+
+    With the functions that came last an effect may raise the error, too.
+    """
     kept, place = chain, 0
     while place < kept.added:
         parent = without(kept, place, rounds=1)
         effect = kept.terms[place].effect
         drop = (effect.unnamed or effect.fast) and parent.score <= kept.score
+        drop |= _raises(kept, parent)
         kept, place = (parent, 0) if drop else (kept, place + 1)
     return chain if kept is chain else extended(kept)
 
@@ -80,7 +84,7 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
     """Return a better chain without one effect, or with another in its place; None if none is."""
     term = best.terms[place]
     parent = without(best, place)
-    if parent.score <= best.score:
+    if parent.score <= best.score or _raises(best, parent):
         return parent
     if term.effect.unnamed:
         return None
@@ -92,6 +96,16 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
             if rival.why_not is None and _takes_the_name(rival.chain, best, parent, term):
                 return rival.chain
     return None
+
+
+def _raises(chain: Chain, parent: Chain) -> bool:
+    """Whether what the parent does without raises the mean square error of all open samples.
+
+    What is fitted where the motion is clear of corners may fail beside them; held-out errors, by
+    which a hard part counts little, do not tell. (A wind-up beside a ripple, 40 % off the latter,
+    raised the error from 0.0069 to 0.0105 A, and the sealed one with it.)
+    """
+    return parent.fit.rmse(sealed=False) < chain.fit.rmse(sealed=False)
 
 
 def _rivals_of(term: Term, unnamed: Pool) -> Pool:

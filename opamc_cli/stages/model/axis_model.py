@@ -11,7 +11,8 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.explain.declared import Declared, best_fit
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.fit.model import Dataset, Fit
+from opamc_cli.joint.fit.model import Dataset, Fit, Term
+from opamc_cli.joint.loop import Anew
 from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
@@ -54,6 +55,8 @@ class AxisModel:
     """Counted from 1."""
     fit: Fit
     """The declared model, fitted to the open data; parameters that were not given are found."""
+    anew: Anew
+    """Fits it to the motion as it is differentiated best beside terms that were found."""
     declared: tuple[tuple[Effect, DeclaredEffect], ...]
     """Model as declared."""
     library: Library
@@ -127,11 +130,14 @@ def lay(
         track = dataset.coarse.track
         return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
 
-    fit = best_fit(recordings, joint, on)
+    def anew(found: Sequence[Term] = ()) -> Fit | None:
+        return best_fit(recordings, joint, on, found=found)
+
+    fit = anew()
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, fit, declared, allowed, read)
+    return AxisModel(axis, fit, anew, declared, allowed, read)
 
 
 def declared_effects(

@@ -196,14 +196,15 @@ def close(
 
 def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
     laid = lay(model, runs, axis)
-    loop = close_loop(laid.fit, laid.library, seed)
+    loop = close_loop(laid.fit, laid.library, seed, anew=laid.anew)
     # What a heavy joint of an arm that moves all of them draws tells its sign only beside what the
     # others ask.
     others = laid.dataset.fine.track.others is not None
     if others and not laid.read.opposite and drag_t(loop.after) < -DRIVEN_T:
         negative = lay(model, runs, axis, opposite=True)
         if negative.read.opposite:  # Of phase currents there is none.
-            laid, loop = negative, close_loop(negative.fit, negative.library, seed)
+            laid = negative
+            loop = close_loop(laid.fit, laid.library, seed, anew=laid.anew)
             laid.notes.append(OPPOSITE.format(axis))
     named = sorted({step.term.effect.name for step in loop.steps} & LIKE_ANOTHER_JOINT)
     if named and "coupling" in loop.untestable:
