@@ -12,10 +12,11 @@ from opamc_cli.joint.fit.parts import ROUNDING
 from opamc_cli.joint.name.chain import PRICE, Chain, chain_of, extended, released, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
-from opamc_cli.joint.name.settle import EXACT, Named, settled, worth_their_price
+from opamc_cli.joint.name.settle import EXACT, Named, lowering, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.signal.motion.smoothing import measurement_noise
 
+RAISES = "raises the error of all samples beside the others"
 TWICE = 2.0
 """The open samples' error: sealed ones of 34 joints had 0.7 to 1.7 times it, one changed 2.6."""
 
@@ -88,6 +89,8 @@ class Loop:
     """Standard deviation of what changes from sample to sample in the final residual."""
     explained_share: float
     """Share of the ceiling that named effects reach, 0 to 1."""
+    asked: tuple[Term, ...]
+    """Named effects before any was dropped for the error that it raised."""
     remaining_domain: str | None
     """Where something without a name is left."""
 
@@ -110,8 +113,7 @@ def close_loop(
     beside it the loop is closed again, and the smaller open error counts.
     """
     loop = _closed(before, library, seed, without_rules)
-    named = [step.term for step in loop.steps if step.named]
-    again = anew(named) if anew is not None and named else None
+    again = anew(loop.asked) if anew is not None and loop.asked else None
     if again is None or not _differ(before, again):
         return loop
     other = _closed(again, library, seed, without_rules)
@@ -141,12 +143,17 @@ def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
+    final = lowering(final)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
     steps = _steps(start, final, named, shares, seed)
-    tried = [(i, trial) for i, one in enumerate(named) for trial in (one.trial.told, *one.others)]
+    kept = {id(term) for term in final.terms}
+    told = [one.trial.told for one in named]
+    told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
+    tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    return _opened(before, only_named.fit, final.fit, saturated, steps, tried, library)
+    asked = tuple(one.term for one in named)
+    return _opened(before, only_named.fit, final.fit, saturated, steps, tried, asked, library)
 
 
 def _with_true_names(
@@ -201,6 +208,7 @@ def _opened(
     saturated: Sequence[Chain],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
+    asked: tuple[Term, ...],
     library: Library,
 ) -> Loop:
     # What either explains can be explained.
@@ -260,6 +268,7 @@ def _opened(
         floor_a=min(rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))), rmse_after),
         noise_a=noise_a,
         explained_share=float(np.clip(reached, 0.0, 1.0)),
+        asked=asked,
         remaining_domain=domain,
     )
 

@@ -1,6 +1,7 @@
 """Simulate a joint and close the loop on it."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from simulator import DECLARED, simulate
@@ -28,15 +29,16 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
         position_rad=made.position,
         temperature_c=made.temperature,
     )
-    fitted = fit_declared([recording], Joint(made.gear_ratio, made.pole_pairs), base)
-    assert fitted is not None
-    return made, close_loop(fitted, built_in_library(without), seed)
+    fit = partial(fit_declared, [recording], Joint(made.gear_ratio, made.pole_pairs), base)
+    return made, close_loop(fit(), built_in_library(without), seed, anew=fit)
 
 
-def fit_declared(recordings, joint=None, base=DECLARED):
+def fit_declared(recordings, joint=None, base=DECLARED, found=()):
     library = built_in_library()
     terms = tuple((library[name], None) for name in base)
-    return best_fit(recordings, joint or Joint(), lambda dataset: terms)
+    fitted = best_fit(recordings, joint or Joint(), lambda dataset: terms, found=found)
+    assert fitted is not None
+    return fitted
 
 
 def plain_fit(recording, base=DECLARED, averaged=True):
