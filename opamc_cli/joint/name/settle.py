@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.fit.model import SETTLED, Term
 from opamc_cli.joint.name.chain import Chain, extended, without
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
@@ -88,7 +88,7 @@ def lowering(chain: Chain) -> Chain:
         fewer = (without(chain, place) for place in range(chain.added))
         found = [(one.fit.rmse(sealed=False), one) for one in fewer]
         least, best = min(found, key=lambda pair: pair[0])
-        if least >= error:
+        if least >= error * (1 - SETTLED):
             break
         error, chain = least, best
     return chain
