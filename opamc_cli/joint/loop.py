@@ -95,8 +95,8 @@ class Loop:
     """Where something without a name is left."""
 
 
-Anew = Callable[[Sequence[Term]], Fit | None]
-"""Fits the declared model again, to the motion differentiated as what was found asks."""
+Anew = Callable[[Fit, Sequence[Term]], Fit | None]
+"""Fits the declared model again, to the motion as it is differentiated best beside found terms."""
 
 
 def close_loop(
@@ -113,18 +113,12 @@ def close_loop(
     beside it the loop is closed again, and the smaller open error counts.
     """
     loop = _closed(before, library, seed, without_rules)
-    again = anew(loop.asked) if anew is not None and loop.asked else None
-    if again is None or not _differ(before, again):
+    again = anew(before, loop.asked) if anew is not None and loop.asked else None
+    if again is None:
         return loop
     other = _closed(again, library, seed, without_rules)
-    errors = (one.after.rmse(sealed=False) for one in (other, loop))
-    return other if next(errors) < next(errors) else loop
-
-
-def _differ(one: Fit, other: Fit) -> bool:
-    """Whether the motion was differentiated in two ways."""
-    first, second = (fit.dataset.fine.track.acceleration for fit in (one, other))
-    return not np.array_equal(first, second)
+    better = other.after.rmse(sealed=False) < loop.after.rmse(sealed=False)
+    return other if better else loop
 
 
 def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[str]) -> Loop:

@@ -7,7 +7,7 @@ import numpy as np
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit
+from opamc_cli.joint.explain.declared import best_fit, fit_beside
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
@@ -29,16 +29,21 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
         position_rad=made.position,
         temperature_c=made.temperature,
     )
-    fit = partial(fit_declared, [recording], Joint(made.gear_ratio, made.pole_pairs), base)
-    return made, close_loop(fit(), built_in_library(without), seed, anew=fit)
+    joint = Joint(made.gear_ratio, made.pole_pairs)
+    anew = partial(fit_beside, [recording], joint, terms_of(base))
+    fitted = fit_declared([recording], joint, base)
+    return made, close_loop(fitted, built_in_library(without), seed, anew=anew)
 
 
-def fit_declared(recordings, joint=None, base=DECLARED, found=()):
-    library = built_in_library()
-    terms = tuple((library[name], None) for name in base)
-    fitted = best_fit(recordings, joint or Joint(), lambda dataset: terms, found=found)
+def fit_declared(recordings, joint=None, base=DECLARED):
+    fitted = best_fit(recordings, joint or Joint(), terms_of(base))
     assert fitted is not None
     return fitted
+
+
+def terms_of(names):
+    library = built_in_library()
+    return lambda dataset: tuple((library[name], None) for name in names)
 
 
 def plain_fit(recording, base=DECLARED, averaged=True):

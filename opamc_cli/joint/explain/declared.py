@@ -8,6 +8,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
+from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
@@ -35,55 +36,97 @@ def best_fit(
     joint: Joint,
     declared: Callable[[Dataset], Declared],
     without_rules: Collection[str] = (),
-    found: Sequence[Term] = (),
 ) -> Fit | None:
     """Fit a declared model to recordings, differentiated in the way that predicts best.
 
-    The recordings are in time order, all at one rate; the rule "windows" may be switched off. What
-    was `found` beside the declared model is not fitted, but has its say in how to differentiate.
-    None where too little moves to seal anything off.
+    The recordings are in time order, all at one rate; the rule "windows" may be switched off. None
+    where too little moves to seal anything off.
     """
     track, grouping = grouped_track(recordings, joint)
     if grouping is None or not is_moving(track):
         return None
     dataset = dataset_of(track, grouping)
     model = declared(dataset)
-    ways = [] if "windows" in without_rules else smoothings(recordings)
-    known = (*model, *((term.effect, term) for term in found))
-    smoothing = _best_of(ways, excerpts(recordings, track), joint, known) if ways else None
+    if "windows" in without_rules or not smoothings(recordings):
+        return declared_fit(dataset, model)
+    ways = _Ways(excerpts(recordings, track), joint)
+    best = ways.best_of(None, model)
+    # What fits best as declared may have smoothed away what something missing answers to.
+    if best is None or ways.unexplained(None, model) < HALF * ways.unexplained(best, model):
+        return declared_fit(dataset, model)
+    return declared_fit(_differentiated(recordings, joint, best, track, grouping), model)
+
+
+def fit_beside(
+    recordings: list[Recording],
+    joint: Joint,
+    declared: Callable[[Dataset], Declared],
+    before: Fit,
+    found: Sequence[Term],
+) -> Fit | None:
+    """Fit a declared model to the motion as it is differentiated best beside what was found.
+
+    `before` is the model's fit, beside which terms were `found`; None where none predicts better
+    than its motion does.
+    """
+    if not smoothings(recordings):
+        return None
+    present = before.dataset.smoothing
+    model = declared(before.dataset)
+    track, grouping = grouped_track(recordings, joint)
+    ways = _Ways(excerpts(recordings, track), joint)
+    best = ways.best_of(present, (*model, *((term.effect, term) for term in found)))
+    if best == present or grouping is None:
+        return None
+    return declared_fit(_differentiated(recordings, joint, best, track, grouping), model)
+
+
+def _differentiated(
+    recordings: list[Recording],
+    joint: Joint,
+    smoothing: Smoothing | None,
+    track: Track,
+    grouping: Grouping,
+) -> Dataset:
+    """Return recordings with another motion, judged by the samples of a first track."""
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
-        dataset = dataset_of(track, grouping)
-    return declared_fit(dataset, model)
+    return replace(dataset_of(track, grouping), smoothing=smoothing)
 
 
-def _best_of(
-    ways: list[Smoothing], recordings: list[Recording], joint: Joint, model: Declared
-) -> Smoothing | None:
-    """Return the way to differentiate that predicts best; None for what the noise asks for."""
-    track, grouping = grouped_track(recordings, joint)
-    if grouping is None:
-        return None
+class _Ways:
+    """Ways to differentiate recordings; None is what the noise of each path asks for."""
 
-    def held_out(track: Track) -> float:
-        sums = declared_fit(dataset_of(track, grouping), model).sums
-        return float(sums.held_out()[sums.parts.judged].sum())
+    def __init__(self, recordings: list[Recording], joint: Joint) -> None:
+        self._recordings, self._joint = recordings, joint
+        self._track, self._grouping = grouped_track(recordings, joint)
 
-    def unexplained(track: Track) -> float:
-        fit = declared_fit(dataset_of(track, grouping, ENOUGH), model)
+    def best_of(self, first: Smoothing | None, model: Declared) -> Smoothing | None:
+        """Return the way that predicts best; the first, unless another is worth it."""
+        if self._grouping is None:
+            return first
+        best, error = first, self._held_out(first, model)
+        for smoothing in (None, *smoothings(self._recordings)):
+            if smoothing != first and (found := self._held_out(smoothing, model)) < BETTER * error:
+                best, error = smoothing, found
+        return best
+
+    def unexplained(self, smoothing: Smoothing | None, model: Declared) -> float:
+        """Return what the best functions without a name leave beside a model."""
+        fit = declared_fit(self._dataset(smoothing, ENOUGH), model)
         pool = Pool.of(fit.dataset, unnamed_library())
         return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS).mean_square
 
-    first, error, best = track, held_out(track), None
-    for smoothing in ways:
-        other = judged_alike(build_track(recordings, joint, smoothing), first)
-        found = held_out(other)
-        if found < BETTER * error:
-            track, error, best = other, found, smoothing
-    # What fits best as declared may have smoothed away what something missing answers to.
-    if best is not None and unexplained(first) < HALF * unexplained(track):
-        return None
-    return best
+    def _held_out(self, smoothing: Smoothing | None, model: Declared) -> float:
+        sums = declared_fit(self._dataset(smoothing), model).sums
+        return float(sums.held_out()[sums.parts.judged].sum())
+
+    def _dataset(self, smoothing: Smoothing | None, *limit: int) -> Dataset:
+        track = self._track
+        if smoothing is not None:
+            track = judged_alike(build_track(self._recordings, self._joint, smoothing), track)
+        assert self._grouping is not None
+        return dataset_of(track, self._grouping, *limit)
 
 
 def judged_alike(other: Track, track: Track) -> Track:

@@ -14,6 +14,7 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
+from opamc_cli.joint.motion.kinematics import Smoothing
 from opamc_cli.joint.motion.track import (
     Bools,
     Floats,
@@ -113,6 +114,8 @@ class Dataset:
     """Fine samples per coarse one."""
     grouping: Grouping
     """What is left out as one, and what is sealed."""
+    smoothing: Smoothing | None = None
+    """How the motion was differentiated; None: as the noise of each path asks for."""
     opened: "Dataset | None" = None
     """The same open samples with some of every sealed group beside them, where `fine` has none."""
     held: bool = True

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -9,9 +10,9 @@ from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
-from opamc_cli.joint.explain.declared import Declared, best_fit
+from opamc_cli.joint.explain.declared import Declared, best_fit, fit_beside
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.fit.model import Dataset, Fit, Term
+from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.loop import Anew
 from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
@@ -130,13 +131,11 @@ def lay(
         track = dataset.coarse.track
         return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
 
-    def anew(found: Sequence[Term] = ()) -> Fit | None:
-        return best_fit(recordings, joint, on, found=found)
-
-    fit = anew()
+    fit = best_fit(recordings, joint, on)
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
+    anew = partial(fit_beside, recordings, joint, on)
     return AxisModel(axis, fit, anew, declared, allowed, read)
 
 
