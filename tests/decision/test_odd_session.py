@@ -71,8 +71,8 @@ def test_two_of_four_sessions_do_not_tell_which_two_are_worn():
 
 def test_healthy_baselines_hang_together():
     """At the level of 1 % a robot."""
-    found = [odd_sessions(one, judge(one)) for one in (robot(seed) for seed in range(60))]
-    assert sum(map(bool, found)) <= 2
+    found = [odd_sessions(one, judge(one)) for one in (robot(seed) for seed in range(30))]
+    assert sum(map(bool, found)) <= 1
 
 
 def test_three_sessions_do_not_tell_which_of_them_is_odd():
