@@ -5,7 +5,7 @@ import pytest
 from opamc_cli.stages.chain.compared.speeds import odd_speeds
 
 
-def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
+def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0, carrier=None):
     """Two axes of some runs, four motions each, of which a reference cycle has its own speed."""
     rows = [
         {
@@ -18,6 +18,9 @@ def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0):
             "kind": "motion",
             "sampling_rate_hz": 100.0,
             "reference_samples": round(samples * (1 + 0.2 * motion) / references[axis]),
+            "signal": "reported" if carrier is None else "phases",
+            "f_max_hz": 60 * speed if carrier is None else carrier,
+            "reference_f_max_hz": 60 * references[axis],
         }
         for number, speed in enumerate(speeds)
         for axis in range(2)
@@ -55,6 +58,17 @@ def test_few_samples_leave_the_speed_open_however_many_motions_there_are():
 def test_a_joint_whose_boundaries_move_does_not_make_another_speed():
     odd = table([1.0], odd_axis=1.012)
     assert not odd_speeds(odd, table([1.0]), 0.01)
+
+
+@pytest.mark.parametrize(("carrier", "same"), [(60.0, True), (60.0 * 0.97, False)])
+def test_the_carrier_tells_a_fault_s_longer_motions_from_another_speed(carrier, same):
+    longer = table([0.97], carrier=carrier)
+    assert bool(odd_speeds(longer, table([1.0], carrier=60.0), 0.01)) is not same
+
+
+def test_motions_that_are_much_longer_at_the_same_carrier_are_of_another_program():
+    longer = table([0.9], carrier=60.0)
+    assert odd_speeds(longer, table([1.0], carrier=60.0), 0.01).keys() == {"run0"}
 
 
 def test_nothing_identified_has_no_speed():
