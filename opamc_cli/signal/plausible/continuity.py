@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
-from opamc_cli.signal.quality import WRAPPED
+from opamc_cli.signal.plausible.quality import WRAPPED
 
 Floats = NDArray[np.float64]
 

@@ -45,6 +45,8 @@ class AxisRecordings:
     """Whether the currents are the negative of what was logged."""
     notes: list[str]
     """What the runs lack."""
+    doubts: list[str]
+    """Of the notes those that say that a run is wrong."""
 
 
 @dataclass(frozen=True)
@@ -182,9 +184,10 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
     notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
-    notes += [
+    doubts = [
         note for run, one in zip(runs, recordings, strict=True) for note in mistaken(run, axis, one)
     ]
+    notes += doubts
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
     signed = len(pairs) == len(recordings)
@@ -199,7 +202,7 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes)
+    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes, doubts)
 
 
 def _too_little_motion(

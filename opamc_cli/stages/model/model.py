@@ -136,6 +136,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
             for trial in tried
         ],
         "notes": laid.notes,
+        "doubts": laid.read.doubts,
         "untestable": [
             {"effect": name, "why": why} for name, why in untestable(base, laid.library).items()
         ],
@@ -212,7 +213,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         laid.notes.append(ALONE.format(axis, " and ".join(named)))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
-        laid.notes.extend(note for run in runs for note in scaled(run, axis, by_name[run.name]))
+        doubts = [note for run in runs for note in scaled(run, axis, by_name[run.name])]
+        laid.notes.extend(doubts)
+        laid.read.doubts.extend(doubts)
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),

@@ -12,7 +12,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.motion.reported import unwrapped, velocity_from_position
 from opamc_cli.signal.motion.signs import another_motion, lacks_sign, signed_by_speed, speed_ratio
-from opamc_cli.signal.quality import LIMITS, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs.run import Run

@@ -5,8 +5,8 @@ import numpy as np
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.plausible.continuity import leaps
+from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
 from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
-from opamc_cli.signal.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.run import Run
 

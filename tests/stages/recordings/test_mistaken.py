@@ -98,8 +98,9 @@ def test_numbers_that_few_joints_have_are_said(model, capsys):
 
 
 def test_gravity_of_another_scale_is_said_where_no_effect_explains_it(model, tmp_path, capsys):
-    code = model("close", axis1_current=OWN.current, axis1_position=OWN.position / 100)
+    code = model("close", "--quiet", axis1_current=OWN.current, axis1_position=OWN.position / 100)
     assert code == 0
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     (note,) = [note for note in entry["notes"] if "gravity in axis1_current" in note]
-    assert note in capsys.readouterr().err
+    assert entry["doubts"] == [note]
+    assert f"opamc: {note}\n" in capsys.readouterr().err

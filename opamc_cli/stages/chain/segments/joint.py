@@ -13,7 +13,7 @@ from opamc_cli.signal.motion.reported import (
 )
 from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.signal.motion.windows import carrier_windows
-from opamc_cli.signal.quality import LIMITS, clipped_share
+from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
     AxisSegments,
     Segment,
