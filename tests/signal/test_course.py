@@ -8,7 +8,7 @@ import pytest
 from opamc_cli.signal.course import mean_course, repeated_course
 from opamc_cli.signal.motion.reported import fluctuation_frequency
 from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed
-from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.plausible.quality import clipped_share
 
 
 @pytest.mark.parametrize(("n", "parts"), [(64, 8), (65, 8), (7, 8), (100, 33)])

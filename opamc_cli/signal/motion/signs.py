@@ -31,8 +31,11 @@ DRIVEN_HZ = 100.0
 """At which a friction is told from the load: a motion has some 50 samples a stroke."""
 RATIO_BLOCK_S = 0.1
 FEWEST_BLOCKS = 20
-SAME_MOTION = 0.98
-"""Correlation of a logged speed with the rate of change of a logged position."""
+SAME_MOTION, UNRELATED = 0.98, 0.3
+"""Correlation of a logged speed with the rate of change of a logged position, from which they are
+one motion, and up to which they are two. Between, one of them may be late or filtered."""
+LEAST_SPEED_RAD_S = 0.01
+"""Root mean square below which either is noise about a standstill."""
 
 
 def lacks_sign(current: NDArray[np.floating], velocity_rad_s: NDArray[np.floating]) -> bool | None:
@@ -203,16 +206,36 @@ def speed_ratio(
 
     1 where the units agree; None where the two do not tell, or have nothing to do with one another.
     """
+    power, both, other = _squares(position_rad, velocity_rad_s, rate_hz)
+    if power <= 0 or both**2 < SAME_MOTION**2 * power * other:
+        return None
+    return both / power
+
+
+def another_motion(
+    position_rad: NDArray[np.floating], velocity_rad_s: NDArray[np.floating], rate_hz: float
+) -> bool:
+    """Whether a position and a speed, both (n,), both move and hardly ever in time."""
+    power, both, other = _squares(position_rad, velocity_rad_s, rate_hz)
+    return min(power, other) > LEAST_SPEED_RAD_S**2 and both**2 < UNRELATED**2 * power * other
+
+
+def _squares(
+    position_rad: NDArray[np.floating], velocity_rad_s: NDArray[np.floating], rate_hz: float
+) -> tuple[float, float, float]:
+    """Mean squares of a position's rate of change, of it times a speed, of the speed; in blocks."""
     length = max(int(RATIO_BLOCK_S * rate_hz), 1)
     edges = np.arange(0, position_rad.size, length)
     if edges.size < FEWEST_BLOCKS:
-        return None
+        return 0.0, 0.0, 0.0
     change = np.diff(position_rad[edges]) * rate_hz / length
     sums = np.concatenate([[0.0], np.cumsum(velocity_rad_s)])
     speed = np.diff(sums[edges]) / length
     good = np.isfinite(change) & np.isfinite(speed)
-    power = float(change[good] @ change[good])
-    both = float(change[good] @ speed[good])
-    if power <= 0 or both**2 < SAME_MOTION**2 * power * float(speed[good] @ speed[good]):
-        return None
-    return both / power
+    change, speed = change[good], speed[good]
+    count = max(change.size, 1)
+    return (
+        float(change @ change) / count,
+        float(change @ speed) / count,
+        float(speed @ speed) / count,
+    )

@@ -16,7 +16,7 @@ from opamc_cli.config import Config
 from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
-from opamc_cli.signal.quality import bridged
+from opamc_cli.signal.plausible.quality import bridged
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched

@@ -22,6 +22,7 @@ from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
+from opamc_cli.stages.recordings.mistaken import mistaken
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import same_clock
 
@@ -46,6 +47,8 @@ class AxisRecordings:
     """Whether the currents are the negative of what was logged."""
     notes: list[str]
     """What the runs lack."""
+    doubts: list[str]
+    """Of the notes those that say that a run is wrong."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +189,10 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
     notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
+    doubts = [
+        note for run, one in zip(runs, recordings, strict=True) for note in mistaken(run, axis, one)
+    ]
+    notes += doubts
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
     signed = len(pairs) == len(recordings)
@@ -200,7 +207,7 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes)
+    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes, doubts)
 
 
 def _too_little_motion(

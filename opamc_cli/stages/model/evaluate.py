@@ -119,6 +119,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             *read.notes,
             *([UNTOLD.format(axis)] if known is None else []),
         ],
+        "doubts": read.doubts,
     }
 
 

@@ -29,6 +29,7 @@ from opamc_cli.stages.model.tables import (
     spectrum_table,
 )
 from opamc_cli.stages.processes.parallel import Watch, unwatched
+from opamc_cli.stages.recordings.mistaken import scaled
 from opamc_cli.storage.files.atomic import ensure_directory, write_json, write_text
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
@@ -42,6 +43,7 @@ ALONE = (
     "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
     "like {}; log it beside to tell"
 )
+ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
 joints of arms that move all of them six did so, by 11 to 161; the least of the others by 3."""
@@ -134,6 +136,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
             for trial in tried
         ],
         "notes": laid.notes,
+        "doubts": laid.read.doubts,
         "untestable": [
             {"effect": name, "why": why} for name, why in untestable(base, laid.library).items()
         ],
@@ -209,6 +212,11 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     named = sorted({step.term.effect.name for step in loop.steps} & LIKE_ANOTHER_JOINT)
     if named and "coupling" in loop.untestable:
         laid.notes.append(ALONE.format(axis, " and ".join(named)))
+    if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
+        by_name = {one.name: one for one in laid.read.recordings}
+        doubts = [note for run in runs for note in scaled(run, axis, by_name[run.name])]
+        laid.notes.extend(doubts)
+        laid.read.doubts.extend(doubts)
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),

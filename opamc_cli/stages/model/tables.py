@@ -94,6 +94,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
         "groups": _groups_entry(laid.dataset),
         "condition_number": known.condition_number,
         "notes": laid.notes,
+        "doubts": laid.read.doubts,
         "inseparable": [list(names) for names in known.inseparable],
         "rmse_a": result.rmse(sealed=False),
         "terms": [
@@ -249,6 +250,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "orders": _orders(loop.after.dataset.fine.track),
         "fails": _failure(loop),
         "notes": laid.notes,
+        "doubts": laid.read.doubts,
     }
 
 

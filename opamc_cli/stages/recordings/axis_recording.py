@@ -11,8 +11,8 @@ from opamc_cli.config.reading import shown
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.motion.reported import unwrapped, velocity_from_position
-from opamc_cli.signal.motion.signs import lacks_sign, signed_by_speed, speed_ratio
-from opamc_cli.signal.quality import LIMITS, strided_speed
+from opamc_cli.signal.motion.signs import another_motion, lacks_sign, signed_by_speed, speed_ratio
+from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs.run import Run
@@ -183,6 +183,12 @@ def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | 
     """Refuse a position and a speed that are the same motion in different units, or signs."""
     if position is None or velocity is None:
         return
+    if another_motion(position, velocity, run.sampling_rate_hz):
+        msg = (
+            f"{run.path}: axis{axis}_velocity is not the rate of change of axis{axis}_position: "
+            "is one of them another joint's? Correct the map of opamc ingest"
+        )
+        raise InputError(msg)
     ratio = speed_ratio(position, velocity, run.sampling_rate_hz)
     for known, unit in UNITS.items():
         if ratio is not None and abs(ratio / known - 1) < SAME_RATIO:

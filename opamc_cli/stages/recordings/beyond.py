@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.signal.quality import Limit, Size
+from opamc_cli.signal.plausible.quality import Limit, Size
 
 
 def limited(path: Path, column: str, values: npt.NDArray[np.floating], limit: Limit) -> str | None:

@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError, OpamcError, UsageError
-from opamc_cli.signal.quality import LIMITS, Size, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, Size, strided_speed
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.files.parquet import read_schema

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
-from opamc_cli.signal.quality import LIMITS, spikes
+from opamc_cli.signal.plausible.quality import LIMITS, spikes
 from opamc_cli.storage.files.parquet import reading, samples_sha256
 from opamc_cli.storage.runs.columns import AxisChannels, axis_channels
 from opamc_cli.storage.runs.hashes import file_sha256

@@ -21,7 +21,7 @@ from opamc_cli.signal.motion.segmentation import (
 )
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.offset import turning_means, turning_offset
-from opamc_cli.signal.quality import LIMITS, Size, clipped_share
+from opamc_cli.signal.plausible.quality import LIMITS, Size, clipped_share
 from opamc_cli.signal.transform.analytic import (
     AnalyticStream,
     clarke,

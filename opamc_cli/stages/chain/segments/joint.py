@@ -13,7 +13,7 @@ from opamc_cli.signal.motion.reported import (
 )
 from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.signal.motion.windows import carrier_windows
-from opamc_cli.signal.quality import LIMITS, clipped_share
+from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
     AxisSegments,
     Segment,
@@ -22,6 +22,7 @@ from opamc_cli.stages.chain.segments.rows import (
     mean_variance,
 )
 from opamc_cli.stages.recordings.beyond import limited
+from opamc_cli.stages.recordings.mistaken import missing
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
 
@@ -75,6 +76,7 @@ def joint_segments(
         )
         raise InputError(msg)
     notes = [note for note in beyond if note]
+    notes += missing(run, channels.position) if channels.position else []
     if known.size < current.size:
         notes.append(
             f"{run.path}: column {name} has {current.size - known.size} samples that are no "

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
-from opamc_cli.signal.quality import clipped_share
+from opamc_cli.signal.plausible.quality import clipped_share
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run

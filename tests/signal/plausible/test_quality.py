@@ -5,7 +5,7 @@ import pytest
 from carriers import Move, record
 
 from opamc_cli.signal.motion.noise import noise_level
-from opamc_cli.signal.quality import (
+from opamc_cli.signal.plausible.quality import (
     LIMITS,
     Size,
     bridged,

@@ -1,0 +1,137 @@
+"""Recordings in which channels are of another joint, clock, scale, or lack samples: it is said."""
+
+import numpy as np
+
+from opamc_cli.errors import InputError
+from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.signal.plausible.continuity import leaps
+from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
+from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
+from opamc_cli.stages.recordings.beyond import limited
+from opamc_cli.storage.runs.run import Run
+
+UNITS = {180 / np.pi: "rad taken for degrees", np.pi / 180: "degrees taken for rad"} | {
+    2 * np.pi: "turns taken for rad",
+    0.5 / np.pi: "rad taken for turns",
+}
+"""Times by which an angle is too small, and what it then probably is."""
+NEARLY = 0.2
+"""By which a scale may miss one of them: gravity does not tell it better over a short travel."""
+WRAPS, WRAPS_LIKE = {360.0: "degrees", 1.0: "turns"}, 0.05
+MOST_LOOKED, STRETCHES = 1 << 20, 4
+"""Samples of an angle whose steps are looked at, in four stretches: of eight hours enough."""
+
+
+def mistaken(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say what is odd about one axis of a run that `read_recording` did not refuse.
+
+    Raises
+    ------
+    InputError
+        If the angle leaps back by one size that is no turn.
+    """
+    notes = [
+        *_sizes(run, axis, recording),
+        *missing(run, f"axis{axis}_position"),
+    ]
+    x, q = recording.current_a, recording.position_rad
+    if x is None or q is None or recording.phases_a is not None:
+        return notes
+    other = follows(x, {axis: q, **recording.others_rad}, axis, recording.rate_hz)
+    if other is not None:
+        return [
+            *notes,
+            f"{run.path}: axis{axis}_current follows the motion of axis{other}_position and not "
+            f"that of axis{axis}_position: friction is of a joint's own motion; are columns "
+            "exchanged? Correct the map of opamc ingest",
+        ]
+    late = lags(x, q, recording.rate_hz)
+    return [*notes, _late(run, axis, late)] if late else notes
+
+
+def _sizes(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say which numbers few joints have."""
+    found = []
+    if recording.phases_a is None and recording.current_a is not None:
+        unit = LIMITS[run.info.current_unit]
+        found.append(limited(run.path, f"axis{axis}_current", recording.current_a, unit))
+    if recording.velocity_rad_s is not None:
+        speed = recording.velocity_rad_s
+        found.append(limited(run.path, f"axis{axis}_velocity", speed, LIMITS["velocity"]))
+    if recording.position_rad is not None:
+        speed = strided_speed(recording.position_rad, recording.rate_hz)
+        name = f"axis{axis}_position (its speed)"
+        found.append(limited(run.path, name, speed, LIMITS["position"]))
+    return [note for note in found if note]
+
+
+def missing(run: Run, column: str) -> list[str]:
+    """Say how many samples an angle's steps show to be missing.
+
+    Raises
+    ------
+    InputError
+        If the angle leaps back by one size that is no turn.
+    """
+    if column not in run.columns:
+        return []
+    found, looked = [], 0
+    parts = min(run.n_samples, MOST_LOOKED) // STRETCHES if run.n_samples > MOST_LOOKED else None
+    starts = [0] if parts is None else np.linspace(0, run.n_samples - parts, STRETCHES).tolist()
+    for start in map(int, starts):
+        stop = None if parts is None else start + parts
+        position = np.asarray(run.read([column], start, stop)[column], dtype=np.float64)
+        looked += position.size
+        found.append(leaps(position))
+    told = [one for one in found if one is not None]
+    if not told:
+        return []
+    places = sum(one.places for one in told)
+    wraps = [one.wrap for one in told if one.wrap is not None]
+    if wraps:
+        units = [name for size, name in WRAPS.items() if abs(wraps[0] / size - 1) < WRAPS_LIKE]
+        msg = (
+            f"{run.path}: column {column} leaps back by {wraps[0]:.4g} at {places} places, and no "
+            f"joint does: an angle that wraps{f', in {units[0]}' if units else ''}? Name its unit "
+            "in the map of opamc ingest, or unwrap it"
+        )
+        raise InputError(msg)
+    return [
+        f"{run.path}: column {column} steps by twice as much and more as beside at {places} "
+        f"places: about {sum(one.missing for one in told)} samples seem to be missing beside "
+        f"{looked}, and what follows comes early; log a time and ingest with it"
+    ]
+
+
+def _late(run: Run, axis: int, late: list[float]) -> str:
+    first, last = late[0], late[-1]
+    if abs(last - first) > DRIFTED_S:
+        return (
+            f"{run.path}: axis{axis}_position comes {1e3 * first:+.0f} ms after what "
+            f"axis{axis}_current tells at the beginning, {1e3 * last:+.0f} ms at the end: two "
+            "clocks of different rates? Log both with one clock, or ingest each with its own time"
+        )
+    middle = float(np.median(late))
+    return (
+        f"{run.path}: axis{axis}_position comes {1e3 * abs(middle):.0f} ms "
+        f"{'after' if middle > 0 else 'before'} the motion that axis{axis}_current tells: "
+        "is one of them logged or filtered late?"
+    )
+
+
+def scaled(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say by how much gravity tells another scale of the angle, where no effect explains it."""
+    x, q = recording.current_a, recording.position_rad
+    if x is None or q is None or recording.phases_a is not None:
+        return []
+    scale = other_scale(x, q, recording.rate_hz)
+    if scale is None:
+        return []
+    named = [name for size, name in UNITS.items() if abs(scale / size - 1) < NEARLY]
+    what = f"{named[0]}, or " if named else ""
+    times = f"{scale:.3g}" if scale > 1 else f"1/{1 / scale:.3g}"
+    return [
+        f"{run.path}: gravity in axis{axis}_current is that of an angle {times} times "
+        f"axis{axis}_position: {what}the motor's side taken for the joint's, or a gear ratio "
+        "applied twice? Correct it in the map of opamc ingest"
+    ]

@@ -1,0 +1,106 @@
+"""A recording that is wrong though it can be read: what `opamc model` and `segment` say of it."""
+
+import json
+import re
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from simulator import simulate
+
+from opamc_cli.__main__ import main
+
+RATE = 250.0
+OWN, OTHER = (simulate(seed, rate=RATE, kind="trapezoid", cycles=6) for seed in (5, 4))
+
+
+def write(path, **columns):
+    size = min(len(values) for values in columns.values())
+    table = pa.table({name: pa.array(values[:size]) for name, values in columns.items()})
+    record = json.dumps({"sampling_rate_hz": RATE}).encode()
+    pq.write_table(table.replace_schema_metadata({b"opamc": record}), path)
+    return path
+
+
+def opamc(*arguments):
+    with pytest.raises(SystemExit) as stopped:
+        main([str(argument) for argument in arguments])
+    return int(stopped.value.code or 0)
+
+
+@pytest.fixture
+def model(tmp_path):
+    def run(step="fit", *more, **columns):
+        file = write(tmp_path / "run.parquet", **columns)
+        return opamc("model", step, file, "--axis", "1", "--out", tmp_path / "out", *more)
+
+    return run
+
+
+def test_a_right_recording_has_no_note(model, capsys):
+    assert model(axis1_current=OWN.current, axis1_position=OWN.position) == 0
+    assert "run.parquet" not in capsys.readouterr().err
+
+
+def test_another_joints_position_is_named(model, capsys):
+    code = model(
+        axis1_current=OWN.current,
+        axis1_position=OTHER.position,
+        axis2_current=OTHER.current,
+        axis2_position=OWN.position,
+    )
+    assert code == 0
+    said = capsys.readouterr().err
+    assert "axis1_current follows the motion of axis2_position" in said
+
+
+def test_a_speed_of_another_joint_is_refused(model, capsys):
+    speed = np.gradient(OTHER.position) * RATE
+    code = model(axis1_current=OWN.current, axis1_position=OWN.position, axis1_velocity=speed)
+    assert code == 3
+    assert "axis1_velocity is not the rate of change of axis1_position" in capsys.readouterr().err
+
+
+def test_missing_samples_are_said_by_model_and_segment(model, tmp_path, capsys):
+    kept = np.random.default_rng(0).random(OWN.position.size) > 0.03
+    columns = {"axis1_current": OWN.current[kept], "axis1_position": OWN.position[kept]}
+    assert model(**columns) == 0
+    assert "samples seem to be missing" in capsys.readouterr().err
+    file = write(tmp_path / "run.parquet", **columns)
+    assert opamc("segment", file, "--out", tmp_path / "out", "--quiet") == 0
+    assert opamc("segment", file, "--out", tmp_path / "other") == 0
+    assert "samples seem to be missing" in capsys.readouterr().err
+
+
+def test_an_angle_that_wraps_by_less_than_a_turn_is_refused(model, capsys):
+    turns = OWN.position / (2 * np.pi)
+    wrapped = (turns - np.median(turns)) % 1.0
+    assert model(axis1_current=OWN.current, axis1_position=wrapped) == 3
+    assert "an angle that wraps, in turns?" in capsys.readouterr().err
+
+
+def test_two_clocks_and_a_late_position_are_said(model, capsys):
+    place = np.arange(OWN.position.size)
+    drifting = np.interp(place * 0.997, place, OWN.position)
+    assert model(axis1_current=OWN.current, axis1_position=drifting) == 0
+    assert "two clocks of different rates?" in capsys.readouterr().err
+    late = np.interp(place - 0.2 * RATE, place, OWN.position)
+    assert model(axis1_current=OWN.current, axis1_position=late) == 0
+    assert re.search("comes (199|20.) ms after the motion", capsys.readouterr().err)
+
+
+def test_numbers_that_few_joints_have_are_said(model, capsys):
+    large = OWN.current * 300.0 / np.abs(OWN.current).max()
+    times = np.where(np.arange(large.size) % 3 == 0, 1.0, 0.98)
+    assert model(axis1_current=large * times, axis1_position=OWN.position) == 0
+    assert "mA taken for A?" in capsys.readouterr().err
+
+
+def test_gravity_of_another_scale_is_said_where_no_effect_explains_it(model, tmp_path, capsys):
+    code = model("close", "--quiet", axis1_current=OWN.current, axis1_position=OWN.position / 100)
+    assert code == 0
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    (note,) = [note for note in entry["notes"] if "gravity in axis1_current" in note]
+    assert entry["doubts"] == [note]
+    assert f"opamc: {note}\n" in capsys.readouterr().err
