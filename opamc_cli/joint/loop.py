@@ -89,10 +89,10 @@ class Loop:
     """Standard deviation of what changes from sample to sample in the final residual."""
     explained_share: float
     """Share of the ceiling that named effects reach, 0 to 1."""
-    asked: tuple[Term, ...]
-    """Named effects before any was dropped for the error that it raised."""
     remaining_domain: str | None
     """Where something without a name is left."""
+    asked: tuple[Term, ...] = ()
+    """Named effects before any was dropped for the error that it raised."""
 
 
 Anew = Callable[[Fit, Sequence[Term]], Fit | None]
@@ -108,22 +108,20 @@ def close_loop(
 ) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
-    The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off. What
-    lacks may have hidden how to differentiate the motion best: where `anew` finds another motion
-    beside it the loop is closed again, and the smaller open error counts.
+    The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off. Where
+    `anew` finds a better motion beside what lacks, the loop is closed again.
     """
     loop = _closed(before, library, seed, without_rules)
     again = anew(before, loop.asked) if anew is not None and loop.asked else None
     if again is None:
         return loop
     other = _closed(again, library, seed, without_rules)
-    # Sealed data choose nothing, but what raises their error is taken back here, too.
-    holds = other.rmse_after_a <= loop.rmse_before_a
-    if not holds or other.after.rmse(sealed=False) >= loop.after.rmse(sealed=False):
+    better = other.after.rmse(sealed=False) < loop.after.rmse(sealed=False)
+    if not better or other.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.
         return loop
     # The declared model is not to look worse than where it was fitted best.
-    before_a = min(loop.rmse_before_a, other.rmse_before_a)
-    return replace(other, rmse_before_a=before_a, r2_before=max(loop.r2_before, other.r2_before))
+    best = min(loop, other, key=lambda one: one.rmse_before_a)
+    return replace(other, rmse_before_a=best.rmse_before_a, r2_before=best.r2_before)
 
 
 def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[str]) -> Loop:
@@ -151,8 +149,8 @@ def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    asked = tuple(one.term for one in named)
-    return _opened(before, only_named.fit, final.fit, saturated, steps, tried, asked, library)
+    loop = _opened(before, only_named.fit, final.fit, saturated, steps, tried, library)
+    return replace(loop, asked=tuple(one.term for one in named))
 
 
 def _with_true_names(
@@ -207,7 +205,6 @@ def _opened(
     saturated: Sequence[Chain],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
-    asked: tuple[Term, ...],
     library: Library,
 ) -> Loop:
     # What either explains can be explained.
@@ -267,7 +264,6 @@ def _opened(
         floor_a=min(rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))), rmse_after),
         noise_a=noise_a,
         explained_share=float(np.clip(reached, 0.0, 1.0)),
-        asked=asked,
         remaining_domain=domain,
     )
 

@@ -5,9 +5,9 @@ import numpy as np
 from opamc_cli.joint.change.lines import strokes
 from opamc_cli.joint.change.slow import Population, Shift, shift_current
 from opamc_cli.joint.change.units import Compared, own_fit
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import highest_order
+from opamc_cli.signal.transform.least_squares import solve
 
 MOST_HARMONICS = 4
 KNOTS = 6

@@ -8,13 +8,13 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import COARSE_RATE_HZ, Dataset, Term, grid_of
 from opamc_cli.joint.fit.parts import Sums
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track, is_moving
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Joint, Track, coarsen, joined
 from opamc_cli.signal.course import repeated_course
 from opamc_cli.signal.motion.smoothing import CORNER_WINDOW, averaging_kernel
+from opamc_cli.signal.transform.least_squares import solve
 
 FEWEST_SAMPLES = 10
 MOSTLY = 0.5

@@ -4,8 +4,8 @@ import numpy as np
 from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Floats, Ints, Track
+from opamc_cli.signal.transform.least_squares import solve
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3

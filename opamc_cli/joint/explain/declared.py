@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -25,8 +26,7 @@ ENOUGH = 12_500
 FUNCTIONS = 4
 """At most: with all, which takes twice the time, no ratio of 24 crosses the half."""
 JUDGED = ("moving", "clear", "channels", "period_s")
-"""What tells which samples count. A longer window has fewer moving samples, none of them near a
-reversal: judged by its own, it is the best wherever friction is wrong."""
+"""What tells which samples count: by its own, none near a reversal, a long window is the best."""
 Declared = tuple[tuple[Effect, Term | None], ...]
 """Effects, with their terms where parameters are given."""
 
@@ -54,7 +54,7 @@ def best_fit(
     # What fits best as declared may have smoothed away what something missing answers to.
     if best is None or ways.unexplained(None, model) < HALF * ways.unexplained(best, model):
         return declared_fit(dataset, model)
-    return declared_fit(_differentiated(recordings, joint, best, track, grouping), model)
+    return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
 
 
 def fit_beside(
@@ -64,50 +64,52 @@ def fit_beside(
     before: Fit,
     found: Sequence[Term],
 ) -> Fit | None:
-    """Fit a declared model to the motion as it is differentiated best beside what was found.
+    """Fit a declared model anew, to the motion that predicts best beside terms that were found.
 
-    `before` is the model's fit, beside which terms were `found`; None where none predicts better
-    than its motion does.
+    None if it is that of the fit `before`.
     """
     if not smoothings(recordings):
         return None
-    present = before.dataset.smoothing
-    model = declared(before.dataset)
+    present, model = before.dataset.smoothing, declared(before.dataset)
     track, grouping = grouped_track(recordings, joint)
     ways = _Ways(excerpts(recordings, track), joint)
     best = ways.best_of(present, (*model, *((term.effect, term) for term in found)))
     if best == present or grouping is None:
         return None
-    return declared_fit(_differentiated(recordings, joint, best, track, grouping), model)
+    return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
 
 
 def _differentiated(
     recordings: list[Recording],
     joint: Joint,
-    smoothing: Smoothing | None,
     track: Track,
     grouping: Grouping,
+    smoothing: Smoothing | None,
+    *limit: int,
 ) -> Dataset:
-    """Return recordings with another motion, judged by the samples of a first track."""
+    """Differentiate recordings, judged by a first track's samples."""
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
-    return replace(dataset_of(track, grouping), smoothing=smoothing)
+    return replace(dataset_of(track, grouping, *limit), smoothing=smoothing)
 
 
 class _Ways:
     """Ways to differentiate recordings; None is what the noise of each path asks for."""
 
     def __init__(self, recordings: list[Recording], joint: Joint) -> None:
-        self._recordings, self._joint = recordings, joint
-        self._track, self._grouping = grouped_track(recordings, joint)
+        track, grouping = grouped_track(recordings, joint)
+        self._ways: list[Smoothing | None] = []
+        if grouping is not None:
+            self._ways = [None, *smoothings(recordings)]
+            self._dataset = partial(_differentiated, recordings, joint, track, grouping)
 
     def best_of(self, first: Smoothing | None, model: Declared) -> Smoothing | None:
         """Return the way that predicts best; the first, unless another is worth it."""
-        if self._grouping is None:
-            return first
-        best, error = first, self._held_out(first, model)
-        for smoothing in (None, *smoothings(self._recordings)):
-            if smoothing != first and (found := self._held_out(smoothing, model)) < BETTER * error:
+        best, error = first, np.inf
+        for smoothing in sorted(self._ways, key=lambda way: way != first):
+            sums = declared_fit(self._dataset(smoothing), model).sums
+            found = float(sums.held_out()[sums.parts.judged].sum())
+            if found < BETTER * error:
                 best, error = smoothing, found
         return best
 
@@ -116,17 +118,6 @@ class _Ways:
         fit = declared_fit(self._dataset(smoothing, ENOUGH), model)
         pool = Pool.of(fit.dataset, unnamed_library())
         return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS).mean_square
-
-    def _held_out(self, smoothing: Smoothing | None, model: Declared) -> float:
-        sums = declared_fit(self._dataset(smoothing), model).sums
-        return float(sums.held_out()[sums.parts.judged].sum())
-
-    def _dataset(self, smoothing: Smoothing | None, *limit: int) -> Dataset:
-        track = self._track
-        if smoothing is not None:
-            track = judged_alike(build_track(self._recordings, self._joint, smoothing), track)
-        assert self._grouping is not None
-        return dataset_of(track, self._grouping, *limit)
 
 
 def judged_alike(other: Track, track: Track) -> Track:

@@ -6,8 +6,8 @@ import numpy as np
 from scipy.special import stdtrit
 
 from opamc_cli.joint.fit.model import Fit
-from opamc_cli.joint.least_squares import SINGULAR_BELOW, eigenvectors
 from opamc_cli.joint.motion.track import Floats
+from opamc_cli.signal.transform.least_squares import SINGULAR_BELOW, eigenvectors
 
 INSEPARABLE = 0.995
 """Multiple correlation of a regressor with the others from which on it is not told apart."""

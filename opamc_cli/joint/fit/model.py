@@ -11,7 +11,6 @@ from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.fit.parts import Parts, Sums, parts_of, whole_parts
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Smoothing
@@ -25,6 +24,7 @@ from opamc_cli.joint.motion.track import (
     coarsen,
     unfolded,
 )
+from opamc_cli.signal.transform.least_squares import solve
 
 COARSE_RATE_HZ = 100.0
 COARSE_SAMPLES = 8_000

@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from opamc_cli.joint.least_squares import inverse
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, ranges
+from opamc_cli.signal.transform.least_squares import inverse
 from opamc_cli.signal.transform.products import products_over
 
 FEWEST_UNITS = 8

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve1d
 
-from opamc_cli.joint.least_squares import inverse
+from opamc_cli.signal.transform.least_squares import inverse
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -7,9 +7,9 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
-from opamc_cli.joint.least_squares import SINGULAR_BELOW
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
+from opamc_cli.signal.transform.least_squares import SINGULAR_BELOW
 
 Products = dict[Hashable, Floats]
 

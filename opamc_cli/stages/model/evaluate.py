@@ -13,10 +13,10 @@ from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.declared import BETTER, judged_alike
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, may_extrapolate, why_not_applied
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.least_squares import leverage
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Reference, Track
+from opamc_cli.signal.transform.least_squares import leverage
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
 from opamc_cli.stages.model.declared_terms import declared_term

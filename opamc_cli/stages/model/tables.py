@@ -12,12 +12,12 @@ from opamc_cli.joint.effects.ripple import order_ties
 from opamc_cli.joint.fit.frozen import may_extrapolate
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, fit_terms
-from opamc_cli.joint.least_squares import root_of
 from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
 from opamc_cli.joint.spectra import highest_order, order_resolution, order_spectrum
+from opamc_cli.signal.transform.least_squares import root_of
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
 

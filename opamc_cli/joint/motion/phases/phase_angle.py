@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.signal.transform.least_squares import solve
 
 LONGEST_LAG_S = 0.06
 ALIGNMENT_SAMPLES = 2000

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from opamc_cli.joint.least_squares import solve
 from opamc_cli.joint.motion.phases.half_turns import stretches
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.phases.sensor_errors import current_vector
 from opamc_cli.joint.motion.track import Floats
+from opamc_cli.signal.transform.least_squares import solve
 
 SIDE_ROUNDS = 8
 CLEARLY = 0.3

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from opamc_cli.joint import least_squares
-from opamc_cli.joint.least_squares import eigenvectors, inverse, leverage, root_of, solve
+from opamc_cli.signal.transform import least_squares
+from opamc_cli.signal.transform.least_squares import eigenvectors, inverse, leverage, root_of, solve
 
 
 def random_columns(seed=4, sets=3, rows=40, width=6):
