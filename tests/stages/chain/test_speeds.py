@@ -66,6 +66,11 @@ def test_the_carrier_tells_a_fault_s_longer_motions_from_another_speed(carrier, 
     assert bool(odd_speeds(longer, table([1.0], carrier=60.0), 0.01)) is not same
 
 
+def test_a_baseline_whose_motions_are_longer_than_the_reference_s_has_its_carrier():
+    alike = table([0.985] * 6, carrier=60.0)
+    assert not odd_speeds(table([1.0], carrier=60.0), alike, 0.01)
+
+
 def test_motions_that_are_much_longer_at_the_same_carrier_are_of_another_program():
     longer = table([0.9], carrier=60.0)
     assert odd_speeds(longer, table([1.0], carrier=60.0), 0.01).keys() == {"run0"}

@@ -72,12 +72,12 @@ def of_another_speed(ratio: float) -> str:
 
 
 def _middles(
-    motions: pa.Table, usual: Mapping[int, float]
+    motions: pa.Table, usual: Mapping[int, tuple[float, float]]
 ) -> dict[str, tuple[float, float, float]]:
     """By run, how long its motions last, what a sample is of it, and what may be open of it."""
     run, axis, ratio, samples, rate, carrier = _lasting(motions)
-    shared = np.array([usual.get(own, 1.0) for own in axis.tolist()])
-    ratio, carrier = ratio / shared, carrier / shared
+    shared = np.array([usual.get(own, (1.0, np.nan)) for own in axis.tolist()]).reshape(-1, 2)
+    ratio, carrier = ratio / shared[:, 0], carrier / shared[:, 1]
     found = {}
     for name in np.unique(run):
         own = run == name
@@ -91,15 +91,18 @@ def _middles(
     return found
 
 
-def _usual(baseline: pa.Table, tolerance: float) -> dict[int, float]:
-    """Return, by axis, how long most of the baseline's runs take, in its reference cycle's time."""
-    run, axis, ratio, *_ = _lasting(baseline)
+def _usual(baseline: pa.Table, tolerance: float) -> dict[int, tuple[float, float]]:
+    """By axis, how long most runs take in the reference's time: a motion, a carrier's period."""
+    run, axis, ratio, *_, carrier = _lasting(baseline)
     usual = {}
     for number in np.unique(axis):
-        own = axis == number
-        middles = np.array([np.median(ratio[own & (run == name)]) for name in np.unique(run[own])])
+        runs = [(axis == number) & (run == name) for name in np.unique(run[axis == number])]
+        middles, periods = (
+            np.array([np.median(of[own]) for own in runs]) for of in (ratio, carrier)
+        )
         alike = np.abs(middles[:, None] - middles) <= tolerance
-        usual[int(number)] = float(np.median(middles[alike[np.argmax(alike.sum(axis=0))]]))
+        most = alike[np.argmax(alike.sum(axis=0))]
+        usual[int(number)] = float(np.median(middles[most])), float(np.median(periods[most]))
     return usual
 
 
