@@ -10,6 +10,7 @@ from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
 from opamc_cli.stages.verdict.reasons import (
+    CURRENT_LAG,
     SENSOR_NOISE,
     SMALLER_PART,
     excuses_little,
@@ -136,6 +137,12 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
     others = () if cause is None else cause.get("others", ())
+    if cause is not None and cause.get("effect") == CURRENT_LAG:
+        rest = f" Besides: {others[0]['interpretation']}." if others else ""
+        return (
+            "A gear's fault bends the current's course; this one is moved in time as a whole "
+            f"({cause['share']:.0%} of the change).{rest}"
+        )
     if any(one["effect"] == SENSOR_NOISE for one in others):
         return "The current fluctuates more at standstill, too: check its sensor and cable as well."
     if n < FEW_SESSIONS:

@@ -8,21 +8,28 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.models import JointConfig
-from opamc_cli.decision.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
+from opamc_cli.decision.measurement.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
+from opamc_cli.decision.measurement.lag import Course, Lag, courses, lag_behind
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import Change, explain_change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.motion.track import Floats, Joint
 from opamc_cli.signal.motion.reported import unwrapped
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
-from opamc_cli.stages.verdict.reasons import AT_REST, SENSOR_NOISE, excuses_little, lies_outside
+from opamc_cli.stages.verdict.reasons import (
+    AT_REST,
+    CURRENT_LAG,
+    SENSOR_NOISE,
+    excuses_little,
+    lies_outside,
+)
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.sources import RunSource
 
@@ -63,6 +70,9 @@ MUCH = 9.0
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
+REST_SHARE = 0.03
+"""What explains less of a change beside a lag is not worth a maintainer's time."""
+
 HUM = "mains_hum"
 NOISE = (
     "noise or hum of the current sensor, which has grown as much while the joint stands still: "
@@ -101,8 +111,9 @@ def explain(
     Returns
     -------
     dict
-        The `cause` of verdict.json: an effect of the library, or noise of the sensor that is there
-        at standstill, too; empty where neither explains the change.
+        The `cause` of verdict.json: an effect of the library, noise of the sensor that is there at
+        standstill, too, or a current that comes later than it did; empty where none of them
+        explains the change.
 
     Raises
     ------
@@ -111,32 +122,32 @@ def explain(
     InputError, NotEnoughDataError
         If a side does not hold what a model of the joint needs.
     """
-    sides, noises = [], []
+    sides, noises, along = [], [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
     for sources, moves in zip((baseline, target), strokes, strict=True):
-        recordings, noise, errors = _recordings(
+        recordings, noise, moved, errors = _recordings(
             axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
         )
         if not recordings:
             raise errors[0]
         sides.append(recordings)
         noises.append(noise)
+        along.append(moved)
+    lag = lag_behind(*along)
+    if lag is not None:  # what else has changed is sought without it
+        sides[1] = [_earlier(recording, lag.lag_s) for recording in sides[1]]
     joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
     library = library_of(config)
     with users_effects_named():
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
         found = _entry(change)
-    grown = growth_at_rest(*noises)
-    if grown is None:
-        if found is None and change.why_not is not None:
-            raise NotEnoughDataError(change.why_not)
-        return found or {}
-    if found is None or _heard_at_rest(found):
-        return _of_sensor(grown, found)
-    sensor = _of_sensor(grown, None)
-    others = [*found["others"], {key: sensor[key] for key in OF_OTHERS}]
-    return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
+    found = _with_noise(growth_at_rest(*noises), found)
+    if lag is not None:
+        return _of_lag(lag, found)
+    if found is None and change.why_not is not None:
+        raise NotEnoughDataError(change.why_not)
+    return found or {}
 
 
 def library_of(config: JointConfig) -> Library:
@@ -177,9 +188,10 @@ def _recordings(
     moving: Mapping[str, tuple[int, int]],
     strokes: Mapping[str, Spans],
     rate_hz: float,
-) -> tuple[list[Recording], list[Fluctuation], list[OpamcError]]:
+) -> tuple[list[Recording], list[Fluctuation], list[list[Course]], list[OpamcError]]:
     found: list[Recording] = []
     noises: list[Fluctuation] = []
+    along: list[list[Course]] = []
     errors: list[OpamcError] = []
     for source in sources:
         # seconds are those of a log of this rate: a slower one costs no more for being longer
@@ -196,10 +208,35 @@ def _recordings(
                 found.append(interpolated(recording, LEAST_HZ))
             noise = _fluctuation(recording, start, strokes.get(source.name, ()))
             noises += [] if noise is None else [noise]
+            along.append(_courses(recording))
         except OpamcError as error:
             # the run served the chain but not a model, which needs motion beside current
             errors.append(error)
-    return found, noises, errors
+    return found, noises, along, errors
+
+
+def _courses(recording: Recording) -> list[Course]:
+    """Return a recording's courses; none where no position is logged."""
+    phases, position = recording.phases_a, recording.position_rad
+    current = recording.current_a if phases is None else phases
+    if current is None or position is None:
+        return []
+    return courses(current, position, recording.rate_hz)
+
+
+def _earlier(recording: Recording, lag_s: float) -> Recording:
+    """Return a recording whose current comes earlier; its last values are held."""
+    time = np.arange(recording.size) / recording.rate_hz
+
+    def moved(values: Floats) -> Floats:
+        return np.interp(time + lag_s, time, values)
+
+    current, phases = recording.current_a, recording.phases_a
+    return replace(
+        recording,
+        current_a=None if current is None else moved(current),
+        phases_a=None if phases is None else np.stack([moved(one) for one in phases.T], axis=1),
+    )
 
 
 def _fluctuation(recording: Recording, start: int, strokes: Spans) -> Fluctuation | None:
@@ -253,6 +290,17 @@ def _entry(change: Change) -> dict[str, Any] | None:
     }
 
 
+def _with_noise(grown: Growth | None, found: dict[str, Any] | None) -> dict[str, Any] | None:
+    """Put a sensor's noise before what it may be, or beside what it is not."""
+    if grown is None:
+        return found
+    if found is None or _heard_at_rest(found):
+        return _of_sensor(grown, found)
+    sensor = _of_sensor(grown, None)
+    others = [*found["others"], {key: sensor[key] for key in OF_OTHERS}]
+    return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
+
+
 def _heard_at_rest(cause: Mapping[str, Any]) -> bool:
     """Whether a cause may be what a sensor's noise or hum looks like: friction is slow."""
     return cause["effect"] in ("ripple", HUM) or (lies_outside(cause) and excuses_little(cause))
@@ -287,6 +335,41 @@ def _of_sensor(noise: Growth, found: Mapping[str, Any] | None) -> dict[str, Any]
         "evidence": {AT_REST: noise.times},
         "why": [why],
         "others": others,
+    }
+
+
+def _of_lag(lag: Lag, found: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Return a current's lag as the cause, beside it what was found with the current moved back.
+
+    As a sensor's noise it makes a joint neither healthy nor faulty.
+    """
+    way = "later" if lag.lag_s > 0 else "earlier"
+    late = f"the current comes {1e3 * abs(lag.lag_s):.2g} ms {way} against the position"
+    others = [] if found is None else [{key: found[key] for key in OF_OTHERS}, *found["others"]]
+    rest = [{**other, "share": other["share"] * (1 - lag.share)} for other in others]
+    rest = [other for other in rest if other["share"] >= REST_SHARE]
+    why = [
+        f"In all motions alike {late} than in the baseline, whose recordings differ by "
+        f"{1e3 * lag.of_baseline_s:.2g} ms at most; moved back, {lag.share:.0%} of what its course "
+        "differs by is gone. A fault of the gear bends the course instead."
+    ]
+    if rest:
+        why += ["With the current moved back:", *(found or {})["why"]]
+    return {
+        "effect": CURRENT_LAG,
+        "domain": "time",
+        "parameters": {"delay_s": lag.lag_s},
+        "interpretation": f"{late} than in the baseline: look at the logger, its bus and the drive",
+        "share": lag.share,
+        "p_value": None,
+        "ties": [],
+        "harmless": False,
+        "origin": "measurement",
+        "explained": lag.share,
+        "clear": False,
+        "evidence": {"delay_s": lag.lag_s, "baseline_delay_s": lag.of_baseline_s},
+        "why": why,
+        "others": rest,
     }
 
 

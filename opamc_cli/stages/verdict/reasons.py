@@ -41,6 +41,12 @@ LEAST_SAID = 0.01
 SENSOR_NOISE = "sensor_noise"
 """What a cause is called that no effect of a joint is: it is there while the joint stands still."""
 
+CURRENT_LAG = "current_lag"
+"""And one that moves all of the current in time against the position."""
+
+BEFORE_THE_GEAR = frozenset({SENSOR_NOISE, CURRENT_LAG})
+"""Causes that excuse nothing, and are looked for first all the same."""
+
 AT_REST = "times_at_rest"
 """In a cause's evidence: by how much the current's fluctuation at standstill has grown with it."""
 
@@ -112,7 +118,7 @@ def reasons(
         if outside and excuses_little(cause):
             known = [SMALLER_PART]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
-        if outside and judgement.state == "fault" and cause.get("effect") != SENSOR_NOISE:
+        if outside and judgement.state == "fault" and cause.get("effect") not in BEFORE_THE_GEAR:
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
         sentences += [*[IN_VAIN] * in_vain, INSPECT, CANNOT_TELL]
@@ -134,9 +140,9 @@ def excuses_little(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause outside the joint holds too little to look there before the gear.
 
     With a fault beside it, or less than half of the change by harmless causes, it is not harmless.
-    A sensor's noise excuses nothing, but is to be looked for before the gear.
+    A sensor's noise, or a lag, excuses nothing, but is to be looked for before the gear.
     """
-    if cause.get("effect") == SENSOR_NOISE:
+    if cause.get("effect") in BEFORE_THE_GEAR:
         return False
     return explains_little(cause) or not cause.get("harmless")
 

@@ -83,6 +83,23 @@ def test_a_sensor_s_noise_sends_nobody_to_the_gear():
     assert _axis(entry | {"cause": cause | {"effect": "mains_hum"}}, None).cause is None
 
 
+def test_a_late_current_sends_to_the_logger_first_and_to_the_gear_for_what_is_left():
+    late = "the current comes 40 ms later than in the baseline: look at the logger"
+    cause = {"effect": "current_lag", "interpretation": late, "origin": "measurement"}
+    cause |= {"harmless": False, "share": 0.9, "explained": 0.9, "others": []}
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    told = brief(judged, Bundle([], {}), cause)
+    assert told["inspect"] == f"Check before the gear: {late}."
+    assert "moved in time as a whole (90% of the change)." in told["against"]
+    entry = {"axis": 1, "state": "fault", "cause": cause}
+    assert wording.inspection(entry) == "Look at the logger; do that before opening the gear."
+    assert _axis(entry, None).cause == "current_lag"
+    cause["others"] = [{"effect": "ripple", "interpretation": "a tooth", "share": 0.08}]
+    assert brief(judged, Bundle([], {}), cause)["against"].endswith("Besides: a tooth.")
+
+
 def test_that_a_cause_was_sought_in_vain_is_said():
     judged = SimpleNamespace(
         state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0

@@ -9,7 +9,7 @@ import pytest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.models import JointConfig
-from opamc_cli.decision.at_rest import Growth
+from opamc_cli.decision.measurement.at_rest import Growth
 from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.joint.change.explain import Change
 from opamc_cli.joint.change.reading import Cause
@@ -161,8 +161,11 @@ def pushed(folder, extra_a, rest=0):
     return found
 
 
-def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True):
-    """Write four sessions of strokes with pauses: with a sensor's noise and a ripple."""
+def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True, lag=0):
+    """Write four sessions of strokes with pauses: with a sensor's noise and a ripple.
+
+    The current comes `lag` samples late.
+    """
     rng = np.random.default_rng(2)
     still, way = np.zeros(100), 0.6 * (1 - np.cos(np.linspace(0, np.pi, 150)))
     q = np.concatenate([still, *[way, still + 1.2, way[::-1], still] * 3])
@@ -172,6 +175,7 @@ def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True):
     for k in range(4):
         torque = friction * (1 + 0.02 * rng.normal()) * np.tanh(speed / 0.02) + 0.8 * np.sin(q)
         torque += ripple_a * np.sin(150 * q) * (speed != 0)
+        torque = np.concatenate([torque[:1].repeat(lag), torque[: q.size - lag]])
         sizes = noise_a * rng.normal(size=(q.size, 3))
         columns = {"axis1_current": (torque + sizes[:, 0]).astype(np.float32)}
         columns["axis1_position" if logged else "axis1_velocity"] = q if logged else speed
@@ -197,6 +201,40 @@ def test_noise_that_is_there_at_standstill_is_the_sensor_s(tmp_path, logged):
         assert (cause.explain(1, before, after, JointConfig()) or {}).get("effect") != (
             "sensor_noise"
         )
+
+
+def test_a_late_current_is_the_logger_s(tmp_path):
+    """It was friction that differs between directions, or a ripple."""
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", 0.03, lag=4)
+    found = cause.explain(1, before, after, JointConfig())
+    assert (found["effect"], found["origin"]) == ("current_lag", "measurement")
+    assert not found["harmless"]
+    assert found["parameters"]["delay_s"] == pytest.approx(0.04, abs=1e-3)
+    assert "comes 40 ms later" in found["interpretation"]
+    assert "comes 40 ms later" in found["why"][0]
+    assert found["share"] > 0.9
+    assert found["others"] == []
+
+
+def test_what_has_changed_beside_a_lag_is_sought_without_it(tmp_path):
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", 0.03, lag=8, ripple_a=0.25)
+    found = cause.explain(1, before, after, JointConfig())
+    assert found["effect"] == "current_lag"
+    assert [(other["effect"], other["origin"]) for other in found["others"]] == [
+        ("ripple", "joint")
+    ]
+    assert found["others"][0]["share"] == pytest.approx(1 - found["share"], abs=0.05)
+    assert "With the current moved back:" in found["why"]
+
+
+def test_noise_beside_a_lag_is_told_beside_it(tmp_path):
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", 0.12, lag=8)
+    found = cause.explain(1, before, after, JointConfig())
+    assert found["effect"] == "current_lag"
+    assert any("fluctuates 4" in sentence for sentence in found["why"])
 
 
 def test_why_no_cause_could_be_sought_is_told(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.decision.at_rest import (
+from opamc_cli.decision.measurement.at_rest import (
     BLOCK_S,
     Fluctuation,
     about_course,
