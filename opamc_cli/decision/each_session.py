@@ -1,6 +1,6 @@
 """Each of several target sessions by itself: what one night shows must not be diluted by others."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from opamc_cli.decision.judge import Bundle, Judgement, Policy, judge
@@ -12,6 +12,11 @@ Tails of single nights are heavier than they are taken for (three or four baseli
 know all conditions): at the whole level 1.7 % of 2000 healthy folders alarm by one night alone, at
 a 30th 0.2 %.
 """
+
+APART = 2.0
+"""Times as far from the baseline as the farthest of the others: where all eight files of a night
+have the same fault the farthest lies 1.5 times as far as the nearest, where half of them have one
+the nearest of those lies five times as far as the others (docs/decision.md)."""
 
 
 @dataclass(frozen=True)
@@ -73,3 +78,25 @@ def each_session(
             )
             found[axis].append(LoneSession(name, own[axis], corrected))
     return found
+
+
+def apart(each: Sequence[LoneSession]) -> list[LoneSession]:
+    """Return those of one joint's sessions, or recordings, that differ from the others.
+
+    Parameters
+    ----------
+    each : sequence of LoneSession
+        As `each_session` judges them.
+
+    Returns
+    -------
+    list of LoneSession
+        Those at fault by themselves, if they lie `APART` times as far out as all others, in their
+        order; none where all are, or what separates them is only how sure each is.
+    """
+    far = [one for one in each if one.judgement.state in ("changed", "fault")]
+    near = [one.judgement.distance_ratio for one in each if one not in far]
+    if not far or not near:
+        return []
+    nearest = min(one.judgement.distance_ratio for one in far)
+    return far if nearest >= APART * max(near) else []

@@ -96,8 +96,12 @@ class Bundle:
 
     def of_target(self, session: int) -> "Bundle":
         """Return the same with one of the target's sessions alone."""
+        return self.of_targets([session])
+
+    def of_targets(self, sessions: Sequence[int]) -> "Bundle":
+        """Return the same with some of the target's sessions alone."""
         n = self.n_baseline
-        return self.of_sessions(range(n), [n + session])
+        return self.of_sessions(range(n), [n + session for session in sessions])
 
     def held_out(self, session: int) -> "Bundle":
         """Return one of the baseline's sessions as the target of the others."""

@@ -220,7 +220,9 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = far_together(judged) | exchanged_joints(sides, decided.target_runs(), judged)
+        odd = decided.with_files(far_together(judged)) | exchanged_joints(
+            sides, decided.target_runs(), judged
+        )
         named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 

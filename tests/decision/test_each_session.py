@@ -1,11 +1,12 @@
 """One night among several that alone is at fault."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from opamc_cli.decision.each_session import each_session
+from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import Bundle, judge
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, spectra
@@ -73,3 +74,28 @@ def test_cycles_of_other_sessions_are_left_out():
     number = np.repeat([0, 1], len(own.target_cycles) // 2)
     alone = replace(own, session_of_target_cycle=number).of_sessions(range(6), [7])
     assert np.array_equal(alone.target_cycles.sum(axis=0), own.target[1])
+
+
+@pytest.mark.parametrize(
+    ("far", "near", "named"),
+    [
+        ([8.0, 9.0], [1.2, 1.3], "ab"),
+        ([8.0, 2.7], [1.2, 1.3], "ab"),
+        # one sure enough and the next one not quite is no difference between them
+        ([8.0, 2.5], [1.2, 1.3], ""),
+        ([8.0, 9.0], [], ""),
+        ([], [1.2, 1.3], ""),
+    ],
+)
+def test_those_at_fault_are_named_where_they_lie_far_from_the_others(far, near, named):
+    states = [*[("fault", ratio) for ratio in far], *[("healthy", ratio) for ratio in near]]
+    each = [
+        LoneSession(name, Bundle([]), SimpleNamespace(state=state, distance_ratio=ratio))
+        for name, (state, ratio) in zip("abcd", states, strict=False)
+    ]
+    assert "".join(one.session for one in apart(each)) == named
+
+
+def test_damaged_sessions_lie_apart():
+    assert [one.session for one in apart(each_session(folder(1, 1))[3])] == [NAMES[1]]
+    assert apart(each_session(folder(1, 1))[2]) == []

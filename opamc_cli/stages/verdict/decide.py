@@ -72,7 +72,9 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     sources = (*sides.baseline.sources, *sides.target.sources)
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = far_together(judged) | exchanged_joints(sides, decided.target_runs(), judged)
+        odd = decided.with_files(far_together(judged)) | exchanged_joints(
+            sides, decided.target_runs(), judged
+        )
         named = with_reasons(judged, {**odd, **found.unjudged})
         head = header(sources, notes, out, score.FILES)
         return named | head | {"tables": head["tables"] | _beside(folder, (baseline, target))}

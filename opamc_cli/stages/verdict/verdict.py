@@ -12,7 +12,7 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.decision.each_session import LoneSession, each_session
+from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
 from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.errors import ExitCode, InputError
@@ -34,6 +34,9 @@ AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
 course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
 cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
+
+MOST_FILES = 16
+"""Of the target, the last ones: to judge one by itself takes a tenth of a second a joint."""
 
 ODD_ONE = (
     "differs from the others on {} as no healthy one does, and is left out there; look at it, and "
@@ -72,6 +75,8 @@ class Decided:
     """Those by which an axis is judged, since they are worse than all together."""
     odd: Mapping[int, Sequence[str]] = field(default_factory=dict)
     """Sessions of the baseline without which an axis is judged: no healthy ones differ as much."""
+    by_file: Mapping[int, Sequence[LoneSession]] = field(default_factory=dict)
+    """Axes that differ, by each recording of target sessions that have several."""
 
     def differing(self, config: ScoreConfig) -> list[int]:
         """Return the axes whose change asks for a cause."""
@@ -128,6 +133,26 @@ class Decided:
             return f"Of {len(each)} target sessions only {shown} shows it by itself."
         return f"At fault by itself, of {len(each)} target sessions: {shown}."
 
+    def files_apart(self, axis: int) -> str | None:
+        """Say which of the target's files differ from the others; None if none or all do."""
+        each = self.by_file.get(axis, ())
+        odd = apart(each)
+        if not odd:
+            return None
+        far = [one.judgement.distance_ratio for one in odd]
+        near = [one.judgement.distance_ratio for one in each if one not in odd]
+        return (
+            f"Of {len(each)} target files only {_and([one.session for one in odd])} "
+            f"differ{'' if len(odd) > 1 else 's'} ({min(far):.2g} times as far from the baseline "
+            f"as a healthy session, or more; the others {max(near):.2g} times at most): another "
+            "program or tool, or a fault that comes and goes?"
+        )
+
+    def with_files(self, why: Mapping[int, Sequence[str]]) -> dict[int, Sequence[str]]:
+        """Add to reasons, by axis, which of the target's files differ from the others."""
+        told = {axis: self.files_apart(axis) for axis in why}
+        return {axis: (*own, *filter(None, [told[axis]])) for axis, own in why.items()}
+
     def notes(self) -> list[str]:
         """Say which axes were judged without some of the witnesses."""
         lacking = {
@@ -183,7 +208,36 @@ def decide(sides: Sides, config: Config) -> Decided:
         if worst is not None and _concern(worst.judgement)[0] > _concern(judgements[axis])[0]:
             alone[axis] = worst
             known[axis], judgements[axis] = worst.bundle, worst.judgement
-    return Decided(sides, known, judgements, each, alone, odd)
+    decided = Decided(sides, known, judgements, each, alone, odd)
+    return replace(decided, by_file=_each_file(decided, policy))
+
+
+def _each_file(decided: Decided, policy: Policy) -> dict[int, Sequence[LoneSession]]:
+    """Judge axes that differ by each recording of their target sessions, where those have more."""
+    judgements = decided.judgements
+    asked = {
+        axis: names
+        for axis, judgement in judgements.items()
+        if _concern(judgement)[0] > 0  # or too far out to be called healthy
+        and len(names := {source.name for source in decided.target_sources(axis)})
+        > judgement.n_target_sessions
+    }
+    if not asked:
+        return {}
+    known = bundles(replace(decided.sides, target_by_file=True))
+    looked = {name for names in asked.values() for name in sorted(names)[-MOST_FILES:]}
+    parts = {
+        axis: bundle.without(decided.odd.get(axis, ())).of_targets(
+            [k for k, name in enumerate(bundle.target_sessions) if name in looked]
+        )
+        for axis, bundle in known.items()
+        if looked & set(bundle.target_sessions)
+    }
+    each = each_session(parts, policy)
+    return {
+        axis: [one for one in each.get(axis, ()) if one.session in names]
+        for axis, names in asked.items()
+    }
 
 
 def in_time(side: Side, sessions: Sessions) -> list[str]:
@@ -290,8 +344,10 @@ def content(
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
         said = reasons(final, bundle, motions, runs, cause, config.score, in_vain=in_vain)
-        if which:  # after what the state does not tell
-            said.insert(int(excused), which)
+        files = decided.files_apart(axis)
+        for told in (files, which):  # after what the state does not tell
+            if told:
+                said.insert(int(excused), told)
         axes.append(
             {
                 "axis": axis,
@@ -312,7 +368,7 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "brief": brief(final, bundle, cause, unit, which, in_vain=in_vain),
+                "brief": brief(final, bundle, cause, unit, which or files, in_vain=in_vain),
                 "reasons": said,
             }
         )

@@ -1,6 +1,7 @@
 """Deciding again from tables, and the documents that programs read."""
 
 import json
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -115,6 +116,29 @@ def test_one_damaged_session_of_three_is_not_diluted(tmp_path):
     assert verdict["axes"][2]["session"] == "night 2021-01-08"
     assert verdict["axes"][2]["cause"]["effect"] == "ripple"
     assert "session" not in verdict["axes"][0]
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_files_of_one_night_that_differ_are_named(tmp_path):
+    """Together they hid which ones it was, and that half of the night was healthy."""
+    healthy = sorted((SAMPLES / "normal").glob("*.parquet"))
+    damaged = sorted((SAMPLES / "fault").glob("*.parquet"))
+    for name, path in zip("abcd", (healthy[6], damaged[0], healthy[7], damaged[1]), strict=True):
+        with Run(path) as run:
+            info = replace(run.info, session="tonight")
+            save_run(tmp_path / f"{name}.parquet", info, run.read(run.columns))
+    flat = [part for run in healthy[:6] for part in ("--baseline", run)]
+    flat += [part for name in "abcd" for part in ("--target", tmp_path / f"{name}.parquet")]
+    options = ("--set", "joint.explain=false", "--out", tmp_path / "out", "--quiet")
+    assert ended("diagnose", *flat, *options) == 1
+    verdict = verdict_in(tmp_path / "out")
+    assert verdict["target"]["sessions"] == 1
+    found = verdict["axes"][2]
+    assert found["state"] == "fault"
+    assert found["reasons"][0].startswith("Of 4 target files only b and d differ (")
+    assert found["brief"]["evidence"][0] == found["reasons"][0]
+    for entry in verdict["axes"][:2]:
+        assert not any("target files" in sentence for sentence in entry["reasons"])
 
 
 @pytest.mark.usefixtures("undrawn")

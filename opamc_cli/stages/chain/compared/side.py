@@ -18,7 +18,13 @@ from opamc_cli.stages.chain.compared.pattern_rows import (
 )
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
-from opamc_cli.stages.recordings.sessions import Sessions, in_words, lie_in_folders, sessions_of
+from opamc_cli.stages.recordings.sessions import (
+    BY_FILE,
+    Sessions,
+    in_words,
+    lie_in_folders,
+    sessions_of,
+)
 from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.sources import RunSource, read_sources
 from opamc_cli.storage.tables import read_table
@@ -83,6 +89,8 @@ class Sides:
     """Hour of the day, UTC, at which a night ends."""
     kept: KeptResults | None = None
     """Where what the baseline alone tells may lie."""
+    target_by_file: bool = False
+    """Whether each of the target's recordings is held against the baseline by itself."""
 
     @cached_property
     def sessions(self) -> tuple[Sessions, Sessions]:
@@ -92,6 +100,8 @@ class Sides:
             sessions_of(side.sources, self.day_starts_at_h, by_folder)
             for side in (self.baseline, self.target)
         )
+        if self.target_by_file:
+            other = Sessions({run: run for run in other.of_run}, (BY_FILE,))
         return own, other
 
     @cached_property
