@@ -143,9 +143,9 @@ class Decided:
         near = [one.judgement.distance_ratio for one in each if one not in odd]
         return (
             f"Of {len(each)} target files only {_and([one.session for one in odd])} "
-            f"differ{'' if len(odd) > 1 else 's'} ({min(far):.2g} times as far from the baseline "
-            f"as a healthy session, or more; the others {max(near):.2g} times at most): another "
-            "program or tool, or a fault that comes and goes?"
+            f"differ{'' if len(odd) > 1 else 's'} ({_times(min(far))} times as far from the "
+            f"baseline as a healthy session, or more; the others {_times(max(near))} times at "
+            "most): another program or tool, or a fault that comes and goes?"
         )
 
     def with_files(self, why: Mapping[int, Sequence[str]]) -> dict[int, Sequence[str]]:
@@ -187,6 +187,11 @@ class Decided:
 def _and(names: Sequence[str]) -> str:
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
+
+
+def _times(ratio: float) -> str:
+    """Return a distance over a healthy session's; how far beyond a hundred says nothing."""
+    return f"{ratio:.2g}" if ratio < 100 else "more than 100"
 
 
 def _axes_named(axes: Sequence[int]) -> str:
