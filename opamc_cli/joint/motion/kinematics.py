@@ -172,7 +172,7 @@ def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Mot
         window=window,
         velocity_noise=noise * noise_gain(rate_hz, window, derivative - 1),
         kernel=averaging_kernel(window, derivative),
-        blur=blurred(path, rate_hz, window, derivative),
+        blur=blurred(path, values[-1], rate_hz, window, derivative),
         taken_noise=noise * taken_noise_gain(rate_hz, window, derivative),
     )
 
