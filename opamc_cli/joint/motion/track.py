@@ -1,6 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Callable, Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -20,6 +20,8 @@ Bools = NDArray[np.bool_]
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """What has a value per sample, but in a block something else than their mean, or nothing."""
 
+MOST_LAID = 24
+"""Terms whose regressors are kept for all models: twice what a joint's model holds, or 50 MB."""
 ENOUGH_ROWS = 4000
 """By which the load's shapes are told apart: built-in effects' loads are sums of them."""
 
@@ -148,11 +150,15 @@ class Track:
         return rows, inverse(shapes @ shapes.T)[0] @ shapes
 
     @cached_property
+    def laid(self) -> dict[Hashable, Floats]:
+        """Regressors of static terms that stay the same, and their means, for every model."""
+        return {}
+
+    @cached_property
     def static_columns(self) -> Floats:
         """Regressors of the static terms, shape (m, k), on the full rate's samples."""
         source = self.full or self
-        blocks = [term.columns(source).T for term in self.static_terms]
-        return np.concatenate([np.zeros((0, source.size)), *blocks]).T
+        return self._static(source.size, "all", lambda term: term.columns(source))
 
     @cached_property
     def static_sums(self) -> Floats:
@@ -167,7 +173,22 @@ class Track:
     @cached_property
     def static_means(self) -> Floats:
         """Regressors of the static terms on this track's own samples, shape (n, k)."""
-        return self.own_means(self.static_columns)
+        if self.full is None:
+            return self.static_columns
+        full = self.full
+        return self._static(self.size, "means", lambda term: self.own_means(term.columns(full)))
+
+    def _static(self, size: int, kind: str, compute: "Callable[[Regressors], Floats]") -> Floats:
+        if len(self.laid) > MOST_LAID:
+            self.laid.clear()
+        blocks = [np.zeros((0, size))]
+        for term in self.static_terms:
+            key = kind, term.key
+            block = self.laid[key] if key in self.laid else compute(term)
+            if term.is_constant:
+                self.laid[key] = block
+            blocks.append(block.T)
+        return np.concatenate(blocks).T
 
     def own_means(self, values: Floats) -> Floats:
         """Average what is given at the full rate, (n,) or (n, k), over this track's own samples."""
@@ -190,7 +211,8 @@ class Track:
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
         new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
         # What follows from the motion alone stays, and is asked for at every step of a fit.
-        new.__dict__.update(speed_scale=self.speed_scale, inertia_weights=self.inertia_weights)
+        for name in ("speed_scale", "inertia_weights", "laid"):
+            new.__dict__[name] = getattr(self, name)
         return new
 
 
