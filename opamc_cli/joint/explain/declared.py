@@ -9,6 +9,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
+from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
@@ -52,7 +53,10 @@ def best_fit(
     ways = _Ways(excerpts(recordings, track), joint)
     best = ways.best_of(None, model)
     # What fits best as declared may have smoothed away what something missing answers to.
-    if best is None or ways.unexplained(None, model) < HALF * ways.unexplained(best, model):
+    if best is None:
+        return declared_fit(dataset, model)
+    least = ways.unexplained(None, model) / HALF
+    if ways.unexplained(best, model, least) > least:
         return declared_fit(dataset, model)
     return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
 
@@ -85,12 +89,13 @@ def _differentiated(
     track: Track,
     grouping: Grouping,
     smoothing: Smoothing | None,
-    *limit: int,
+    most: int = MOST_SAMPLES,
+    ends: bool = True,
 ) -> Dataset:
     """Differentiate recordings, judged by a first track's samples."""
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
-    return replace(dataset_of(track, grouping, *limit), smoothing=smoothing)
+    return replace(dataset_of(track, grouping, most, ends), smoothing=smoothing)
 
 
 class _Ways:
@@ -101,7 +106,8 @@ class _Ways:
         self._ways: list[Smoothing | None] = []
         if grouping is not None:
             self._ways = [None, *smoothings(recordings)]
-            self._dataset = partial(_differentiated, recordings, joint, track, grouping)
+            laid = recordings, joint, track, grouping
+            self._dataset = partial(_differentiated, *laid, ends=False)
 
     def best_of(self, first: Smoothing | None, model: Declared) -> Smoothing | None:
         """Return the way that predicts best; the first, unless another is worth it."""
@@ -113,11 +119,13 @@ class _Ways:
                 best, error = smoothing, found
         return best
 
-    def unexplained(self, smoothing: Smoothing | None, model: Declared) -> float:
-        """Return what the best functions without a name leave beside a model."""
+    def unexplained(
+        self, smoothing: Smoothing | None, model: Declared, enough: float = 0.0
+    ) -> float:
+        """Return what the best functions without a name leave beside a model, or `enough`."""
         fit = declared_fit(self._dataset(smoothing, ENOUGH), model)
         pool = Pool.of(fit.dataset, unnamed_library())
-        return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS).mean_square
+        return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS, enough).mean_square
 
 
 def judged_alike(other: Track, track: Track) -> Track:

@@ -187,12 +187,19 @@ class Dataset:
         return replace(self, fine=fine, coarse=coarse)
 
 
-def dataset_of(track: Track, grouping: Grouping, most: int = MOST_SAMPLES) -> Dataset:
-    """Arrange a track for the loop; of more than so many moving samples by some of them."""
+def dataset_of(
+    track: Track, grouping: Grouping, most: int = MOST_SAMPLES, ends: bool = True
+) -> Dataset:
+    """Arrange a track for the loop; of more than so many moving samples by some of them.
+
+    Of sealed ones as well if this `ends` in opening them.
+    """
     track = replace(track, group=grouping.group)
     if int(np.count_nonzero(track.moving & (track.group >= 0))) <= most:
         return _dataset(track, grouping)
     pieces = thinned(track, grouping, grouping.open, most)
+    if not ends:
+        return _dataset(cut(track, pieces), grouping)
     sealed = thinned(track, grouping, grouping.sealed, most)
     both = cut(track, sorted((*pieces, *sealed)))
     return replace(_dataset(cut(track, pieces), grouping), opened=_dataset(both, grouping))
@@ -365,10 +372,15 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
     """Fit all terms jointly; what follows the load or the model, until no error falls."""
-    circular = not all(term.is_constant or term.effect.from_terms for term in terms)
+    follow = [not (term.is_constant or term.effect.from_terms) for term in terms]
+    circular = any(follow)
     names, kept, track = frozenset(t.key for t in terms), dataset.cache.settled, dataset.fine.track
     # A set of terms that was met before, in another order, begins where it ended.
     rounds = 1 if names in kept else rounds
+    loads = [term.effect.follows_load for term in terms]
+    if loads == follow and any(term.effect.carries_load for term in terms):
+        # The load that is found depends on no earlier one: a third fit is the second one.
+        rounds = min(rounds, 2)
     load_a, model_a = kept.get(names, (track.load_a, track.model_a))
     dataset = dataset.with_model(load_a, model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3
