@@ -3,8 +3,8 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.signal.transform.second_order import answers
 
 
 class Elasticity(Effect):

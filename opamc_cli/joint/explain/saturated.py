@@ -37,9 +37,7 @@ def unnamed_library() -> dict[str, Effect]:
     return {effect.name: effect for effect in effects}
 
 
-def saturated(
-    start: Chain, pool: Pool, steps: int = MOST_STEPS, enough: float = 0.0
-) -> Chain:
+def saturated(start: Chain, pool: Pool, steps: int = MOST_STEPS, enough: float = 0.0) -> Chain:
     """Explain what the declared model leaves by a pool of unnamed functions, as `beam`."""
     return beam(start, replace(pool, least_share=PRICE), 1, steps, enough)
 

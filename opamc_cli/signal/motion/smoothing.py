@@ -143,7 +143,9 @@ def derivatives(path: Floats, rate_hz: float, window: int, derivative: int) -> F
     """
     half = window // 2
     weights = polynomial_weights(rate_hz, window, derivative, np.arange(-half, half + 1))
-    smooth = correlate1d(path, weights[half]) if window < LONG_WINDOW else _by_fft(path, weights[half])
+    smooth = (
+        correlate1d(path, weights[half]) if window < LONG_WINDOW else _by_fft(path, weights[half])
+    )
     # Within half a window of the ends the outermost polynomial goes on.
     smooth[:half] = weights[:half] @ path[:window]
     smooth[-half:] = weights[half + 1 :] @ path[-window:]

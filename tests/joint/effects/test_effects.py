@@ -14,12 +14,12 @@ from track_of import track_of
 from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, averaged, block_mean, coarsen
+from opamc_cli.signal.transform.second_order import answers
 
 VOCABULARY = list(built_in_library())
 

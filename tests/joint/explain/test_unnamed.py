@@ -10,12 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from simulator import simulate
 
-from opamc_cli.joint.effects.second_order import answers
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import coarsen
+from opamc_cli.signal.transform.second_order import answers
 
 
 @settings(max_examples=60, deadline=None)
