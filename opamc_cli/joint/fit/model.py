@@ -372,15 +372,10 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
     """Fit all terms jointly; what follows the load or the model, until no error falls."""
-    follow = [not (term.is_constant or term.effect.from_terms) for term in terms]
-    circular = any(follow)
+    circular = not all(term.is_constant or term.effect.from_terms for term in terms)
     names, kept, track = frozenset(t.key for t in terms), dataset.cache.settled, dataset.fine.track
     # A set of terms that was met before, in another order, begins where it ended.
     rounds = 1 if names in kept else rounds
-    loads = [term.effect.follows_load for term in terms]
-    if loads == follow and any(term.effect.carries_load for term in terms):
-        # The load that is found depends on no earlier one: a third fit is the second one.
-        rounds = min(rounds, 2)
     load_a, model_a = kept.get(names, (track.load_a, track.model_a))
     dataset = dataset.with_model(load_a, model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3

@@ -49,10 +49,20 @@ class Parts:
         """Number of units."""
         return int(self.unit.max()) + 1 if self.unit.size else 0
 
-    @property
+    @cached_property
+    def edges(self) -> Ints:
+        """The slices as an array, (p, 2)."""
+        return np.array(self.slices, dtype=np.int64).reshape(-1, 2)
+
+    @cached_property
     def counts(self) -> Floats:
         """Samples of each part; (p,)."""
-        return np.array([stop - start for start, stop in self.slices], dtype=float)
+        return np.diff(self.edges)[:, 0].astype(float)
+
+    @cached_property
+    def others(self) -> Floats:
+        """1 where a part is of another unit, else 0; (units, p)."""
+        return np.asarray(np.arange(self.units)[:, None] != self.unit, dtype=float)
 
     @property
     def halves(self) -> Ints:
@@ -92,8 +102,7 @@ class Parts:
 
     def elsewhere(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over all units but each one."""
-        others = (np.arange(self.units)[:, None] != self.unit).astype(float)
-        sums = others @ values.reshape(len(values), -1)
+        sums = self.others @ values.reshape(len(values), -1)
         return np.asarray(sums.reshape(self.units, *values.shape[1:]))
 
     def products(self, left: Floats, right: Floats) -> Floats:
@@ -102,8 +111,7 @@ class Parts:
 
     def products_of(self, lefts: Sequence[Floats], right: Floats) -> list[Floats]:
         """Likewise for several."""
-        edges = np.array(self.slices, dtype=np.int64).reshape(-1, 2)
-        return [products_over(edges, left, right) for left in lefts]
+        return [products_over(self.edges, left, right) for left in lefts]
 
 
 def parts_of(groups: Sequence[Ints], clear: Bools) -> Parts:
