@@ -102,7 +102,11 @@ def test_spans_become_recordings_of_their_own():
 def test_the_static_terms_are_summed_from_zero_in_each_recording():
     track = track_of()
     assert track.static_columns.shape == (2000, 0)
-    term = SimpleNamespace(columns=lambda on: np.stack([on.velocity, on.position_rad], axis=1))
+    term = SimpleNamespace(
+        columns=lambda on: np.stack([on.velocity, on.position_rad], axis=1),
+        key="motion",
+        is_constant=True,
+    )
     track = replace(track, static_terms=(term,))
     assert track.static_sums.shape == (2002, 2)
     assert (track.static_sums[[0, 1001]] == 0).all()
@@ -117,6 +121,27 @@ def test_the_static_terms_are_summed_from_zero_in_each_recording():
     np.testing.assert_array_equal(coarse.full.model_a, 2 * track.velocity)
     coarse.forget()
     assert not {"static_columns", "static_sums", "static_means"} & set(vars(coarse))
+
+
+def test_static_regressors_are_laid_once_unless_they_follow_the_model():
+    track, asked = coarsen(track_of(), 5), []
+
+    def term(name, is_constant):
+        def columns(on):
+            asked.append(name)
+            return (on.velocity if is_constant else on.load_a)[:, None]
+
+        return SimpleNamespace(columns=columns, key=name, is_constant=is_constant)
+
+    terms = (term("motion", True), term("load", False))
+    for size in (1.0, 2.0):
+        load = size * np.ones(2000)
+        track = track.with_model(load, load, terms)
+        means = np.column_stack(
+            [block_mean(track.full.velocity, track.full.bounds, 5), size * np.ones(400)]
+        )
+        np.testing.assert_allclose(track.static_means, means)
+    assert asked == ["motion", "load", "load"]
 
 
 def test_a_loads_inertia_is_told_beside_weight_and_springs_and_what_tells_it_stays():

@@ -5,6 +5,7 @@ from simulator import simulate
 
 from opamc_cli.joint.motion.track import averaged
 from opamc_cli.signal.motion.smoothing import (
+    LONG_WINDOW,
     SHORTEST_WINDOW,
     averaging_kernel,
     derivatives,
@@ -37,6 +38,16 @@ def test_derivative_is_that_of_a_cubic_fitted_around_each_sample(order, window):
     np.testing.assert_allclose(fast[inside], slow[inside], rtol=1e-6, atol=1e-6)
     ends = savgol_filter(path, window, min(3, window - 1), deriv=order, delta=0.01, mode="interp")
     np.testing.assert_allclose(fast, ends, rtol=1e-9, atol=1e-9 * np.abs(ends).max())
+
+
+@pytest.mark.parametrize("order", [0, 1, 2])
+@pytest.mark.parametrize("size", [LONG_WINDOW, LONG_WINDOW + 2, 1000])
+def test_a_long_window_gives_what_sums_over_it_give(order, size):
+    # Far from zero, and not of a size that transforms like.
+    path = 1e3 + np.cumsum(np.random.default_rng(3).normal(size=size))
+    sums = savgol_filter(path, LONG_WINDOW, 3, deriv=order, delta=0.01, mode="interp")
+    fast = derivatives(path, 100.0, LONG_WINDOW, order)
+    np.testing.assert_allclose(fast, sums, rtol=1e-9, atol=1e-9 * np.abs(sums).max())
 
 
 @pytest.mark.parametrize("window", [3, 7, 13, 51])
