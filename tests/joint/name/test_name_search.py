@@ -187,8 +187,10 @@ def called(name):
 
 def test_of_chains_that_hold_the_same_effects_the_best_alone_is_followed(monkeypatch):
     kinds = ("ripple", -3.0), ("ripple", -2.0), ("drag", -1.0), ("spring", -0.5)
-    made = [SimpleNamespace(score=score, terms=[called(name)]) for name, score in kinds]
-    start, asked = SimpleNamespace(score=0.0, terms=[]), []
+    made = [
+        SimpleNamespace(score=score, mean_square=1.0, terms=[called(name)]) for name, score in kinds
+    ]
+    start, asked = SimpleNamespace(score=0.0, mean_square=1.0, terms=[]), []
 
     def possible(chain, pool, known):
         asked.append(chain)
@@ -202,7 +204,10 @@ def test_of_chains_that_hold_the_same_effects_the_best_alone_is_followed(monkeyp
 @pytest.mark.parametrize("width", [1, 2])
 def test_chains_are_followed_as_far_as_the_score_falls(monkeypatch, width):
     scores = enumerate((0.0, -1.0, -0.5, -3.0))
-    chains = [SimpleNamespace(score=score, terms=[called(str(place))]) for place, score in scores]
+    chains = [
+        SimpleNamespace(score=score, mean_square=1.0, terms=[called(str(place))])
+        for place, score in scores
+    ]
 
     def possible(chain, pool, known):
         following = chains[chains.index(chain) + 1 :][:1]
