@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import re
 import subprocess
 import sys
@@ -44,7 +45,10 @@ def test_help_and_completion_import_nothing_heavy(arguments):
         f"try: main({arguments})\nexcept SystemExit: pass\n"
         f"print([name for name in {EXTRAS} if name in sys.modules], file=sys.stderr)"
     )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    # whatever shell, or none, has started the tests
+    named = os.environ | {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}
+    given = [sys.executable, "-c", code]
+    ended = subprocess.run(given, capture_output=True, text=True, check=True, env=named)
     assert "opamc" in ended.stdout
     assert ended.stderr.strip() == "[]"
 
