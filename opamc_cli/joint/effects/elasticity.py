@@ -26,13 +26,18 @@ class Elasticity(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Resonances from 2 Hz up, three dampings."""
-        high = 0.9 * _highest(track)
+        """Resonances from 2 Hz up, three dampings, as far apart as half the power is wide."""
+        high = max(0.9 * _highest(track), 2.0)
         return [
             {"resonance_hz": resonance, "damping": damping}
             for damping in (0.03, 0.1, 0.2)
-            for resonance in geometric(2.0, high, 22)
+            for resonance in geometric(2.0, high, 1 + round(np.log(high / 2) / damping / 2))
         ]
+
+    def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
+        """Half as far, or a neighbour tells nothing of the top: damped by 3 %, 40 % is too far."""
+        resonance, damping = parameters["resonance_hz"], parameters["damping"]
+        return {"resonance_hz": damping * resonance, "damping": 0.4 * damping}
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to what the grid can show; damped more, nothing rings."""

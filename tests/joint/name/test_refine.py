@@ -9,6 +9,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.candidates import Beside
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.refine import refined
+from opamc_cli.signal.transform.second_order import answers
 
 LIBRARY = built_in_library()
 
@@ -31,6 +32,22 @@ def test_place_and_width_of_a_dragging_place_are_found_together():
     found = refined(Term(LIBRARY["position_drag"], start), beside)
     assert found.parameters["place_rad"] == pytest.approx(0.3, abs=0.01)
     assert found.parameters["width_rad"] == pytest.approx(0.1, rel=0.1)
+
+
+@pytest.mark.parametrize("damping", [0.02, 0.05])
+@pytest.mark.parametrize("resonance_hz", [4.7, 7.9, 11.5, 16.3])
+def test_a_ringing_that_is_damped_little_is_found_wherever_it_is(resonance_hz, damping):
+    def ringing(q, v, a, t):
+        return answers([a], 2 * np.pi * resonance_hz, damping, 250.0, ((0, a.size),))[0] - a
+
+    chain = chain_of(fit_declared([joint_of("cyclic", ringing)]), 0)
+    beside, effect = Beside(chain, False), LIBRARY["elasticity"]
+    track = beside.dataset.coarse.track
+    guesses = [Term(effect, one) for one in effect.guesses(track, np.zeros(track.size))]
+    best = max(map(beside.candidate, guesses), key=lambda one: one.gain)
+    found = refined(best.term, beside).parameters
+    assert found["resonance_hz"] == pytest.approx(resonance_hz, rel=0.02)
+    assert found["damping"] == pytest.approx(damping, rel=0.3)
 
 
 def test_an_effect_without_parameters_stays_as_it_is():
