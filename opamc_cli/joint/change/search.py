@@ -92,7 +92,7 @@ class Grease:
         mean = own_fit(compared, population.terms)[0][late].mean(axis=0)
         changes = {"coulomb": 0.0, "viscous": 0.0}
         for name, before, after in zip(population.names, population.mean, mean, strict=True):
-            if name in changes and before != 0:
+            if name in changes and before > 0:  # of a negative friction a share says nothing
                 changes[name] = float(after / before - 1)
         return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"])
 
@@ -114,8 +114,12 @@ class Grease:
         return not self.logged and self.mostly_wet and little
 
     def warms(self, shift: Shift) -> bool:
-        """Whether friction falls by a shift, and warmth may be behind it, as far as is known."""
-        warm = not self.logged if self.warmer_c is None else self.warmer_c > 0
+        """Whether friction falls by a shift, and warmth may be behind it, as far as is known.
+
+        Where no temperature is logged, viscous friction must have fallen by the larger share.
+        """
+        thinner = not self.logged and self.wet < min(self.dry, 0.0)
+        warm = thinner if self.warmer_c is None else self.warmer_c > 0
         return warm and shift.falls > 0
 
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import sessions
 from sessions import COEFFICIENTS, LIBRARY, TERMS, units_of
 
 from opamc_cli.joint.change import search
@@ -136,7 +137,7 @@ def test_grease_of_another_temperature_is_stiffer_when_cold_and_not_by_more(
 @pytest.mark.parametrize(
     ("colder", "effect", "word"),
     [
-        (None, "thermal_viscous", "less friction, as in warmer grease"),
+        (None, "coulomb", search.LESS_FRICTION),  # warmth takes more of viscous friction
         (-15.0, "thermal_viscous", "warmer grease (by 15 °C"),
         (0.0, "coulomb", search.LESS_FRICTION),  # as warm as ever
     ],
@@ -148,6 +149,26 @@ def test_friction_that_falls_is_warmth_first_where_that_can_be(colder, effect, w
     assert word in cause.interpretation
     assert cause.shift.falls == pytest.approx(0.2, abs=0.03)
     assert cause.evidence["relative_change"] == pytest.approx(-0.4, abs=0.06)
+
+
+@pytest.mark.parametrize(("dry", "wet"), [(-0.08, -0.3), (0.0, -0.6), (-0.25, -0.6)])
+def test_friction_that_falls_as_warmth_lowers_it_may_be_warmth(dry, wet):
+    def less(q, v, a, t):
+        return dry * COEFFICIENTS[3] * np.sign(v) + wet * COEFFICIENTS[4] * v
+
+    cause = causes_of(less)[0]
+    assert cause.effect == "thermal_viscous"
+    assert "less friction, as in warmer grease" in cause.interpretation
+
+
+@pytest.mark.parametrize(("dry", "wet"), [(0.0, 0.09), (-0.08, -0.02)])
+def test_a_current_that_falls_with_the_speed_knows_of_no_warmth(dry, wet, monkeypatch):
+    """A ball screw whose friction had fallen was excused: -0.4 A s/rad had grown by 38 %."""
+    stepper = np.where(np.arange(6) == 4, -0.2, COEFFICIENTS)
+    monkeypatch.setattr(sessions, "COEFFICIENTS", stepper)
+    found = causes_of(lambda q, v, a, t: dry * np.sign(v) + wet * v)
+    assert found
+    assert "thermal_viscous" not in {cause.effect for cause in found}
 
 
 def test_dry_and_wet_friction_that_fall_are_one_cause():
