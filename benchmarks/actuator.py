@@ -34,6 +34,7 @@ from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.cause import explain, moving_samples
 from opamc_cli.stages.verdict.evidence import bundles
+from opamc_cli.stages.verdict.verdict import believed, with_cause
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 
@@ -204,8 +205,8 @@ def main() -> None:
 
 
 def causes(machine: Machine, draws: int, seed: int) -> None:
-    """Print which cause is named first for each state, and how often."""
-    config = load_config().joint
+    """Print which cause is named first for each state, what the verdict is, and how often."""
+    config = load_config()
     for state in machine.currents:
         if state == HEALTHY:
             continue
@@ -214,12 +215,19 @@ def causes(machine: Machine, draws: int, seed: int) -> None:
         rng = np.random.default_rng([seed, *state.encode()])
         named: Counter[str] = Counter()
         for _ in range(draws):
-            sources = []
-            for side in (HEALTHY, state):
-                runs = rng.choice(list(machine.currents[side]), 5, replace=False)
-                sources.append([s for s in machine.sides[side].sources if s.name in runs])
-            found = explain(1, *sources, config, moving)
-            named[found["effect"] if found else "none"] += 1
+            runs = [
+                rng.choice(list(machine.currents[side]), 5, replace=False).tolist()
+                for side in (HEALTHY, state)
+            ]
+            sources = [
+                [s for s in machine.sides[side].sources if s.name in own]
+                for side, own in zip((HEALTHY, state), runs, strict=True)
+            ]
+            found = explain(1, *sources, config.joint, moving)
+            judged, _ = machine.judgement(*runs, state)
+            cause = believed(judged, found or None, config.score)
+            final = with_cause(judged, cause, config.score)
+            named[f"{found['effect'] if found else 'none'}, {final.state}"] += 1
         print(state, dict(named.most_common()), flush=True)
 
 

@@ -10,6 +10,7 @@ from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
 from opamc_cli.stages.verdict.reasons import (
+    COMMON,
     CURRENT_LAG,
     SENSOR_NOISE,
     SMALLER_PART,
@@ -26,9 +27,6 @@ SMOOTHER = 0.5
 """Of the baseline's fluctuations: a run-in or a warmer gear takes some per cent, a filter most."""
 
 GEAR = "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
-
-COMMON = 1.5
-"""Times as far as usual that the siblings have moved, to be worth a word."""
 
 
 def brief(

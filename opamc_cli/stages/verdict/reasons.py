@@ -32,6 +32,13 @@ REPEAT = (
     "Repeat the recording under the baseline's conditions before taking the joint apart: the "
     "current shows an effect, not the part that is worn."
 )
+COMMON = 1.5
+"""Times as far as usual that the siblings have moved, to be worth a word."""
+
+ALONE = (
+    "No temperature was logged, and most other joints have moved no farther than usual, as they "
+    "would in a warmer or colder hall: look for what warms or cools this joint alone, too."
+)
 SUSPICION = 0.1
 """Corrected p-value from which a healthy joint is said to be worth an eye."""
 
@@ -75,6 +82,7 @@ def reasons(
     limits: ScoreConfig | None = None,
     *,
     in_vain: bool = False,
+    siblings: int = 0,
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -92,6 +100,8 @@ def reasons(
         What a change has to exceed; None: the defaults.
     in_vain
         Whether a cause was sought, and none found.
+    siblings
+        How many other joints of the robot were judged.
 
     Returns
     -------
@@ -118,6 +128,9 @@ def reasons(
         if outside and excuses_little(cause):
             known = [SMALLER_PART]
         sentences += [*cause.get("why", []), *(text.format(meaning) for text in known)]
+        of_hall = cause.get("origin") == "environment" and not cause.get("parameters")
+        if of_hall and siblings > 1 and math.exp(judgement.common_log_ratio) < COMMON:
+            sentences += [ALONE]
         if outside and judgement.state == "fault" and cause.get("effect") not in BEFORE_THE_GEAR:
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
@@ -320,7 +333,7 @@ def _rest(judgement: Judgement, sources: Mapping[str, Sequence[RunSource]]) -> s
 def _siblings(judgement: Judgement) -> list[str]:
     excused = judgement.state == "healthy" and judgement.p_alone > judgement.p_adjusted
     factor = math.exp(judgement.common_log_ratio)
-    if factor < 1.5:
+    if factor < COMMON:
         allowed = math.exp(judgement.allowed_log_ratio)
         if not excused or judgement.p_adjusted > SUSPICION:
             return []

@@ -320,7 +320,7 @@ def content(
     for axis, judgement in decided.judgements.items():
         in_vain = causes.get(axis) == {}
         cause = believed(judgement, causes.get(axis) or None, config.score)
-        final = _with_cause(judgement, cause, config.score)
+        final = with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
         if final.state == "insufficient-data":
@@ -348,7 +348,10 @@ def content(
         lacking = _not_compared(axis, decided)
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
-        said = reasons(final, bundle, motions, runs, cause, config.score, in_vain=in_vain)
+        others = sum(math.isfinite(one.p_value) for one in decided.judgements.values()) - 1
+        said = reasons(
+            final, bundle, motions, runs, cause, config.score, in_vain=in_vain, siblings=others
+        )
         files = decided.files_apart(axis)
         for told in (files, which):  # after what the state does not tell
             if told:
@@ -438,7 +441,7 @@ def believed(
     return None if sharp and cause.get("origin") == "environment" else cause
 
 
-def _with_cause(
+def with_cause(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Judgement:
     """Call a change of known cause a fault only if that cause harms the joint."""

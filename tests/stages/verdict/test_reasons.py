@@ -58,6 +58,32 @@ def test_a_joint_that_the_weather_of_its_siblings_excuses_is_told_so(state, p_al
     assert ("may lie 2.7 times as far out" in text) is said
 
 
+@pytest.mark.parametrize(
+    ("cause", "siblings", "common", "said"),
+    [
+        ({}, 2, 0.0, True),
+        ({}, 1, 0.0, False),  # of one nothing in common is known
+        ({}, 5, 1.0, False),
+        ({"parameters": {"warmer_c": 9.0}}, 2, 0.0, False),
+        ({"origin": "load"}, 2, 0.0, False),
+    ],
+)
+def test_warmth_of_one_joint_alone_is_said(cause, siblings, common, said):
+    own = cells(Fleet(n_axes=1), 0)[1]
+    one = replace(judge({1: Bundle(own)})[1], state="changed", common_log_ratio=common)
+    entries = [
+        {
+            **{"motion": cell.motion, "order": cell.order, "tau": cell.tau},
+            **{"jsd_baseline": [0.02], "jsd_target": [0.03]},
+        }
+        for cell in own
+    ]
+    grease = {"effect": "thermal_viscous", "origin": "environment", "harmless": True} | cause
+    sides = {"baseline": [], "target": []}
+    text = " ".join(reasons(one, Bundle(own), entries, sides, grease, siblings=siblings))
+    assert ("warms or cools this joint alone" in text) is said
+
+
 def test_a_witness_that_could_not_be_heard_is_said():
     own = cells(Fleet(n_axes=1), 0)[1]
     whole = judge({1: Bundle(own)})[1]
