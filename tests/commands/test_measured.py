@@ -67,11 +67,11 @@ def test_a_healthy_recording_left_out_stays_healthy(recordings, tmp_path, left_o
 
 @pytest.fixture(scope="module")
 def screw(tmp_path_factory):
-    """A ball screw, healthy and without grease: position and unsigned current at 25 Hz."""
+    """A ball screw, healthy, without grease, and spalled: position, unsigned current at 25 Hz."""
     if not SCREW.is_dir():
         pytest.skip(f"no measured recordings at {SCREW}")
     out = tmp_path_factory.mktemp("screw")
-    for state in ("normal", "lackLubrication1"):
+    for state in ("normal", "lackLubrication1", "spalling7"):
         for file in sorted((SCREW / state).glob("*.csv")):
             table = np.genfromtxt(file, delimiter=",", names=True)
             columns = {
@@ -107,6 +107,16 @@ def test_a_screw_without_grease_is_at_fault_and_its_friction_is_why(screw, tmp_p
     axis = json.loads((tmp_path / "verdict.json").read_text())["axes"][0]
     assert axis["state"] == "fault"
     assert axis["cause"]["effect"] in ("viscous", "coulomb", "sublinear_friction")
+
+
+@pytest.mark.parametrize("target", [slice(0, 5), slice(5, 10), slice(0, 10, 2)])
+def test_no_warmth_excuses_a_spalled_screw(screw, tmp_path, target):
+    """Its current falls with the speed: what is fitted as viscous friction is below nought."""
+    normal, spalled = (sorted((screw / s).glob("*")) for s in ("normal", "spalling7"))
+    code = opamc("diagnose", *sides(normal[:5], spalled[target]), "--out", tmp_path, "--quiet")
+    assert code == ExitCode.UNHEALTHY
+    axis = json.loads((tmp_path / "verdict.json").read_text())["axes"][0]
+    assert axis["cause"] is None or not axis["cause"]["harmless"]
 
 
 def test_a_healthy_screw_stays_healthy(screw, tmp_path):
