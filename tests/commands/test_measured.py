@@ -109,14 +109,15 @@ def test_a_screw_without_grease_is_at_fault_and_its_friction_is_why(screw, tmp_p
     assert axis["cause"]["effect"] in ("viscous", "coulomb", "sublinear_friction")
 
 
-@pytest.mark.parametrize("target", [slice(0, 5), slice(5, 10), slice(0, 10, 2)])
+@pytest.mark.parametrize("target", [slice(0, 5), slice(5, 10)])
 def test_no_warmth_excuses_a_spalled_screw(screw, tmp_path, target):
     """Its current falls with the speed: what is fitted as viscous friction is below nought."""
     normal, spalled = (sorted((screw / s).glob("*")) for s in ("normal", "spalling7"))
-    code = opamc("diagnose", *sides(normal[:5], spalled[target]), "--out", tmp_path, "--quiet")
+    code = opamc("diagnose", *sides(normal[::2], spalled[target]), "--out", tmp_path, "--quiet")
     assert code == ExitCode.UNHEALTHY
     axis = json.loads((tmp_path / "verdict.json").read_text())["axes"][0]
-    assert axis["cause"] is None or not axis["cause"]["harmless"]
+    assert axis["state"] == "fault"
+    assert not axis["cause"]["harmless"]
 
 
 def test_a_healthy_screw_stays_healthy(screw, tmp_path):
