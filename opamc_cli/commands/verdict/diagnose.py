@@ -37,7 +37,7 @@ def diagnose(
     verbose: options.Verbose = False,
 ) -> None:
     """Run all stages on two sets of runs; writes verdict.json, report.html and every table."""
-    from opamc_cli.stages.processes.documentation import forgo_documentation
+    from opamc_cli.stages.processes.documentation import forgo_compiler, forgo_documentation
 
     forgo_documentation()
     from opamc_cli.commands.terminal.tables import doubtful, verdict_lines, verdict_table
@@ -47,6 +47,7 @@ def diagnose(
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
 
+    forgo_compiler()
     forgo_pandas()
     output = Output(as_json, quiet)
     effective = load_config(config, overrides or ())

@@ -1,13 +1,16 @@
-"""What libraries load that nobody asks for: documentation, and tools for makers of libraries."""
+"""What libraries load that nobody asks for: documentation, tools for makers of libraries, and what
+compiles loops that are compiled."""
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from functools import partial
 from typing import Any
 
 UNUSED = ("f2py", "testing")
 """Parts of numpy that it loads only when they are asked for, and scipy asks for all."""
+
+OURS = "opamc_cli."
 
 
 def forgo_documentation() -> None:
@@ -26,6 +29,38 @@ def forgo_documentation() -> None:
         reader.FunctionDoc = partial(reader.FunctionDoc, doc="")
         with _unseen(UNUSED):
             import scipy._lib.array_api_compat.numpy  # noqa: F401 - who loads it first, fills it
+
+
+def forgo_compiler() -> None:
+    """Have our compiled loops read from where they are kept without all that could compile them.
+
+    numba makes its compiler ready before it looks, which takes a quarter of a second, an eighth of
+    a healthy lone night; who has to compile makes it ready then. Loops of a user's may call what
+    that alone would load: theirs are left alone. To be called once numba is loaded.
+    """
+    caching = sys.modules.get("numba.core.caching")
+    if caching is None or caching.Cache.load_overload.__module__ == __name__:
+        return
+    from numba.core.runtime import rtsys
+
+    loaded = caching.Cache.load_overload
+
+    def load_overload(self: Any, sig: Any, target_context: Any) -> Any:
+        ours = self._py_func.__module__.startswith(OURS)
+        with _ready(target_context, rtsys.initialize) if ours else nullcontext():
+            return loaded(self, sig, target_context)
+
+    caching.Cache.load_overload = load_overload
+
+
+@contextmanager
+def _ready(context: Any, initialize: Callable[[Any], None]) -> Iterator[None]:
+    """Have a numba context made ready to run what is compiled, no more; under numba's own lock."""
+    context.refresh = partial(initialize, context)
+    try:
+        yield
+    finally:
+        del context.refresh  # what lay over the method
 
 
 @contextmanager

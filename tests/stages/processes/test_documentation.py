@@ -43,3 +43,60 @@ def test_a_scipy_without_that_part_loads_as_it_is():
     hidden = "import sys\nsys.modules['scipy._lib._docscrape'] = None\n"
     shown = "del sys.modules['scipy._lib._docscrape']\n"
     assert printed(hidden + FORGO + shown + LOAD) == printed(LOAD)
+
+
+LOOP = (
+    "import sys, numpy\n"
+    "from opamc_cli.signal.ordinal.kernels import _next_order\n"
+    "{}"
+    "bits = [numpy.zeros(5, numpy.uint8) for _ in range(3)]\n"
+    "_next_order(*numpy.float32([[3, 1, 4, 1, 5], [1, 4, 1, 5, 9]]), 1, 1, *bits)\n"
+    "print('numba.np.random' in sys.modules, [each.tolist() for each in bits],\n"
+    "      *_next_order.stats.cache_hits.values())\n"
+)
+FORGO_COMPILER = (
+    "from opamc_cli.stages.processes.documentation import forgo_compiler\n"
+    "forgo_compiler()\n"
+    "forgo_compiler()\n"
+)
+
+
+def test_a_compiled_loop_is_read_without_the_compiler_and_compiled_with_it(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    ready, compiled = printed(LOOP.format(FORGO_COMPILER))
+    assert ready == "True"
+    assert printed(LOOP.format("")) == ["True", compiled.replace("]]\n", "]] 1\n")]
+    assert printed(LOOP.format(FORGO_COMPILER)) == ["False", compiled.replace("]]\n", "]] 1\n")]
+
+
+EVERY_LOOP = f"""
+import importlib, pkgutil, sys
+from numba.core.dispatcher import Dispatcher
+import opamc_cli
+{FORGO_COMPILER}
+for module in pkgutil.walk_packages(opamc_cli.__path__, "opamc_cli."):
+    text = module.module_finder.find_spec(module.name).loader.get_source(module.name)
+    if "njit" in text and not module.ispkg:
+        importlib.import_module(module.name)
+ours = [v for m in [*sys.modules.values()] for v in vars(m).values() if isinstance(v, Dispatcher)
+        and m.__name__.startswith("opamc_cli.")]
+for loop in ours:
+    for signature, *_ in loop._cache._cache_file._load_index():
+        loop.compile(signature)
+print("numba.np.random" in sys.modules, len(ours))
+"""
+
+
+def test_all_loops_that_are_kept_can_be_read_so():
+    """One that lacks what the compiler would have loaded ends the process."""
+    ready, number = printed(EVERY_LOOP)
+    assert ready == "False"
+    assert int(number) > 15
+
+
+def test_loops_of_a_users_are_left_alone(tmp_path):
+    effect = tmp_path / "effect.py"
+    effect.write_text("import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2 * x\n")
+    used = f"import sys\nsys.path.insert(0, {str(tmp_path)!r})\nimport effect\n" + FORGO_COMPILER
+    used += "print(effect.twice(4), 'numba.np.random' in sys.modules)\n"
+    assert printed(used) == printed(used) == ["8", "True\n"]

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
 from opamc_cli.errors import OpamcError
-from opamc_cli.stages.processes.documentation import forgo_documentation
+from opamc_cli.stages.processes.documentation import forgo_compiler, forgo_documentation
 from opamc_cli.stages.processes.garbage import look_for_garbage_seldom
 from opamc_cli.stages.processes.interruption import SIGNALS
 from opamc_cli.stages.processes.parallel import die_with, one_thread_each
@@ -233,6 +233,7 @@ def _serve(pipe: Connection, name: str, memory: int | None, parent: int, forked:
     look_for_garbage_seldom()
     forgo_documentation()
     function = called(name)
+    forgo_compiler()
     forgo_pandas()
     if memory is not None:
         _limit_memory(memory)
