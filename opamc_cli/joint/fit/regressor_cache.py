@@ -71,7 +71,7 @@ class RegressorCache:
     def _bounded(self) -> None:
         """Forget what follows the model, which nothing meets again; all where it is too much."""
         kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
-        # Products are known by their blocks. To look through all of them took a fifth of a cause.
+        # Products are known by their blocks. To look through all of them took a sixth of a cause.
         if not kept.issuperset(key[0] for key in self._taken):
             self._taken = {key: pair for key, pair in self._taken.items() if key[0] in kept}
             pairs = [key for key in self._products if kept.issuperset(key[:2])]
