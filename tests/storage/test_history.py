@@ -3,8 +3,12 @@
 import sqlite3
 from contextlib import closing
 
+import pytest
+
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import Event
+from opamc_cli.storage.history.rows import Event, NightRow
+
+KEY = '{"version": "1", "config": "c", "baseline": "b", "files": []}'
 
 
 def test_a_file_tells_the_layout_that_it_has(tmp_path):
@@ -29,3 +33,28 @@ def test_missing_nights_are_written_anew_only_if_they_differ(tmp_path):
         history.replace_missing([])
         assert changed() != before
         assert history.events() == []
+
+
+def test_nights_are_read_once_until_somebody_writes(tmp_path, monkeypatch):
+    path = tmp_path / "history.sqlite"
+    read, rows = [], History.rows
+    monkeypatch.setattr(History, "rows", lambda *given: read.append(1) or rows(*given))
+
+    def known(history):
+        return [night for _, night in history.nights()]
+
+    with History(path) as history, History(path) as other:
+        assert known(history) == []
+        history.record_night(NightRow("r1", "2026-03-01", KEY, "done"))
+        assert known(history) == ["2026-03-01"]
+        before = len(read)
+        history.nights().clear()  # theirs, who asked
+        assert known(history) == ["2026-03-01"]
+        assert len(read) == before
+        other.record_night(NightRow("r1", "2026-03-02", KEY, "done"))
+        assert known(history) == ["2026-03-01", "2026-03-02"]
+        with pytest.raises(LookupError), history.transaction():
+            history._db.execute("DELETE FROM night")
+            assert known(history) == []
+            raise LookupError
+        assert known(history) == ["2026-03-01", "2026-03-02"]

@@ -79,6 +79,7 @@ class History:
 
     def __init__(self, path: Path, *, read_only: bool = False) -> None:
         self.path = path
+        self._nights: tuple[tuple[int, ...], dict[tuple[str, str], NightRow]] = ((), {})
         if read_only and not path.is_file():
             msg = f"{path}: no history here yet; `opamc nightly` writes it"
             raise InputError(msg)
@@ -222,9 +223,20 @@ class History:
         return not self.rows("SELECT path FROM file LIMIT 1") and not self.nights()
 
     def nights(self) -> dict[tuple[str, str], NightRow]:
-        """Return what became of every robot's night."""
-        found = self._read(NightRow, "SELECT * FROM night")
-        return {(row.robot, row.night): row for row in found}
+        """Return what became of every robot's night.
+
+        A start asks five times; to read thousands of nights once is a twelfth of one without news.
+        """
+        with self._errors():
+            others = self._db.execute("PRAGMA data_version").fetchone()
+        now = (self._db.total_changes, *others)
+        then, found = self._nights
+        passing = self._db.in_transaction  # to take it back counts as no change
+        if passing or then != now:
+            rows = self._read(NightRow, "SELECT * FROM night")
+            found = {(row.robot, row.night): row for row in rows}
+            self._nights = (() if passing else now), found
+        return dict(found)
 
     def baselines(self) -> dict[tuple[str, str, str, str], list[str]]:
         """Return the nights of every complete baseline, by robot, program, condition and since."""

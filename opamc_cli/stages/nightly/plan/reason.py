@@ -80,6 +80,9 @@ def reason_of(
     """Say why a night is to be done; empty if its record stands."""
     if record is None:
         return "new"
+    again = record.status == "broken" and record.attempts < MOST_ATTEMPTS
+    if key == record.key:
+        return f"broke before ({record.why})" if again else ""
     now, then = json.loads(key), json.loads(record.key)
     if now["version"] != then["version"]:
         return f"judged by version {then['version']}"
@@ -93,6 +96,4 @@ def reason_of(
     added = set(now["files"]) - set(then["files"])
     if added:
         return f"{len(added)} new or changed file{'s' if len(added) > 1 else ''}"
-    if record.status == "broken" and record.attempts < MOST_ATTEMPTS:
-        return f"broke before ({record.why})"
-    return ""
+    return f"broke before ({record.why})" if again else ""

@@ -56,9 +56,11 @@ def _inputs(recordings: Sequence[Recording]) -> tuple[Input, ...]:
 
 def drop_copies(cell: CellConfig, planned: Sequence[PlannedNight]) -> None:
     """Keep copies of baselines only: every night needs them, and a target is not read again."""
+    copies = cell.out / COPIES
+    if not copies.is_dir():
+        return
     baselines = (one for night in planned for each in night.comparisons for one in each.baseline)
     keep = {copy_name(one.log) for one in baselines if one.log.remote}
-    copies = cell.out / COPIES
-    for copy in copies.iterdir() if copies.is_dir() else ():
+    for copy in copies.iterdir():
         if copy.name not in keep:
             copy.unlink(missing_ok=True)
