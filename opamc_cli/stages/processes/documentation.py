@@ -1,5 +1,4 @@
-"""What libraries load that nobody asks for: documentation, tools for makers of libraries, and what
-compiles loops that are compiled."""
+"""What libraries load that nobody asks for: documentation, makers' tools, and a compiler."""
 
 import sys
 from collections.abc import Callable, Iterator

@@ -149,6 +149,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(cell, opamc):
     alarm = "r2 axis 2: ALARM"
     at = ("--why", "gear ordered", "--cell", cell)
@@ -170,6 +171,7 @@ def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(
         assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
     """It was what healthy nights differ by: the same fault in the next night was healthy."""
     rule = "alarm: {nights: 1, of: 1}\nrobots: {r2: {}}\n"
@@ -187,6 +189,7 @@ def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
     ]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     cell.write_text(cell.read_text() + "alarm: {nights: 1, of: 1, remind_after: 1}\n")
     late = cell.parent / "logs" / "r2" / NIGHTS[4]
@@ -199,6 +202,7 @@ def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     assert again.out.startswith("r2 axis 2: STILL UNDER ALARM, not as it was since ")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     plain = cell.read_text()
     watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
@@ -229,6 +233,7 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     assert "not watched" not in ended.out  # which was so before
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_history(cell, opamc):
     at = ("--why", "new gear", "--cell", cell)
     begin = ("nightly", "rebaseline", "r2", "--from", NIGHTS[3], *at)
@@ -264,6 +269,7 @@ def test_facts_of_thousands_of_known_files_are_read_at_once():
     assert time.process_time() - begun < 2.0  # 0.1 s; it was once 35 s
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     only = ("nightly", cell, "--quiet", "--robot", "r1", "--night", NIGHTS[4])
     assert (opamc(*only).code, opamc(*only).out) == (ExitCode.DONE, "")
@@ -293,6 +299,7 @@ def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     assert opamc(*shown, "--robot", "r1", "--since", NIGHTS[0]).code == ExitCode.DONE
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_logs_out_of_reach_and_joints_that_are_not_there_are_said(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r2: {axes: [2, 7]}}\n")
     for night in NIGHTS[3:4]:

@@ -168,9 +168,7 @@ class Baselines:
         # the file asks for more nights than before, or some are under alarm by nights that came
         # later: those that follow, as soon as they are there
         longer = pinned + [
-            n
-            for n in there
-            if (not before or n > before[-1]) and self._alarm_over(key, n) is None
+            n for n in there if (not before or n > before[-1]) and self._alarm_over(key, n) is None
         ]
         if len(longer) >= wanted:
             return longer[:wanted]
