@@ -37,19 +37,22 @@ def forgo_compiler() -> None:
     a healthy lone night; who has to compile makes it ready then. Loops of a user's may call what
     that alone would load: theirs are left alone. To be called once numba is loaded.
     """
-    caching = sys.modules.get("numba.core.caching")
-    if caching is None or caching.Cache.load_overload.__module__ == __name__:
+    caching: Any = sys.modules.get("numba.core.caching")
+    if caching is None:
         return
-    from numba.core.runtime import rtsys
+    with suppress(ImportError, AttributeError):  # private; left alone if absent
+        from numba.core.runtime.nrt import rtsys
 
-    loaded = caching.Cache.load_overload
+        loaded, initialize = caching.Cache.load_overload, rtsys.initialize
+        if loaded.__module__ == __name__:
+            return
 
-    def load_overload(self: Any, sig: Any, target_context: Any) -> Any:
-        ours = self._py_func.__module__.startswith(OURS)
-        with _ready(target_context, rtsys.initialize) if ours else nullcontext():
-            return loaded(self, sig, target_context)
+        def load_overload(self: Any, sig: Any, target_context: Any) -> Any:
+            ours = self._py_func.__module__.startswith(OURS)
+            with _ready(target_context, initialize) if ours else nullcontext():
+                return loaded(self, sig, target_context)
 
-    caching.Cache.load_overload = load_overload
+        caching.Cache.load_overload = load_overload
 
 
 @contextmanager
