@@ -10,7 +10,8 @@ from opamc_cli.joint.motion.track import Floats, Ints, Track
 ONE = (
     (0,),  # a far or light link
     (0, 1, 2, 3, 4),  # the outer link of an elbow,
-    (0, 5, 6),  # or the inner one
+    (0, 5, 6),  # or the inner one,
+    (0, 13, 14),  # whose axis is opposed
     (7, 8),  # a link that lifts, of a joint that stands upright
     (9, 10),  # a slow link on an axis that is parallel,
     (11, 12),  # or opposed
@@ -19,6 +20,10 @@ TWO = (
     *((place, place + 1) for place in (0, 2, 4, 6)),  # a slow third link
     *(tuple(range(place, place + 4)) for place in (8, 12)),  # both lift, of an upright joint
     tuple(range(8)),  # a slow link on axes that are not parallel
+    # A chain of three on parallel axes: of its first joint, its second and its third.
+    *((n, n + 1, n + 16, n + 17, 32, 33) for n in (0, 2, 4, 6)),
+    *((n, n + 1, n + 24, n + 25, 32, 33) for n in (0, 2, 4, 6)),
+    *((n, n + 1, n + 24, n + 25, 34, 35) for n in (0, 2, 4, 6)),
 )
 """With `ONE`: columns of the smaller forms, with one other joint and with two."""
 
@@ -29,10 +34,10 @@ class Coupling(Effect):
     Of a planar elbow the shoulder bears ``(a + b cos q2) q2'' - b sin q2 q2'^2``, twice the rate
     of change of ``b cos q2 q1'``, and ``g cos(q1 + q2)``; the elbow ``(a + b cos q2) q1'' + b sin
     q2 q1'^2`` (Spong, Hutchinson, Vidyasagar, Robot Modeling and Control, 2006, section 7.3). A
-    third link adds ``cos(q1 + q2 + q3)``; about an upright axis the links' inertia is a sum of
-    squares and products of ``cos q2`` and ``cos(q2 + q3)``. Zeros of the angles are unknown and
-    axes may be opposed: every wave is a sine and a cosine, and the difference stands beside the
-    sum.
+    third link on a parallel axis adds ``cos(q1 + q2 + q3)``, and the same with ``q2 + q3``, or with
+    two joints' speeds; about an upright axis the links' inertia is a sum of squares and products of
+    ``cos q2`` and ``cos(q2 + q3)``. Zeros of the angles are unknown and axes may be opposed: every
+    wave is a sine and a cosine, and the difference stands beside the sum.
     """
 
     name = "coupling"
@@ -60,25 +65,32 @@ class Coupling(Effect):
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Regressors of one other joint, or of two, at some samples."""
-        q, dq, ddq = (one[rows] for one in (track.position_rad, track.velocity, track.acceleration))
-        a, da, dda = _motion(track, parameters["axis"], rows)
+        q, dq, ddq = (own[rows] for own in (track.position_rad, track.velocity, track.acceleration))
+        one = a, da, dda = _motion(track, parameters["axis"], rows)
         if "beside" not in parameters:
             return stack(
                 dda,
                 *_carried(a, da, da, dda),
                 *_carried(a, da, dq, ddq),
-                np.cos(q) * dda + np.sin(q) * da**2,
-                np.sin(q) * dda - np.cos(q) * da**2,
+                *_carried(q, -da, da, dda),
                 *_carried(2 * a, 2 * da, dq, ddq),
                 *_waves(q + a),
                 *_waves(q - a),
+                *_carried(q, -da, da, -dda),
             )
-        b, db, _ = _motion(track, parameters["beside"], rows)
-        weights = [_waves(q + way * a + side * b) for way in (1, -1) for side in (1, -1)]
-        lifted = [
-            _carried(2 * a + times * b, 2 * da + times * db, dq, ddq) for times in (1, 2, -1, -2)
+        two = b, db, _ = _motion(track, parameters["beside"], rows)
+        senses = [(way, side) for way in (1, -1) for side in (1, -1)]
+        lifted = [(2 * one + times * two)[:2] for times in (1, 2, -1, -2)]
+        sums = [way * one + side * two for way, side in senses]
+        pairs = [
+            *(_waves(q + angle) for angle, _, _ in sums),
+            *(_carried(angle, rate, dq, ddq) for angle, rate in lifted),
+            *(_carried(s, ds, 2 * dq + ds, 2 * ddq + dds) for s, ds, dds in sums),
+            *(_carried(q + side * b, -da, da, way * dda) for way, side in senses),
+            _carried(b, db, da, dda),
+            (np.cos(q) * da * db, np.sin(q) * da * db),
         ]
-        return stack(*(column for pair in (*weights, *lifted) for column in pair))
+        return stack(*(column for pair in pairs for column in pair))
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say which joints."""

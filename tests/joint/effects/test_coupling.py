@@ -1,6 +1,7 @@
 """What another joint of the arm asks of this one."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -74,6 +75,20 @@ def across(first, second, third):
     return 0.5 * first[2] + 8.0 * np.sin(first[0]) * weighed
 
 
+def chain(joint, *motions):
+    """Torque on a joint of links on parallel axes, from their angles against the ground."""
+    angle, speed, acceleration = (np.cumsum(one, axis=0) for one in zip(*motions, strict=True))
+    inertia = np.array([[1.9, 0.8, 0.3], [0.8, 0.7, 0.25], [0.3, 0.25, 0.2]])
+    torque = 0.0
+    for i in range(joint, 3):
+        torque = torque + (3.0, 1.8, 0.7)[i] * np.cos(angle[i])
+        for j in range(3):
+            apart = angle[i] - angle[j]
+            pulled = np.cos(apart) * acceleration[j] + np.sin(apart) * speed[j] ** 2
+            torque = torque + inertia[i, j] * pulled
+    return torque
+
+
 def recording(current, place, others):
     return Recording("run", RATE, current, position_rad=place, others_rad=others)
 
@@ -91,11 +106,15 @@ PAIR = [{"axis": 2.0}, {"axis": 3.0}, {"axis": 2.0, "beside": 3.0}]
         (third_link(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR[2:]),
         (upright(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR),
         (across(FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR[2:]),
+        (chain(0, FIRST, SECOND, THIRD), FIRST, {2: SECOND, 3: THIRD}, PAIR),
+        (chain(1, FIRST, SECOND, THIRD), SECOND, {2: FIRST, 3: THIRD}, PAIR),
+        (chain(2, FIRST, SECOND, THIRD), THIRD, {2: FIRST, 3: SECOND}, PAIR),
     ],
-    ids=["shoulder", "elbow", "third link", "upright", "across"],
+    ids=["shoulder", "elbow", "third link", "upright", "across", "first", "second", "third"],
 )
-def test_an_arm_s_torques_are_held_by_the_columns(torque, own, others, asked):
-    places = {axis: motion[0] for axis, motion in others.items()}
+@pytest.mark.parametrize("senses", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
+def test_an_arm_s_torques_are_held_by_the_columns(torque, own, others, asked, senses):
+    places = {a: way * one[0] for way, (a, one) in zip(senses, others.items(), strict=False)}
     track = build_track([recording(torque, own[0], places)], Joint())
     inner = slice(50, -50)
     columns = [built_in_library()["coupling"].columns(track, one)[inner] for one in asked]
@@ -125,7 +144,7 @@ def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
     assert loop.verdict == "closed"
 
 
-@pytest.mark.parametrize("torque", [third_link, upright, across])
+@pytest.mark.parametrize("torque", [third_link, upright, across, partial(chain, 0)])
 def test_two_joints_that_load_this_one_are_named_and_another_is_not(torque):
     noise = 0.05 * np.random.default_rng(4).normal(size=FIRST[0].size)
     current = torque(FIRST, SECOND, THIRD) + 0.3 * np.sign(FIRST[1]) + noise
