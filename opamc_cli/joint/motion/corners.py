@@ -8,7 +8,8 @@ over: broad in frequency, the same in every cycle, and well fitted by sines of t
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
-from opamc_cli.joint.motion.track import Bools, Floats, averaged
+from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.signal.transform.averages import averaged
 
 LARGEST_LACK = 0.3
 """Standard deviations of the current's noise that the smoothing may take from a sample."""

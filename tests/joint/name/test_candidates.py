@@ -6,10 +6,10 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.motion.track import averaged, block_mean
 from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
+from opamc_cli.signal.transform.averages import averaged, block_mean
 
 LIBRARY = built_in_library()
 MOTION = ("offset", "spring", "stribeck", "quadratic_friction", "asymmetric_friction",

@@ -3,7 +3,6 @@ import pytest
 from scipy.signal import savgol_filter
 from simulator import simulate
 
-from opamc_cli.joint.motion.track import averaged
 from opamc_cli.signal.motion.smoothing import (
     LONG_WINDOW,
     SHORTEST_WINDOW,
@@ -14,6 +13,7 @@ from opamc_cli.signal.motion.smoothing import (
     taken_noise_gain,
     unstepped,
 )
+from opamc_cli.signal.transform.averages import averaged
 
 
 def slow_derivative(path, rate, window, order):
