@@ -161,7 +161,7 @@ class Baselines:
         """Return the nights of a baseline that begins with the first ones; empty: too few yet."""
         wanted = self._now.baseline.nights or NIGHTS_AGAIN
         before = self._now.pinned.get(key, ())
-        there = self._nights_there(key)
+        there = self._nights_there(key)  # also for who looks it up under the key hereafter
         pinned = [n for n in before if self._alarm_over(key, n) is None]
         if len(pinned) >= wanted:
             return pinned[:wanted]  # asked for each night, over all nights: a tenth of a start
