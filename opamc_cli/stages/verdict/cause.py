@@ -11,7 +11,7 @@ from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.measurement.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
 from opamc_cli.decision.measurement.lag import Course, Lag, courses, lag_behind
 from opamc_cli.errors import NotEnoughDataError, OpamcError
-from opamc_cli.joint.change.explain import Change, explain_change
+from opamc_cli.joint.change.explain import SMALLEST_SHARE, Change, explain_change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
 from opamc_cli.joint.effects.library import Library, built_in_library
@@ -69,9 +69,6 @@ MUCH = 9.0
 
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
-
-REST_SHARE = 0.03
-"""What explains less of a change beside a lag is not worth a maintainer's time."""
 
 HUM = "mains_hum"
 NOISE = (
@@ -347,7 +344,7 @@ def _of_lag(lag: Lag, found: Mapping[str, Any] | None) -> dict[str, Any]:
     late = f"the current comes {1e3 * abs(lag.lag_s):.2g} ms {way} against the position"
     others = [] if found is None else [{key: found[key] for key in OF_OTHERS}, *found["others"]]
     rest = [{**other, "share": other["share"] * (1 - lag.share)} for other in others]
-    rest = [other for other in rest if other["share"] >= REST_SHARE]
+    rest = [other for other in rest if other["share"] >= SMALLEST_SHARE]
     why = [
         f"In all motions alike {late} than in the baseline, whose recordings differ by "
         f"{1e3 * lag.of_baseline_s:.2g} ms at most; moved back, {lag.share:.0%} of what its course "
