@@ -430,6 +430,13 @@ def _health_index(shift: Shift) -> float:
     return math.expm1(min(shift.log_ratio - log_mean, 100.0)) / shift.unit
 
 
+def one_of_many(judgement: Judgement, times: int, policy: Policy) -> Judgement:
+    """Return what is left of a judgement that was chosen from so many (Bonferroni)."""
+    adjusted, alone = min(1.0, times * judgement.p_adjusted), min(1.0, times * judgement.p_alone)
+    left = replace(judgement, p_adjusted=adjusted, p_alone=alone)
+    return replace(left, state=_state(left, policy))
+
+
 def _state(judgement: Judgement, policy: Policy) -> State:
     if not math.isfinite(judgement.p_adjusted):
         return "insufficient-data"

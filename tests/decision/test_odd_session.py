@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from opamc_cli.decision.judge import Bundle, Policy, judge
-from opamc_cli.decision.odd_session import _odd_one, odd_sessions
+from opamc_cli.decision.judge import Bundle, Policy, judge, one_of_many
+from opamc_cli.decision.odd_session import _odd_one, judge_without_odd, odd_sessions
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, spectra
 
@@ -36,9 +36,23 @@ def test_a_worn_night_of_the_baseline_is_found_and_hides_no_fault_any_more(worn)
     assert before[3].state == "healthy"
     odd = odd_sessions(bundles, before)
     assert odd == {3: (f"2026-03-0{worn + 1}",)}
-    after = judge(bundles | {3: bundles[3].without(odd[3])})
+    kept, after, same = judge_without_odd(bundles)
+    assert same == odd
     assert after[3].state == "fault"
     assert after[3].n_baseline_sessions == 5
+
+
+def test_beside_a_baseline_that_was_chosen_a_target_differs_by_more():
+    """The session that was left out was the farthest of six: chance alone brings the rest nearer."""
+    bundles = robot(1, 3)
+    kept, after, _ = judge_without_odd(bundles)
+    plain = judge(kept)
+    assert after[3].p_adjusted == 6 * plain[3].p_adjusted
+    assert after[3].p_alone == 6 * plain[3].p_alone
+    assert {axis: after[axis] for axis in (1, 2, 4)} == {axis: plain[axis] for axis in (1, 2, 4)}
+    uncertain = Policy(false_alarm_rate=3 * max(plain[3].p_adjusted, plain[3].p_alone))
+    assert judge(kept, uncertain)[3].state == "fault"
+    assert one_of_many(plain[3], 6, uncertain).state == "healthy"
 
 
 @pytest.mark.parametrize(("n_baseline", "worn"), [(6, (4, 5)), (6, (3, 4, 5)), (8, (5, 6, 7))])
