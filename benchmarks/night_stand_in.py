@@ -41,7 +41,7 @@ def stand_in(job: NightJob) -> tuple[ProgramResult, ...]:
                 temperature_c=25.0,
                 reason="",
             )
-            for axis in (1, 2)
+            for axis in job.axes or (1, 2)
         )
         page = json.dumps([program.program, [one.name for one in program.baseline]]).encode()
         files = {"verdict.json": page, "report.html": page * 200}

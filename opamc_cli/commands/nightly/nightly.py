@@ -117,6 +117,7 @@ def run(
             now = [*outcome.thinned, *outcome.strays]
             now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
+            history.come_back(outcome.robots)
             now += left(history, loaded)
             untold += history.untold(now)
         morning = tell(summary, untold, outcome, loaded.out, cell)

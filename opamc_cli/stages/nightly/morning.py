@@ -20,15 +20,15 @@ OVER = {
     kind: rank
     for rank, kind in enumerate(
         (
-            *("lost", "ended", "silent", "thinned", "lacking", "failed", "partial", "not-judged"),
-            *("missing", "cleared", "excused", "gathering"),
+            *("lost", "ended", "left", "silent", "thinned", "lacking", "failed", "partial"),
+            *("not-judged", "missing", "cleared", "excused", "gathering"),
         )
     )
 }
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
-NO_ROBOTS = ("lost", "silent", "ended", "stray")
+NO_ROBOTS = ("lost", "silent", "ended", "left", "stray")
 """Kinds of event that may be of none of the cell's robots."""
 
 MOST_STANDING = 20
@@ -74,7 +74,7 @@ def left(history: History, cell: CellConfig) -> Iterator[Event]:
         if alarm.robot not in cell.robots:
             text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: the robot has "
             yield Event(
-                alarm.raised, alarm.robot, alarm.axis, "ended", f"{text}left the cell's file"
+                alarm.raised, alarm.robot, alarm.axis, "left", f"{text}left the cell's file"
             )
 
 
@@ -141,7 +141,7 @@ def tell(
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
-    once = any(event.kind in ("lost", "ended", "stray") for event in news)  # nothing stays of it
+    once = any(event.kind in ("lost", "ended", "left", "stray") for event in news)  # nothing stays of it
     failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
     doubtful = failed or unwatched or once
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE

@@ -444,6 +444,15 @@ class History:
                 [(one.robot, one.axis or 0, one.kind, one.time) for one in events],
             )
 
+    def come_back(self, robots: Iterable[str]) -> None:
+        """Forget that somebody was told that these robots had left: once more is news."""
+        left = {row["robot"] for row in self.rows("SELECT robot FROM told WHERE kind = 'left'")}
+        if there := left.intersection(robots):
+            with self.transaction():
+                self._db.executemany(
+                    "DELETE FROM told WHERE kind = 'left' AND robot = ?", [(one,) for one in there]
+                )
+
     def reports(self) -> dict[str, dict[str, list[str]]]:
         """Return where reports lie, by robot and night, in time order."""
         found: dict[str, dict[str, list[str]]] = {}

@@ -204,33 +204,35 @@ def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
 
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
-    plain = cell.read_text()
-    watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
-    cell.write_text(watched)
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
-    # its joint is watched no more
-    cell.write_text(watched.replace("r2: {}", "r2: {axes: [1]}"))
-    ended = opamc("nightly", cell, "--quiet")
-    assert f"r2 axis 2: the alarm of {NIGHTS[3]} stands no more: it is not watched" in ended.out
-    assert ended.code == ExitCode.PARTIAL
-    ended = opamc("nightly", cell, "--quiet")
-    assert (ended.code, "stands no more" in ended.out) == (ExitCode.DONE, False)
-    # its robot leaves the cell
-    cell.write_text(watched)
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
-    cell.write_text(watched.replace(" r2: {},", ""))
-    ended = opamc("nightly", cell, "--quiet")
-    assert "r2 axis 2: the alarm of" in ended.out
-    assert ended.code == ExitCode.PARTIAL
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
-    # other options, another verdict
-    cell.write_text(watched)
-    assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
-    cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 10}\n")
-    ended = opamc("nightly", cell, "--quiet")
-    assert "r2 axis 2: the alarm of" in ended.out
-    assert "its nights show none now" in ended.out
-    assert "not watched" not in ended.out  # which was so before
+    with nightly_kills.with_stand_in():
+        plain = cell.read_text()
+        watched = f"{plain}robots: {{r1: {{}}, r2: {{}}, r3: {{}}}}\n"
+        cell.write_text(watched)
+        assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+        # its joint is watched no more
+        cell.write_text(watched.replace("r2: {}", "r2: {axes: [1]}"))
+        ended = opamc("nightly", cell, "--quiet")
+        assert f"r2 axis 2: the alarm of {NIGHTS[4]} stands no more: it is not watched" in ended.out
+        assert ended.code == ExitCode.PARTIAL
+        ended = opamc("nightly", cell, "--quiet")
+        assert (ended.code, "stands no more" in ended.out) == (ExitCode.DONE, False)
+        # its robot leaves the cell, is back, and leaves it once more
+        for _ in range(2):
+            cell.write_text(watched)
+            assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+            cell.write_text(watched.replace(" r2: {},", ""))
+            ended = opamc("nightly", cell, "--quiet")
+            assert f"r2 axis 2: the alarm of {NIGHTS[4]}" in ended.out
+            assert ended.code == ExitCode.PARTIAL
+            assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+        # other options, another verdict
+        cell.write_text(watched)
+        assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+        cell.write_text(watched + "alarm: {nights: 3, of: 3, gross: 10}\n")
+        ended = opamc("nightly", cell, "--quiet")
+        assert "r2 axis 2: the alarm of" in ended.out
+        assert "its nights show none now" in ended.out
+        assert "not watched" not in ended.out  # which was so before
 
 
 @pytest.mark.usefixtures("undrawn")
