@@ -45,9 +45,7 @@ def judge_without_odd(
         return dict(bundles), judgements, odd
     kept = dict(bundles) | {axis: bundles[axis].without(names) for axis, names in odd.items()}
     judgements = judge(kept, policy)
-    chosen = {
-        axis: one_of_many(judgements[axis], bundles[axis].n_baseline, policy) for axis in odd
-    }
+    chosen = {axis: one_of_many(judgements[axis], bundles[axis].n_baseline, policy) for axis in odd}
     return kept, judgements | chosen, odd
 
 

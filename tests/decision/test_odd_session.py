@@ -36,14 +36,14 @@ def test_a_worn_night_of_the_baseline_is_found_and_hides_no_fault_any_more(worn)
     assert before[3].state == "healthy"
     odd = odd_sessions(bundles, before)
     assert odd == {3: (f"2026-03-0{worn + 1}",)}
-    kept, after, same = judge_without_odd(bundles)
+    _, after, same = judge_without_odd(bundles)
     assert same == odd
     assert after[3].state == "fault"
     assert after[3].n_baseline_sessions == 5
 
 
 def test_beside_a_baseline_that_was_chosen_a_target_differs_by_more():
-    """The session that was left out was the farthest of six: chance alone brings the rest nearer."""
+    """The session left out was the farthest of six: chance alone brings the rest nearer."""
     bundles = robot(1, 3)
     kept, after, _ = judge_without_odd(bundles)
     plain = judge(kept)

@@ -141,7 +141,8 @@ def tell(
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
-    once = any(event.kind in ("lost", "ended", "left", "stray") for event in news)  # nothing stays of it
+    # nothing stays of these
+    once = any(event.kind in ("lost", "ended", "left", "stray") for event in news)
     failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
     doubtful = failed or unwatched or once
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE
