@@ -7,7 +7,7 @@ import numpy as np
 
 from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.fit.parts import Parts
-from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.joint.motion.track import Floats, Ints, Track
 from opamc_cli.joint.name.chain import Chain, deviation_of, price_of
 from opamc_cli.signal.transform.least_squares import SINGULAR_BELOW
 
@@ -71,16 +71,12 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     """Choose among the smaller forms of an effect the one that is worth its price."""
     effect = full.effect
     (batch,) = batches_of(dataset, [full], fine=True)
-    cross = beside.products(batch.columns)[:, None]
-    found = []
     forms = [(full, tuple(range(batch.own.shape[-1])))]
     for form, keep in effect.variants(full.parameters):
         forms.append((Term(effect, form, None if effect.flags_choose_columns else keep), keep))
-    for term, keep in forms:
-        index = np.asarray(keep)
-        own = batch.own[:, :, index[:, None], index]
-        gain = float(beside.gains_of(term, cross[..., index], own, batch.moment[..., index])[0])
-        found.append(judged(term, gain, index.size, dataset.fine.track))
+    gains = beside.gains_of_forms(batch, [(term, np.asarray(keep)) for term, keep in forms])
+    pairs = zip(forms, gains, strict=True)
+    found = [judged(term, gain, len(keep), dataset.fine.track) for (term, keep), gain in pairs]
     return min(found, key=lambda one: one.score)
 
 
@@ -140,21 +136,34 @@ class Beside:
         if self.fast_part is not None:
             fast = self.parts.products(batch.columns, self.fast_part[:, None])[:, :, 0]
             moment = moment - fast.reshape(moment.shape)
-        return self.gains_of(batch.terms[0], cross, batch.own, moment)
+        rest = self._elsewhere(cross, batch.own, moment)
+        gamma, projected = self._asked_for(batch.terms[0], *rest), rest[1]
+        return self._taken(gamma, projected, cross, batch.own, moment)
 
-    def gains_of(self, term: Term, cross: Floats, own: Floats, moment: Floats) -> Floats:
-        """Likewise of terms like this one, from products.
+    def gains_of_forms(self, batch: Batch, forms: Sequence[tuple[Term, Ints]]) -> list[float]:
+        """Likewise of forms of a batch's one guess: what one leaves out has no coefficient."""
+        cross, own, moment = self.products(batch.columns)[:, None], batch.own, batch.moment
+        rest_cross, projected, rest_own, asked = self._elsewhere(cross, own, moment)
+        gamma = np.zeros((self.parts.units, len(forms), own.shape[-1]))
+        for number, (term, kept) in enumerate(forms):
+            some = rest_cross[..., kept], projected[..., kept], rest_own[:, :, kept[:, None], kept]
+            gamma[:, number, kept] = self._asked_for(term, *some, asked[..., kept])[:, 0]
+        return [float(gain) for gain in self._taken(gamma, projected, cross, own, moment)]
 
-        These are cross (p, K, b, w), own (p, K, w, w), moment (p, K, w).
-        """
-        unit, alone = self.parts.unit, self.sums.coefficients
-        rest_cross, rest_own, rest_moment = (
-            self.parts.elsewhere(one) for one in (cross, own, moment)
-        )
-        projected = self.inverses[:, None] @ rest_cross
+    def _elsewhere(self, cross: Floats, own: Floats, moment: Floats) -> tuple[Floats, ...]:
+        """Products outside of each unit, with what the chain's own fit leaves to ask for."""
+        rest = self.parts.elsewhere(cross)
+        alone = np.einsum("ukij,ui->ukj", rest, self.sums.coefficients)
+        asked = self.parts.elsewhere(moment) - alone
+        return rest, self.inverses[:, None] @ rest, self.parts.elsewhere(own), asked
+
+    def _asked_for(
+        self, term: Term, rest_cross: Floats, projected: Floats, rest_own: Floats, asked: Floats
+    ) -> Floats:
+        """Coefficients of terms like this one beside the chain, fitted to all units but each."""
         left = rest_own - np.swapaxes(rest_cross, -1, -2) @ projected
         energy = np.einsum("ukii->uki", rest_own)
-        width = own.shape[-1]
+        width = rest_own.shape[-1]
         # What nothing outside a unit excites has no coefficient there, nor what the model leaves
         # next to nothing of.
         floor = (
@@ -163,15 +172,20 @@ class Beside:
             + 1e-200
         )
         left = left + floor[..., None] * np.eye(width)
-        asked = rest_moment - np.einsum("ukij,ui->ukj", rest_cross, alone)
-        gamma = (
-            np.ones_like(asked)
-            if term.effect.whole
-            else np.linalg.solve(left, asked[..., None])[..., 0]
-        )
-        beta = alone[:, None] - np.einsum("ukij,ukj->uki", projected, gamma)
-        gamma, beta = gamma[unit], beta[unit]
-        sums = self.sums
+        if term.effect.whole:
+            return np.ones_like(asked)
+        return np.asarray(np.linalg.solve(left, asked[..., None])[..., 0])
+
+    def _taken(
+        self, gamma: Floats, projected: Floats, cross: Floats, own: Floats, moment: Floats
+    ) -> Floats:
+        """Share of the held-out mean square that coefficients, (u, K, w), take; (K,).
+
+        Products are cross (p, K, b, w), own (p, K, w, w), moment (p, K, w), or of one for all.
+        """
+        unit, sums = self.parts.unit, self.sums
+        beta = (sums.coefficients[:, None] - (projected @ gamma[..., None])[..., 0])[unit]
+        gamma = gamma[unit]
         error = (
             sums.power[:, None]
             + np.sum(beta * (beta @ sums.gram - 2 * sums.moment[:, None]), axis=-1)
