@@ -86,7 +86,7 @@ def run(
         from opamc_cli.stages.nightly.start import run as stage
     from opamc_cli.commands.nightly.claim import check_apart, claim
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.morning import left, silent, tell
+    from opamc_cli.stages.nightly.morning import as_told, over, silent, tell
     from opamc_cli.stages.nightly.start.outcome import Wanted
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
@@ -117,9 +117,13 @@ def run(
             now = [*outcome.thinned, *outcome.strays]
             now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
-            history.come_back(outcome.robots)
-            now += left(history, loaded)
             untold += history.untold(now)
+        standing = [
+            as_told(one) for one in history.alarms(standing=True) if one.robot in outcome.robots
+        ]
+        stood = history.told_to_stand(None if wanted.robots is None else outcome.robots)
+        ended = list(over(history, loaded, stood))
+        untold += [*history.untold(standing), *ended]
         morning = tell(summary, untold, outcome, loaded.out, cell)
         if outcome.ended:
             output.failure(outcome.ended)
@@ -137,7 +141,9 @@ def run(
             urgent=bool(morning.lines),
         )
         # only now: a start that is killed before says it next time
-        history.tell(untold)
+        for one in ended:
+            history.record_news(one)
+        history.tell([*untold, *standing], no_more=stood)
     raise typer.Exit(morning.exit_code)
 
 

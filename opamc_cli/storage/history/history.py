@@ -30,6 +30,7 @@ from opamc_cli.storage.history.layout import (
 )
 from opamc_cli.storage.history.rows import (
     OF_ROBOT,
+    STANDING,
     AlarmRow,
     AlarmSpan,
     Declared,
@@ -365,16 +366,7 @@ class History:
                 [(robot, *place) for place in standing],
             )
             self._put("alarm", alarms)
-            said = list(events)
-            # a joint that is watched again, and then no more, is news; why it ended before is not
-            ended = [(one.robot, one.axis, one.time) for one in said if one.kind == "ended"]
-            for table in ("told", "event"):
-                self._db.executemany(
-                    f"DELETE FROM {table} "
-                    "WHERE robot = ? AND axis = ? AND kind = 'ended' AND time = ?",
-                    ended,
-                )
-            self._put("event", said)
+            self._put("event", events)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:
@@ -416,10 +408,11 @@ class History:
             self._put("declared", [said])
             self._put("event", [Event(said.time, said.robot, said.axis, said.kind, text)])
             if said.kind == "rebaselined":  # what its nights say from now on is news
+                of = "WHERE robot = ? AND time >= ? AND kind"
+                place = (said.robot, said.night)
+                self._db.execute(f"DELETE FROM told {of} = 'reminder'", place)
                 self._db.execute(
-                    "DELETE FROM told "
-                    "WHERE robot = ? AND time >= ? AND kind IN ('alarm', 'reminder')",
-                    (said.robot, said.night),
+                    f"UPDATE OR REPLACE told SET kind = 'known' {of} = 'stands'", place
                 )
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (said.robot,))
 
@@ -436,22 +429,23 @@ class History:
             one for one in events if (one.robot, one.axis or 0, one.kind, one.time) not in known
         ]
 
-    def tell(self, events: Iterable[Event]) -> None:
-        """Remember that somebody was told."""
+    def told_to_stand(self, robots: Sequence[str] | None) -> list[Event]:
+        """Return of which alarms somebody was told last that they stand; robots: None for all."""
+        query = f"SELECT * FROM told WHERE kind IN ({_marks(STANDING)})"
+        told = [Event(**row, text="") for row in self.rows(query, STANDING)]
+        return [one for one in told if robots is None or one.robot in robots]
+
+    def tell(self, events: Iterable[Event], no_more: Iterable[Event] = ()) -> None:
+        """Remember that somebody was told, and that something is so `no_more`."""
+        told, over = (
+            [(one.robot, one.axis or 0, one.kind, one.time) for one in said]
+            for said in (events, no_more)
+        )
         with self.transaction():
             self._db.executemany(
-                "INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)",
-                [(one.robot, one.axis or 0, one.kind, one.time) for one in events],
+                "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", over
             )
-
-    def come_back(self, robots: Iterable[str]) -> None:
-        """Forget that somebody was told that these robots had left: once more is news."""
-        left = {row["robot"] for row in self.rows("SELECT robot FROM told WHERE kind = 'left'")}
-        if there := left.intersection(robots):
-            with self.transaction():
-                self._db.executemany(
-                    "DELETE FROM told WHERE kind = 'left' AND robot = ?", [(one,) for one in there]
-                )
+            self._db.executemany("INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)", told)
 
     def reports(self) -> dict[str, dict[str, list[str]]]:
         """Return where reports lie, by robot and night, in time order."""
