@@ -90,7 +90,7 @@ def run(
     from opamc_cli.stages.nightly.start.outcome import Wanted
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
-    from opamc_cli.storage.history.rows import THE_CELL
+    from opamc_cli.storage.history.rows import OF_START, STANDING, THE_CELL, Event
     from opamc_cli.storage.schemas import files
 
     forgo_pandas()
@@ -113,15 +113,22 @@ def run(
         summary = outcome.summary.only(outcome.robots)
         told_of = {*outcome.robots, THE_CELL}
         untold = [one for one in history.events(untold=True) if one.robot in told_of]
+        now: list[Event] = []
+        no_more: list[Event] = []
         if wanted == Wanted():
             now = [*outcome.thinned, *outcome.strays]
             now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
             untold += history.untold(now)
+            no_more += history.told(OF_START)
         standing = [
             as_told(one) for one in history.alarms(standing=True) if one.robot in outcome.robots
         ]
-        stood = history.told_to_stand(None if wanted.robots is None else outcome.robots)
+        stood = [
+            one
+            for one in history.told(STANDING)
+            if wanted.robots is None or one.robot in outcome.robots
+        ]
         ended = list(over(history, loaded, stood))
         untold += [*history.untold(standing), *ended]
         morning = tell(summary, untold, outcome, loaded.out, cell)
@@ -143,7 +150,7 @@ def run(
         # only now: a start that is killed before says it next time
         for one in ended:
             history.record_news(one)
-        history.tell([*untold, *standing], no_more=stood)
+        history.tell([*untold, *standing, *now], no_more=[*stood, *no_more])
     raise typer.Exit(morning.exit_code)
 
 

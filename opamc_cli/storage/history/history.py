@@ -30,7 +30,6 @@ from opamc_cli.storage.history.layout import (
 )
 from opamc_cli.storage.history.rows import (
     OF_ROBOT,
-    STANDING,
     AlarmRow,
     AlarmSpan,
     Declared,
@@ -305,8 +304,7 @@ class History:
         """Forget nights of which nothing could be judged: their files are mended, or gone."""
         places = [(robot, night) for night in nights]
         with self.transaction():
-            for what in ("night WHERE robot = ? AND night", "told WHERE robot = ? AND time"):
-                self._db.executemany(f"DELETE FROM {what} = ?", places)
+            self._db.executemany("DELETE FROM night WHERE robot = ? AND night = ?", places)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (robot,))
 
     # -- trend and alarm ---------------------------------------------------------------------
@@ -367,6 +365,7 @@ class History:
             )
             self._put("alarm", alarms)
             self._put("event", events)
+            self._forget_told(OF_ROBOT, robot)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:
@@ -377,6 +376,16 @@ class History:
         with self.transaction():
             self._db.execute("DELETE FROM event WHERE kind = 'missing'")
             self._put("event", found)
+            self._forget_told(("missing",))
+
+    def _forget_told(self, kinds: Sequence[str], robot: str | None = None) -> None:
+        """Forget that somebody was told what is not so any more: once more it is news."""
+        self._db.execute(
+            f"DELETE FROM told WHERE kind IN ({_marks(kinds)}) AND robot = ifnull(?, robot) "
+            "AND NOT EXISTS (SELECT * FROM event e WHERE (e.robot, ifnull(e.axis, 0), e.kind, "
+            "e.time) = (told.robot, told.axis, told.kind, told.time))",
+            (*kinds, robot),
+        )
 
     def alarms(self, *, standing: bool = False) -> list[AlarmRow]:
         """Return all alarms, or those that stand, by robot, program, axis and night."""
@@ -429,11 +438,10 @@ class History:
             one for one in events if (one.robot, one.axis or 0, one.kind, one.time) not in known
         ]
 
-    def told_to_stand(self, robots: Sequence[str] | None) -> list[Event]:
-        """Return of which alarms somebody was told last that they stand; robots: None for all."""
-        query = f"SELECT * FROM told WHERE kind IN ({_marks(STANDING)})"
-        told = [Event(**row, text="") for row in self.rows(query, STANDING)]
-        return [one for one in told if robots is None or one.robot in robots]
+    def told(self, kinds: Sequence[str]) -> list[Event]:
+        """Return what somebody was told of some kinds, without its words."""
+        query = f"SELECT * FROM told WHERE kind IN ({_marks(kinds)})"
+        return [Event(**row, text="") for row in self.rows(query, kinds)]
 
     def tell(self, events: Iterable[Event], no_more: Iterable[Event] = ()) -> None:
         """Remember that somebody was told, and that something is so `no_more`."""
