@@ -86,11 +86,11 @@ def run(
         from opamc_cli.stages.nightly.start import run as stage
     from opamc_cli.commands.nightly.claim import check_apart, claim
     from opamc_cli.config.cell import load_cell
-    from opamc_cli.stages.nightly.morning import left, silent, tell
+    from opamc_cli.stages.nightly.morning import as_told, over, silent, tell
     from opamc_cli.stages.nightly.start.outcome import Wanted
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
-    from opamc_cli.storage.history.rows import THE_CELL
+    from opamc_cli.storage.history.rows import OF_START, STANDING, THE_CELL, Event
     from opamc_cli.storage.schemas import files
 
     forgo_pandas()
@@ -113,13 +113,24 @@ def run(
         summary = outcome.summary.only(outcome.robots)
         told_of = {*outcome.robots, THE_CELL}
         untold = [one for one in history.events(untold=True) if one.robot in told_of]
+        now: list[Event] = []
+        no_more: list[Event] = []
         if wanted == Wanted():
             now = [*outcome.thinned, *outcome.strays]
             now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
-            history.come_back(outcome.robots)
-            now += left(history, loaded)
             untold += history.untold(now)
+            no_more += history.told(OF_START)
+        standing = [
+            as_told(one) for one in history.alarms(standing=True) if one.robot in outcome.robots
+        ]
+        stood = [
+            one
+            for one in history.told(STANDING)
+            if wanted.robots is None or one.robot in outcome.robots
+        ]
+        ended = list(over(history, loaded, stood))
+        untold += [*history.untold(standing), *ended]
         morning = tell(summary, untold, outcome, loaded.out, cell)
         if outcome.ended:
             output.failure(outcome.ended)
@@ -137,7 +148,9 @@ def run(
             urgent=bool(morning.lines),
         )
         # only now: a start that is killed before says it next time
-        history.tell(untold)
+        for one in ended:
+            history.record_news(one)
+        history.tell([*untold, *standing, *now], no_more=[*stood, *no_more])
     raise typer.Exit(morning.exit_code)
 
 

@@ -13,14 +13,14 @@ from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import THE_CELL, Event
+from opamc_cli.storage.history.rows import STANDING, THE_CELL, AlarmRow, Event
 from opamc_cli.storage.schemas import files
 
 OVER = {
     kind: rank
     for rank, kind in enumerate(
         (
-            *("lost", "ended", "left", "silent", "thinned", "lacking", "failed", "partial"),
+            *("lost", "ended", "silent", "thinned", "lacking", "failed", "partial"),
             *("not-judged", "missing", "cleared", "excused", "gathering"),
         )
     )
@@ -28,7 +28,7 @@ OVER = {
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
-NO_ROBOTS = ("lost", "silent", "ended", "left", "stray")
+NO_ROBOTS = ("lost", "silent", "ended", "stray")
 """Kinds of event that may be of none of the cell's robots."""
 
 MOST_STANDING = 20
@@ -68,14 +68,45 @@ def silent(history: History, today: date, remind_after: int) -> Iterator[Event]:
         yield Event(time, THE_CELL, None, "silent", f"no recording of any robot since {last}")
 
 
-def left(history: History, cell: CellConfig) -> Iterator[Event]:
-    """Say which alarms stood when their robot left the cell's file."""
-    for alarm in history.alarms(standing=True) if cell.robots != "auto" else ():
-        if alarm.robot not in cell.robots:
-            text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: the robot has "
-            yield Event(
-                alarm.raised, alarm.robot, alarm.axis, "left", f"{text}left the cell's file"
+def as_told(alarm: AlarmRow) -> Event:
+    """Return what is remembered of an alarm that was told to stand."""
+    kind = STANDING[alarm.acknowledged is not None]
+    return Event(f"{alarm.raised} {alarm.program}", alarm.robot, alarm.axis, kind, "")
+
+
+def over(history: History, cell: CellConfig, stood: Sequence[Event]) -> Iterator[Event]:
+    """Say which alarms stand no more of which it was told last that they stand, and why.
+
+    Whatever has ended them: what was said is held against what is.
+    """
+    watched = {
+        (row["robot"], row["axis"], row["program"])
+        for row in history.rows("SELECT DISTINCT robot, axis, program FROM verdict")
+    }
+    last_night = dict(sorted(history.nights()))
+    alarms: dict[tuple[str, int | None, str], list[AlarmRow]] = {}
+    for one in history.alarms():
+        alarms.setdefault((one.robot, one.axis, one.program), []).append(one)
+    for told in stood:
+        raised, _, program = told.time.partition(" ")
+        place = (told.robot, told.axis, program)
+        of = [one for one in alarms.get(place, ()) if (one.cleared or "9999") >= raised]
+        left = cell.robots != "auto" and told.robot not in cell.robots
+        if not left and any(one.cleared is None for one in of):
+            continue
+        if not left and of:
+            ends = (told.robot, told.axis, "cleared", of[-1].cleared)
+            yield from (
+                one for one in history.events() if (one.robot, one.axis, one.kind, one.time) == ends
             )
+            continue
+        why = "its nights show none now"
+        if left:
+            why = "the robot has left the cell's file"
+        elif place not in watched:
+            why = "it is not watched any more (`axes` in the cell's file, or its recordings)"
+        text = f"axis {told.axis}: the alarm of {raised} stands no more: {why}"
+        yield Event(last_night.get(told.robot, raised), told.robot, told.axis, "ended", text)
 
 
 def tell(
@@ -104,7 +135,7 @@ def tell(
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
         for joint in robot.alarms:
-            if (joint.axis, "alarm") in told:
+            if joint.alarm and as_told(joint.alarm) in news:
                 lines += _alarm_lines("ALARM", robot, joint, out, cell)
             elif (joint.axis, "reminder") in told:
                 lines += _alarm_lines("STILL UNDER ALARM", robot, joint, out, cell)
@@ -142,7 +173,7 @@ def tell(
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
     # nothing stays of these
-    once = any(event.kind in ("lost", "ended", "left", "stray") for event in news)
+    once = any(event.kind in ("lost", "ended", "stray") for event in news)
     failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
     doubtful = failed or unwatched or once
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE

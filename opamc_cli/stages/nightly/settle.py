@@ -4,7 +4,6 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, timedelta
-from typing import Any
 
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
@@ -68,9 +67,10 @@ def settle_cell(
         gone = {one.robot: one.night for one in history.declared() if one.kind == "gone"}
         history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
     _prune(cell, history)
-    summary = summarise(history, robots)
-    if cell.robots != "auto":  # what left the cell is no concern of its page
-        summary = summary.only(tuple(cell.robots))
+    named = None if cell.robots == "auto" else tuple(cell.robots)
+    summary = summarise(history, named or robots)
+    if named:  # what left the cell is no concern of its page
+        summary = summary.only(named)
     write_page(cell, history, summary)
     write_metrics(cell, summary)
     return summary
@@ -84,7 +84,7 @@ def _settle(
     nights: Sequence[NightRow],
     before: Sequence[AlarmRow],
 ) -> None:
-    """Find a robot's alarms anew, and say which of those before have ended with their nights."""
+    """Find a robot's alarms anew; those of nights that are a new baseline's now are kept."""
     series, declared = history.series(robot), history.declared(robot)
     settled = settle_robot(
         robot,
@@ -100,7 +100,6 @@ def _settle(
     events = [
         *settled.events,
         *_events_of(taken, before, history.events() if taken else (), settled.events),
-        *_ended(before, settled.alarms, series, nights, begun),
     ]
     history.settle(robot, [*settled.alarms, *taken], settled.standing, events)
 
@@ -143,34 +142,6 @@ def _events_of(
             text = f"axis {alarm.axis}: the alarm of {alarm.raised} is over, by a new baseline"
             kept[Event(str(alarm.cleared), alarm.robot, alarm.axis, "cleared", text)] = None
     yield from (one for one in kept if (one.time, one.axis, one.kind) not in there)
-
-
-def _ended(
-    before: Sequence[AlarmRow],
-    after: Sequence[AlarmRow],
-    series: Sequence[Mapping[str, Any]],
-    nights: Sequence[NightRow],
-    begun: Sequence[str],
-) -> Iterator[Event]:
-    """Say which alarms stood, and after nights were judged anew neither stand nor have ended.
-
-    But for those of nights that a user has made a new baseline of.
-    """
-    baseline = {row.night for row in nights if row.status == "baseline"} if begun else set()
-    watched = {(row["program"], row["axis"]) for row in series}
-    for alarm in before:
-        if alarm.cleared is not None:
-            continue
-        place = (alarm.program, alarm.axis)
-        same = [one for one in after if (one.program, one.axis) == place]
-        over = any(one.cleared is None or one.cleared > alarm.raised for one in same)
-        if over or alarm.raised in baseline:
-            continue
-        why = "its nights show none now"
-        if place not in watched:
-            why = "it is not watched any more (`axes` in the cell's file, or its recordings)"
-        text = f"axis {alarm.axis}: the alarm of {alarm.raised} stands no more: {why}"
-        yield Event(nights[-1].night, alarm.robot, alarm.axis, "ended", text)
 
 
 def _missing(

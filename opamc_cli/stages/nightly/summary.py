@@ -280,7 +280,7 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
                 last.get(name),
                 undated.get(name),
                 missing.get(name, ""),
-                name in last and last[name].night < gone.get(name, ""),
+                name in last and name not in undated and last[name].night < gone.get(name, ""),
                 name in last
                 and last[name].status == "baseline"
                 and complete.get(name, "9999") < last[name].night,

@@ -304,8 +304,7 @@ class History:
         """Forget nights of which nothing could be judged: their files are mended, or gone."""
         places = [(robot, night) for night in nights]
         with self.transaction():
-            for what in ("night WHERE robot = ? AND night", "told WHERE robot = ? AND time"):
-                self._db.executemany(f"DELETE FROM {what} = ?", places)
+            self._db.executemany("DELETE FROM night WHERE robot = ? AND night = ?", places)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (robot,))
 
     # -- trend and alarm ---------------------------------------------------------------------
@@ -365,16 +364,8 @@ class History:
                 [(robot, *place) for place in standing],
             )
             self._put("alarm", alarms)
-            said = list(events)
-            # a joint that is watched again, and then no more, is news; why it ended before is not
-            ended = [(one.robot, one.axis, one.time) for one in said if one.kind == "ended"]
-            for table in ("told", "event"):
-                self._db.executemany(
-                    f"DELETE FROM {table} "
-                    "WHERE robot = ? AND axis = ? AND kind = 'ended' AND time = ?",
-                    ended,
-                )
-            self._put("event", said)
+            self._put("event", events)
+            self._forget_told(OF_ROBOT, robot)
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:
@@ -385,6 +376,16 @@ class History:
         with self.transaction():
             self._db.execute("DELETE FROM event WHERE kind = 'missing'")
             self._put("event", found)
+            self._forget_told(("missing",))
+
+    def _forget_told(self, kinds: Sequence[str], robot: str | None = None) -> None:
+        """Forget that somebody was told what is not so any more: once more it is news."""
+        self._db.execute(
+            f"DELETE FROM told WHERE kind IN ({_marks(kinds)}) AND robot = ifnull(?, robot) "
+            "AND NOT EXISTS (SELECT * FROM event e WHERE (e.robot, ifnull(e.axis, 0), e.kind, "
+            "e.time) = (told.robot, told.axis, told.kind, told.time))",
+            (*kinds, robot),
+        )
 
     def alarms(self, *, standing: bool = False) -> list[AlarmRow]:
         """Return all alarms, or those that stand, by robot, program, axis and night."""
@@ -416,10 +417,11 @@ class History:
             self._put("declared", [said])
             self._put("event", [Event(said.time, said.robot, said.axis, said.kind, text)])
             if said.kind == "rebaselined":  # what its nights say from now on is news
+                of = "WHERE robot = ? AND time >= ? AND kind"
+                place = (said.robot, said.night)
+                self._db.execute(f"DELETE FROM told {of} = 'reminder'", place)
                 self._db.execute(
-                    "DELETE FROM told "
-                    "WHERE robot = ? AND time >= ? AND kind IN ('alarm', 'reminder')",
-                    (said.robot, said.night),
+                    f"UPDATE OR REPLACE told SET kind = 'known' {of} = 'stands'", place
                 )
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (said.robot,))
 
@@ -436,22 +438,22 @@ class History:
             one for one in events if (one.robot, one.axis or 0, one.kind, one.time) not in known
         ]
 
-    def tell(self, events: Iterable[Event]) -> None:
-        """Remember that somebody was told."""
+    def told(self, kinds: Sequence[str]) -> list[Event]:
+        """Return what somebody was told of some kinds, without its words."""
+        query = f"SELECT * FROM told WHERE kind IN ({_marks(kinds)})"
+        return [Event(**row, text="") for row in self.rows(query, kinds)]
+
+    def tell(self, events: Iterable[Event], no_more: Iterable[Event] = ()) -> None:
+        """Remember that somebody was told, and that something is so `no_more`."""
+        told, over = (
+            [(one.robot, one.axis or 0, one.kind, one.time) for one in said]
+            for said in (events, no_more)
+        )
         with self.transaction():
             self._db.executemany(
-                "INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)",
-                [(one.robot, one.axis or 0, one.kind, one.time) for one in events],
+                "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", over
             )
-
-    def come_back(self, robots: Iterable[str]) -> None:
-        """Forget that somebody was told that these robots had left: once more is news."""
-        left = {row["robot"] for row in self.rows("SELECT robot FROM told WHERE kind = 'left'")}
-        if there := left.intersection(robots):
-            with self.transaction():
-                self._db.executemany(
-                    "DELETE FROM told WHERE kind = 'left' AND robot = ?", [(one,) for one in there]
-                )
+            self._db.executemany("INSERT OR IGNORE INTO told VALUES (?, ?, ?, ?)", told)
 
     def reports(self) -> dict[str, dict[str, list[str]]]:
         """Return where reports lie, by robot and night, in time order."""

@@ -13,6 +13,12 @@ OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "excused", "failed", "
 OF_NIGHT = ("judged-anew", "lacking")
 """Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
 
+OF_START = ("thinned", "stray", "silent", "gathering")
+"""Kinds of event that each start finds anew."""
+
+STANDING = ("stands", "known")
+"""Kinds of what was told of an alarm that stands, if it is not or is acknowledged."""
+
 THE_CELL = "the cell:"
 """What an event is of that is none of a robot's."""
 

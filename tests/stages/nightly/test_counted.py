@@ -123,6 +123,49 @@ def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_p
         assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
+def test_a_night_without_a_program_that_each_night_of_the_baseline_has_is_judged_in_part(
+    cell, logs, opamc
+):
+    for index in range(4):
+        cell_logs.record(logs / "r1" / night(index) / "lift.parquet", 7, index, program="lift")
+    said = f"r1 {night(4)}: in part not judged: no recording of program 'lift' where each night"
+    assert said in opamc("nightly", cell, "--quiet").out
+    assert counted(cell, opamc)[0] == ExitCode.PARTIAL
+    assert failed(cell) == ["r1"]
+    cell_logs.record(logs / "r1" / night(4) / "lift.parquet", 7, 4, program="lift")
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+
+
+def test_what_is_over_and_comes_again_is_said_again(cell, logs, opamc):
+    lacking, of_baseline = logs / "r3" / night(4), logs / "r1" / night(0)
+    shutil.rmtree(lacking)
+    assert f"r3 no file of {night(4)}" in opamc("nightly", cell, "--quiet").out
+    lacking.mkdir()
+    (lacking / "cycle.parquet").touch()
+    assert f"r3 {night(4)}: " in opamc("nightly", cell, "--quiet").out
+    shutil.rmtree(lacking)
+    again = opamc("nightly", cell, "--quiet")
+    assert (again.code, f"r3 no file of {night(4)}" in again.out) == (ExitCode.PARTIAL, True)
+    for _ in range(2):
+        of_baseline.rename(cell.parent / "kept")
+        assert f"r1 the recordings of the baseline's nights {night(0)} are gone" in (
+            opamc("nightly", cell, "--quiet").out
+        )
+        assert opamc("nightly", cell, "--quiet").out == ""
+        (cell.parent / "kept").rename(of_baseline)
+        assert opamc("nightly", cell, "--quiet").out == ""
+
+
+def test_a_robot_that_is_gone_is_back_with_files_that_tell_no_night(cell, logs, opamc):
+    shutil.rmtree(logs / "r3" / night(4))
+    opamc("nightly", cell)
+    opamc("nightly", "acknowledge", "r3", "--why", "scrapped", "--cell", cell)
+    assert counted(cell, opamc)[0] == ExitCode.DONE
+    shutil.copytree(logs / "r3" / night(3), logs / "r3" / "2061-01-01")
+    assert "lies in the future" in opamc("nightly", cell, "--quiet").out
+    assert counted(cell, opamc)[0] == ExitCode.PARTIAL
+
+
 def test_a_robot_whose_next_baseline_is_recorded_is_not_watched(cell, logs, opamc):
     for index in (5, 6, 7, 8):
         add_night(logs, index, "r1", program="pick_v2")

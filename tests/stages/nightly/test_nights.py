@@ -219,7 +219,10 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
         # its robot leaves the cell, is back, and leaves it once more
         for _ in range(2):
             cell.write_text(watched)
-            assert opamc("nightly", cell, "--quiet").code == ExitCode.UNHEALTHY
+            again = opamc("nightly", cell, "--quiet")
+            assert again.code == ExitCode.UNHEALTHY
+            # the last word was that it stands no more
+            assert again.out.startswith("r2 axis 2: ALARM, ")
             cell.write_text(watched.replace(" r2: {},", ""))
             ended = opamc("nightly", cell, "--quiet")
             assert f"r2 axis 2: the alarm of {NIGHTS[4]}" in ended.out
@@ -233,6 +236,42 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
         assert "r2 axis 2: the alarm of" in ended.out
         assert "its nights show none now" in ended.out
         assert "not watched" not in ended.out  # which was so before
+        cell.write_text(watched)
+        assert opamc("nightly", cell, "--quiet").out.startswith("r2 axis 2: ALARM, ")
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_an_alarm_that_is_over_and_stands_again_is_said_again(cell, opamc):
+    rule = "alarm: {nights: 1, of: 1, remind_after: 99}\n"
+    cell.write_text(cell.read_text().replace("nights: 3", "nights: 2") + rule)
+    alarm = "r2 axis 2: ALARM, "
+    with nightly_kills.with_stand_in():
+        assert alarm in opamc("nightly", cell, "--quiet").out
+        whole = {
+            path: path.read_bytes() for path in (cell.parent / "logs" / "r2").rglob("*.parquet")
+        }
+        for path in whole:
+            path.write_bytes(b"")
+        broken = opamc("nightly", cell, "--quiet")
+        assert "r2 axis 2: the alarm of" in broken.out
+        assert broken.code == ExitCode.PARTIAL
+        for path, content in whole.items():
+            path.write_bytes(content)
+        mended = opamc("nightly", cell, "--quiet")
+        assert (mended.code, alarm in mended.out) == (ExitCode.UNHEALTHY, True)
+        assert opamc("nightly", cell, "--quiet").out == ""
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_a_robot_without_any_night_stays_on_page_and_metrics(cell, opamc):
+    cell.write_text(cell.read_text() + "robots: {r1: {}, r2: {}, r3: {}, r9: {}}\n")
+    metrics = cell.parent / "nightly" / "metrics.prom"
+    with nightly_kills.with_stand_in():
+        opamc("nightly", cell)
+        opamc("nightly", "acknowledge", "r2", "--axis", 2, "--why", "known", "--cell", cell)
+        assert 'opamc_robot_failed{robot="r9"} 1' in metrics.read_text()
+        assert opamc("nightly", cell, "--robot", "r1").code == ExitCode.DONE
+        assert 'opamc_robot_failed{robot="r9"} 1' in metrics.read_text()
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -27,6 +27,9 @@ class Baselines:
         self._series = series
         self._usable = usable
         self._nights = nights
+        self._programs: dict[str, set[str]] = {}
+        for program, night in series:
+            self._programs.setdefault(night, set()).add(program)
         self._complete_before = {
             (key[0], baseline_name(f"from {nights[0]}", key[1])): (key, nights[-1])
             for key, nights in now.pinned.items()
@@ -92,7 +95,11 @@ class Baselines:
         used, lost = self._used[key]
         name = baseline_name(name, condition)
         of = tuple(members)
-        return Comparison(program, condition, targets, used, name, "", of, bool(gone), lost, picked)
+        each = set.intersection(*(self._programs.get(n, set()) for n in members))
+        absent = () if picked else tuple(sorted(each - self._programs[night]))
+        return Comparison(
+            program, condition, targets, used, name, "", of, bool(gone), lost, picked, absent
+        )
 
     def say_gone(self, recordings: Sequence[Recording]) -> None:
         """Have it said that a baseline has lost recordings that a night was judged with."""

@@ -1,7 +1,7 @@
 """What a plan is made of, and what it is made from."""
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from opamc_cli.config.cell import BaselineConfig
@@ -33,20 +33,25 @@ class Comparison:
     picked: bool = False
     """Whether the baseline is of recordings that a user has named, not of nights."""
 
+    absent: tuple[str, ...] = ()
+    """Other programs that each night of the baseline has, and this one has not."""
+
     @property
-    def lacking(self) -> str:
-        """Say that the night has fewer recordings than each of the baseline's; empty: it has not.
+    def lacking(self) -> Iterator[str]:
+        """Say that the night has fewer recordings than each of the baseline's, if it has.
 
         Of a baseline of one night, of nights that differ, or of recordings that a user has picked,
         nobody knows how many there are to be.
         """
+        for program in self.absent:
+            yield f"no recording of program {program!r} where each night of the baseline has one"
         nights = Counter(one.night for one in (*self.baseline, *self.gone))
         usual, have = set(nights.values()), len(self.targets)
         if self.picked or len(nights) < 2 or len(usual) > 1 or have >= min(usual):
-            return ""
+            return
         recordings = "1 recording" if have == 1 else f"{have} recordings"
         program = f" of program {self.program!r}" * bool(self.program)
-        return f"{recordings}{program} where each night of the baseline has {min(usual)}"
+        yield f"{recordings}{program} where each night of the baseline has {min(usual)}"
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ def _night_row(
 ) -> NightRow:
     why = list(_first([one.facts.error for one in night.broken]))
     if not why:
-        why = [one.lacking for one in night.comparisons if one.lacking]
+        why = list(dict.fromkeys(said for one in night.comparisons for said in one.lacking))
     why += [sentence for result in answer for sentence in result.failures]
     notes = [*night.notes, *(note for result in answer for note in result.notes)]
     status = "failed" if not judged else "partial" if why else "done"
