@@ -79,13 +79,8 @@ def over(history: History, cell: CellConfig, stood: Sequence[Event]) -> Iterator
 
     Whatever has ended them: what was said is held against what is.
     """
-    watched = {
-        (row["robot"], row["axis"], row["program"])
-        for row in history.rows("SELECT DISTINCT robot, axis, program FROM verdict")
-    }
-    last_night = dict(sorted(history.nights()))
     alarms: dict[tuple[str, int | None, str], list[AlarmRow]] = {}
-    for one in history.alarms():
+    for one in history.alarms() if stood else ():
         alarms.setdefault((one.robot, one.axis, one.program), []).append(one)
     for told in stood:
         raised, _, program = told.time.partition(" ")
@@ -103,10 +98,13 @@ def over(history: History, cell: CellConfig, stood: Sequence[Event]) -> Iterator
         why = "its nights show none now"
         if left:
             why = "the robot has left the cell's file"
-        elif place not in watched:
+        elif not history.rows(
+            "SELECT night FROM verdict WHERE (robot, axis, program) = (?, ?, ?) LIMIT 1", place
+        ):
             why = "it is not watched any more (`axes` in the cell's file, or its recordings)"
         text = f"axis {told.axis}: the alarm of {raised} stands no more: {why}"
-        yield Event(last_night.get(told.robot, raised), told.robot, told.axis, "ended", text)
+        nights = [night for robot, night in history.nights() if robot == told.robot]
+        yield Event(max(nights, default=raised), told.robot, told.axis, "ended", text)
 
 
 def tell(
