@@ -269,11 +269,13 @@ class History:
         """Record a robot's night, in the place of what was known of it; said again is no news."""
         with self.transaction():
             place = (night.robot, night.night)
-            # another reason than the one that was told is news
+            # another reason than the one that was told is news; a night that was judged before and
+            # is not now may be of a row of nights that is told by its first one
+            of = "kind IN ('failed', 'partial') AND robot = ? AND time"
             self._db.execute(
-                "DELETE FROM told WHERE kind IN ('failed', 'partial') AND robot = ? AND time = ? "
-                "AND EXISTS (SELECT * FROM night WHERE robot = ? AND night = ? AND why <> ?)",
-                (*place, *place, night.why),
+                f"DELETE FROM told WHERE {of} = (SELECT max(time) FROM event WHERE {of} <= ?) AND "
+                "EXISTS (SELECT * FROM night WHERE robot = ? AND night = ? AND ? NOT IN ('', why))",
+                (night.robot, *place, *place, night.why),
             )
             for table in ("verdict", "measure"):
                 self._db.execute(f"DELETE FROM {table} WHERE robot = ? AND night = ?", place)

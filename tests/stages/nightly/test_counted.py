@@ -156,6 +156,15 @@ def test_what_is_over_and_comes_again_is_said_again(cell, logs, opamc):
         assert opamc("nightly", cell, "--quiet").out == ""
 
 
+def test_a_night_that_was_judged_joins_one_that_failed_with_a_word(cell, logs, opamc):
+    for index in (3, 4):
+        path = logs / "r3" / night(index) / "cycle.parquet"
+        path.write_bytes(b"PAR1 half a file")
+        assert f"r3 {night(3)}" in opamc("nightly", cell, "--quiet").out
+        again = opamc("nightly", cell, "--quiet")
+        assert (again.code, again.out) == (ExitCode.DONE if index == 3 else ExitCode.PARTIAL, "")
+
+
 def test_a_robot_that_is_gone_is_back_with_files_that_tell_no_night(cell, logs, opamc):
     shutil.rmtree(logs / "r3" / night(4))
     opamc("nightly", cell)
