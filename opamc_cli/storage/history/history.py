@@ -273,7 +273,7 @@ class History:
             # is not now may be of a row of nights that is told by its first one
             of = "kind IN ('failed', 'partial') AND robot = ? AND time"
             self._db.execute(
-                f"DELETE FROM told WHERE {of} = (SELECT max(time) FROM event WHERE {of} <= ?) AND "
+                f"DELETE FROM told WHERE {of} = (SELECT max(time) FROM told WHERE {of} <= ?) AND "
                 "EXISTS (SELECT * FROM night WHERE robot = ? AND night = ? AND ? NOT IN ('', why))",
                 (night.robot, *place, *place, night.why),
             )
