@@ -12,7 +12,7 @@ from opamc_cli.joint.name.significance import LEAST_T, paired
 EXACT = 0.9
 """Share of its domain's curve from which on a form has the name, and of the ceiling from which on
 the loop is closed."""
-MOST_ROUNDS = 8
+MOST_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -100,16 +100,7 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
     if parent.score <= best.score:
         return parent
     if term.effect.unnamed:
-        # It may hold what a name does that went for it, and not what it has taken the place of.
-        explained = EXACT * (parent.mean_square - best.mean_square)
-        names = [
-            other.chain
-            for other in trials(parent, pool)
-            if other.why_not is None
-            and not other.term.effect.fast
-            and parent.mean_square - other.chain.mean_square >= explained
-        ]
-        return min(names, key=lambda chain: chain.score, default=None)
+        return None
     if _trial(parent, best, term, pool).why_not is not None:
         passing = [other.chain for other in trials(parent, pool) if other.why_not is None]
         return min(passing, key=lambda chain: chain.score, default=parent)

@@ -88,20 +88,6 @@ def test_a_name_that_holds_nine_tenths_of_a_function_keeps_its_place():
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
 
 
-@pytest.mark.parametrize(("width", "called"), [(0.15, True), (None, False)])
-def test_a_function_in_a_place_that_a_name_holds_as_well_takes_the_name(width, called):
-    """It came for what another effect had held, and made the drag beside it superfluous."""
-
-    def drag(q, v, a, t):
-        bell = np.cos(9 * q) if width is None else np.exp(-0.5 * (q / width) ** 2)
-        return np.sign(v) * bell
-
-    smooth = Term(unnamed_library()["unnamed_angle_and_direction"], {"degree": 8.0})
-    chain, named = settle(drag, smooth, names=("position_drag",))
-    assert [one.term.effect.name for one in named] == ["position_drag"] * called
-    assert [one.effect.unnamed for one in chain.terms] == [not called]
-
-
 @pytest.mark.parametrize("resonance_hz", [18.0, 25.0])
 def test_a_ripple_that_shakes_the_measured_motion_keeps_its_name(resonance_hz):
     """What looks at the acceleration fits the current better: the acceleration is the ripple's."""
