@@ -282,6 +282,13 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     return judgements
 
 
+def one_of_many(judgement: Judgement, times: int, policy: Policy) -> Judgement:
+    """Return what is left of a judgement that was chosen from so many (Bonferroni)."""
+    adjusted, alone = min(1.0, times * judgement.p_adjusted), min(1.0, times * judgement.p_alone)
+    left = replace(judgement, p_adjusted=adjusted, p_alone=alone)
+    return replace(left, state=_state(left, policy))
+
+
 def one_session_log_ratio(cells: Sequence[Cell]) -> float:
     """Log of the target's divergence over what healthy sessions are allowed.
 
@@ -428,13 +435,6 @@ def _health_index(shift: Shift) -> float:
     # The mean of a log-normal ratio lies above its median by half the variance of the logarithm.
     log_mean = shift.spread.scale**2 / 2
     return math.expm1(min(shift.log_ratio - log_mean, 100.0)) / shift.unit
-
-
-def one_of_many(judgement: Judgement, times: int, policy: Policy) -> Judgement:
-    """Return what is left of a judgement that was chosen from so many (Bonferroni)."""
-    adjusted, alone = min(1.0, times * judgement.p_adjusted), min(1.0, times * judgement.p_alone)
-    left = replace(judgement, p_adjusted=adjusted, p_alone=alone)
-    return replace(left, state=_state(left, policy))
 
 
 def _state(judgement: Judgement, policy: Policy) -> State:

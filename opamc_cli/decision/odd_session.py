@@ -35,8 +35,8 @@ def judge_without_odd(
     -----
     Which sessions are left out was chosen, and the others agree the better for it: beside them a
     target has to differ as the sessions had to, with its p-value times the number of sessions
-    there were. Of 670 healthy robots of four files a night 10 would alarm else, of 7 without the
-    rule; no fault of 168 in worn baselines is lost (docs/decision.md).
+    there were. Of 670 healthy robots of four files a night 8 alarm, 10 would without this and 7 if
+    nothing were left out; of 232 faults in worn baselines one is lost (docs/decision.md).
     """
     policy = policy or Policy()
     judgements = judge(bundles, policy)
