@@ -1,6 +1,6 @@
 # Two commands set everything up on a machine that has only Python and make:
 #   make demo   environment, install, a diagnosis of data/samples, a report
-#   make test   the tests but the long ones: three minutes on two cores (make test-all: all)
+#   make test   the tests but the long ones: eight minutes on two cores (make test-all: all)
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
@@ -32,7 +32,7 @@ demo-nightly: $(STAMP)  ## Three virtual robots, ten nights, one joint that wear
 # a file's tests stay together for their fixtures, until one core would wait for the other
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal -q
 
-test: $(STAMP)  ## Run the tests that take three minutes, on all cores
+test: $(STAMP)  ## Run the tests but the long ones, on all cores
 	$(PYTEST) -m 'not long'
 
 test-all: $(STAMP)  ## Run all tests, as CI does
