@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit, fit_beside
+from opamc_cli.joint.explain.declared import best_fit, fit_anew
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -64,7 +64,7 @@ def close(
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)
-    anew = None if "windows" in without_rules else partial(fit_beside, *ask)
+    anew = None if "windows" in without_rules else partial(fit_anew, *ask)
     loop = close_loop(fit, library, seed, without_rules, anew)
     return Closed(
         loop.rmse_before_a,

@@ -109,22 +109,23 @@ def close_loop(
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
     The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off. Where
-    `anew` finds a better motion beside what lacks, the loop is closed again.
+    `anew` finds a better motion beside what may lack, or beside what was found, that is closed.
     """
-    loop = _closed(before, library, seed, without_rules)
-    again = anew(before, loop.asked) if anew is not None and loop.asked else None
+    told = anew(before, ()) if anew is not None else None
+    loop = _closed(told or before, library, seed, without_rules, before)
+    if told is not None and loop.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.
+        return _closed(before, library, seed, without_rules, before)
+    again = anew(loop.before, loop.asked) if anew is not None and loop.asked else None
     if again is None:
         return loop
-    other = _closed(again, library, seed, without_rules)
+    other = _closed(again, library, seed, without_rules, before)
     better = other.after.rmse(sealed=False) < loop.after.rmse(sealed=False)
-    if not better or other.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.
-        return loop
-    # The declared model is not to look worse than where it was fitted best.
-    best = min(loop, other, key=lambda one: one.rmse_before_a)
-    return replace(other, rmse_before_a=best.rmse_before_a, r2_before=best.r2_before)
+    return other if better and other.rmse_after_a <= loop.rmse_before_a else loop
 
 
-def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[str]) -> Loop:
+def _closed(
+    before: Fit, library: Library, seed: int, without_rules: Collection[str], best_before: Fit
+) -> Loop:
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
     saturated = saturations(start, unnamed)
@@ -149,7 +150,8 @@ def _closed(before: Fit, library: Library, seed: int, without_rules: Collection[
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    loop = _opened(before, only_named.fit, final.fit, saturated, steps, tried, library)
+    fits = before, only_named.fit, final.fit, best_before
+    loop = _opened(*fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 
 
@@ -202,6 +204,7 @@ def _opened(
     before: Fit,
     named: Fit,
     after: Fit,
+    best_before: Fit,
     saturated: Sequence[Chain],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
@@ -210,11 +213,18 @@ def _opened(
     # What either explains can be explained.
     ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
-    rmse_before, rmse_named, rmse_after = (fit.rmse(sealed=True) for fit in (before, named, after))
+    rmse_named, rmse_after = named.rmse(sealed=True), after.rmse(sealed=True)
+    # The declared model is not to look worse than where it was fitted best.
+    least = min(before, best_before, key=lambda fit: fit.rmse(sealed=True))
+    rmse_before, scale = least.rmse(sealed=True), 1.0
+    if least is not before:
+        scale = (before.rmse(sealed=True) / max(rmse_before, 1e-300)) ** 2
+        share = max(1.0 - scale * (1.0 - found.share), 0.0)
+        found = Ceiling(share, scale * found.standard_error)
     refused: list[Tried] = []
     # Functions alone have to be worth the price of one.
-    least = 1.0 - PRICE * (not any(step.named for step in steps))
-    if steps and rmse_after**2 > least * rmse_before**2:
+    worth = 1.0 - PRICE * (not any(step.named for step in steps))
+    if steps and rmse_after**2 > worth * rmse_before**2:
         # Functions without a name first, then all: steps are never chosen among by the sealed data.
         hold = rmse_named <= rmse_before
         why = "does not hold on the sealed data"
@@ -259,7 +269,7 @@ def _opened(
         verdict=verdict,
         rmse_before_a=rmse_before,
         rmse_after_a=rmse_after,
-        r2_before=before.sealed_r2,
+        r2_before=least.sealed_r2,
         r2_after=r2_after,
         floor_a=min(rmse_before * float(np.sqrt(max(1.0 - found.share, 0.0))), rmse_after),
         noise_a=noise_a,

@@ -7,7 +7,7 @@ import numpy as np
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit, fit_beside
+from opamc_cli.joint.explain.declared import best_fit, fit_anew
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
@@ -30,7 +30,7 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
         temperature_c=made.temperature,
     )
     joint = Joint(made.gear_ratio, made.pole_pairs)
-    anew = partial(fit_beside, [recording], joint, terms_of(base))
+    anew = partial(fit_anew, [recording], joint, terms_of(base))
     fitted = fit_declared([recording], joint, base)
     return made, close_loop(fitted, built_in_library(without), seed, anew=anew)
 

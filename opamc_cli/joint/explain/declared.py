@@ -18,14 +18,11 @@ from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
 
 BETTER = 0.97
-"""Of the held-out mean square error: another window than the noise asks for must be worth it."""
-HALF = 0.5
-"""Of the error that functions without a name leave beside it: where the noise's own window leaves
-less, the other one hides what is missing. Joints that it hid had 0.17 and 0.42, others 0.6 up."""
+"""Of the mean square error: another window than the noise asks for must be worth it."""
 ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
-"""At most: with all, which takes twice the time, no ratio of 24 crosses the half."""
+"""Without a name, beside a model that may lack something: 16 leave the least with the same way."""
 JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count: by its own, none near a reversal, a long window is the best."""
 Declared = tuple[tuple[Effect, Term | None], ...]
@@ -50,34 +47,31 @@ def best_fit(
     model = declared(dataset)
     if "windows" in without_rules or not smoothings(recordings):
         return declared_fit(dataset, model)
-    ways = _Ways(excerpts(recordings, track), joint)
-    best = ways.best_of(None, model)
-    # What fits best as declared may have smoothed away what something missing answers to.
+    best = _Ways(excerpts(recordings, track), joint).best_of(None, model)
     if best is None:
-        return declared_fit(dataset, model)
-    least = ways.unexplained(None, model) / HALF
-    if ways.unexplained(best, model, least) > least:
         return declared_fit(dataset, model)
     return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
 
 
-def fit_beside(
+def fit_anew(
     recordings: list[Recording],
     joint: Joint,
     declared: Callable[[Dataset], Declared],
     before: Fit,
-    found: Sequence[Term],
+    found: Sequence[Term] = (),
 ) -> Fit | None:
     """Fit a declared model anew, to the motion that predicts best beside terms that were found.
 
-    None if it is that of the fit `before`.
+    Before any is, beside functions without a name: what fits best as declared may have smoothed
+    away what something missing answers to. None if it is the motion of the fit `before`.
     """
     if not smoothings(recordings):
         return None
     present, model = before.dataset.smoothing, declared(before.dataset)
     track, grouping = grouped_track(recordings, joint)
+    beside = (*model, *((term.effect, term) for term in found))
     ways = _Ways(excerpts(recordings, track), joint)
-    best = ways.best_of(present, (*model, *((term.effect, term) for term in found)))
+    best = ways.best_of(present, beside, 0 if found else FUNCTIONS)
     if best == present or grouping is None:
         return None
     return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
@@ -109,23 +103,23 @@ class _Ways:
             laid = recordings, joint, track, grouping
             self._dataset = partial(_differentiated, *laid, ends=False)
 
-    def best_of(self, first: Smoothing | None, model: Declared) -> Smoothing | None:
-        """Return the way that predicts best; the first, unless another is worth it."""
+    def best_of(
+        self, first: Smoothing | None, model: Declared, functions: int = 0
+    ) -> Smoothing | None:
+        """Return the way that predicts best; the first, unless another is worth it.
+
+        With so many functions without a name beside the model, where they help.
+        """
         best, error = first, np.inf
         for smoothing in sorted(self._ways, key=lambda way: way != first):
-            sums = declared_fit(self._dataset(smoothing), model).sums
-            found = float(sums.held_out()[sums.parts.judged].sum())
+            fits = [declared_fit(self._dataset(smoothing, ENOUGH), model)]
+            if functions:
+                pool = with_links(Pool.of(fits[0].dataset, unnamed_library()))
+                fits.append(saturated(chain_of(fits[0], 0), pool, functions).fit)
+            found = min(fit.rmse(sealed=False) for fit in fits) ** 2
             if found < BETTER * error:
                 best, error = smoothing, found
         return best
-
-    def unexplained(
-        self, smoothing: Smoothing | None, model: Declared, enough: float = 0.0
-    ) -> float:
-        """Return what the best functions without a name leave beside a model, or `enough`."""
-        fit = declared_fit(self._dataset(smoothing, ENOUGH), model)
-        pool = Pool.of(fit.dataset, unnamed_library())
-        return saturated(chain_of(fit, 0), with_links(pool), FUNCTIONS, enough).mean_square
 
 
 def judged_alike(other: Track, track: Track) -> Track:

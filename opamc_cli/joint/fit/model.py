@@ -15,7 +15,7 @@ from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Smoothing
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, coarsen
-from opamc_cli.signal.transform.averages import averaged, block_mean, unfolded
+from opamc_cli.signal.transform.averages import averaged, block_mean
 from opamc_cli.signal.transform.least_squares import solve
 
 COARSE_RATE_HZ = 100.0
@@ -322,22 +322,25 @@ class Fit:
     def judged(self) -> Judged:
         """Residuals at the full rate where the motion is clear of corners, as of `sharp`.
 
-        Else on the coarse grid, where the current is as smooth as the motion: what is missing may
-        show nowhere but there.
+        Else as smooth as the acceleration: what the terms that follow it hold of the current is
+        smooth already, all else is put through the same moving average, over its own samples.
         """
-        dataset, track = self.dataset, self.dataset.fine.track
-        coarse, sharp = dataset.coarse, dataset.sharp
-        own = self.residual_a, track.current_a, sharp.fit, sharp.sealed
-        if sharp is dataset.fine or coarse is dataset.fine:
-            return Judged(*own)
-        blocks, fast = self._on_coarse()
-        slow = [v for t, v in zip(self.terms, self.coefficients, strict=True) if not t.effect.fast]
-        current = coarse.track.current_a
-        left = current - fast - sum(map(np.matmul, blocks, slow))
-        smooth = left, current, coarse.fit, coarse.sealed
-        pairs = zip(own, smooth, strict=True)
-        laid = ((one, unfolded(by, track.bounds, dataset.factor)) for one, by in pairs)
-        return Judged(*(np.where(track.clear, one, by) for one, by in laid))
+        dataset, track, grid = self.dataset, self.dataset.fine.track, self.dataset.fine
+        residual, current, sharp = self.residual_a, track.current_a, dataset.sharp
+        if sharp is grid:
+            return Judged(residual, current, grid.fit, grid.sealed)
+        smooth = np.zeros(track.size)
+        for term, values in zip(self.terms, self.coefficients, strict=True):
+            if term.effect.domain == "acceleration":
+                smooth += grid.spread(dataset.columns(term, True) @ values)
+        whole = np.stack([residual + smooth, current, np.ones(track.size)], axis=1)
+        found = np.stack([residual, current], axis=1)
+        for some in (grid.fit, grid.sealed):
+            means = averaged(np.where(some[:, None], whole, 0.0), track.bounds, track.kernel)
+            unclear = some & ~track.clear
+            found[unclear] = means[unclear, :2] / means[unclear, 2:]
+            found[unclear, 0] -= smooth[unclear]
+        return Judged(found[:, 0], found[:, 1], grid.fit, grid.sealed)
 
     def rmse(self, sealed: bool) -> float:
         """Root mean square error of the open or of the sealed samples."""

@@ -1,6 +1,4 @@
-"""Averages inside each recording: over blocks of samples, their values undone, and moving ones."""
-
-from typing import Any
+"""Averages inside each recording: over blocks of samples, and moving ones."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +19,6 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
         part = values[start : start + blocks * factor].T
         parts.append(part.reshape((*part.shape[:-1], blocks, factor)) @ ones)
     return np.concatenate(parts, axis=-1).T / factor
-
-
-def unfolded(
-    values: NDArray[Any], bounds: tuple[tuple[int, int], ...], factor: int
-) -> NDArray[Any]:
-    """Give each of the samples that a block was of its value, (n,); those of a rest get none, 0."""
-    found = np.zeros(bounds[-1][1], dtype=values.dtype)
-    place = 0
-    for start, stop in bounds:
-        blocks = (stop - start) // factor
-        found[start : start + blocks * factor] = np.repeat(values[place : place + blocks], factor)
-        place += blocks
-    return found
 
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:

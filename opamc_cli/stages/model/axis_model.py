@@ -10,7 +10,7 @@ from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
-from opamc_cli.joint.explain.declared import Declared, best_fit, fit_beside
+from opamc_cli.joint.explain.declared import Declared, best_fit, fit_anew
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.loop import Anew
@@ -138,7 +138,7 @@ def lay(
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    anew = partial(fit_beside, recordings, joint, on)
+    anew = partial(fit_anew, recordings, joint, on)
     return AxisModel(axis, fit, anew, declared, allowed, read)
 
 

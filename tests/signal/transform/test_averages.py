@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.transform.averages import averaged, block_mean, unfolded
+from opamc_cli.signal.transform.averages import averaged, block_mean
 
 TWO = ((0, 7), (7, 12))
 
@@ -14,12 +14,6 @@ def test_a_block_is_its_samples_mean_and_a_rest_is_dropped():
     both = block_mean(np.stack([values, -values], axis=1), TWO, 3)
     assert both.tolist() == [[1.0, -1.0], [4.0, -4.0], [8.0, -8.0]]
     assert block_mean(values, TWO, 1) is values
-
-
-def test_a_block_s_value_goes_back_to_its_samples_and_a_rest_has_none():
-    found = unfolded(np.array([5, 6, 7]), TWO, 3)
-    assert found.tolist() == [5, 5, 5, 6, 6, 6, 0, 7, 7, 7, 0, 0]
-    assert found.dtype == np.int64
 
 
 def test_a_moving_average_does_not_reach_into_another_recording():
