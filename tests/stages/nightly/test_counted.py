@@ -95,6 +95,20 @@ def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
         assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
 
 
+def test_nights_of_a_baseline_that_dates_give_are_those_of_a_first_one(cell, logs, opamc):
+    said = "2 robots recording the baseline"
+    by_first_nights = cell.read_text()
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    # though the first three were a complete one before
+    cell.write_text(by_first_nights.replace("nights: 3", f"from: {night(2)}, to: {night(4)}"))
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+    # though another program has no recording of the last night
+    lift = logs / "r3" / night(0) / "lift.parquet"
+    cell_logs.record(lift, 500, 100, program="another")
+    cell.write_text(by_first_nights.replace("nights: 3", f"from: {night(0)}, to: {night(4)}"))
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+
+
 def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, opamc):
     (logs / "r1" / night(4) / "empty.parquet").touch()
     assert "in part not judged" in opamc("nightly", cell, "--quiet").out
