@@ -1,6 +1,6 @@
 # Two commands set everything up on a machine that has only Python and make:
 #   make demo   environment, install, a diagnosis of data/samples, a report
-#   make test   the tests but the long ones: eight minutes on two cores (make test-all: all)
+#   make test   the tests but the long ones: 287 s of processor time, on all cores (make test-all: all)
 PYTHON ?= python3
 VENV   ?= .venv
 BIN    := $(VENV)/bin
