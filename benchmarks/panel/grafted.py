@@ -152,6 +152,9 @@ def grafted(joint: Case, effect: str, wanted_a: float, seed: int) -> list[Logged
         msg = f"the declared effects leave {left / max(whole, 1e-12):.2f} of it"
         raise ValueError(msg)
     scale = wanted_a / left
+    if effect == "load_friction" and scale > 1:
+        msg = f"friction of {scale:.1f} times the load is none"
+        raise ValueError(msg)
     return [
         replace(one, current=one.current + scale * part)
         for one, part in zip(recordings, extra, strict=True)

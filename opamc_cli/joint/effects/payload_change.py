@@ -54,7 +54,7 @@ class PayloadChange(Effect):
         )
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
-        """Take the middle of a stretch that nothing open tells the time in."""
+        """Where nothing open tells the time, take a recording's start, or the middle."""
         rows = track.open_samples
         if rows is None or "since_s" not in parameters:
             return parameters
@@ -65,7 +65,10 @@ class PayloadChange(Effect):
         if last <= first:
             return parameters
         widest = first + int(np.argmax(np.diff(times[first : last + 1])))
-        return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
+        early, late = times[widest : widest + 2]
+        # Tools are changed between recordings.
+        starts = [s for s in track.time_s[[s for s, _ in track.bounds]] if early < s <= late]
+        return parameters | {"since_s": float(np.median(starts or (early, late)))}
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""

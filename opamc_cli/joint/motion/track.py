@@ -20,6 +20,8 @@ Bools = NDArray[np.bool_]
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """What has a value per sample, but in a block something else than their mean, or nothing."""
 
+SHORTEST_PATH = 2.9
+"""Travels of a path that passes its places again the same way; ways end a little apart."""
 MOST_LAID = 24
 """Terms whose regressors are kept for all models: twice what a joint's model holds, or 50 MB."""
 ENOUGH_ROWS = 4000
@@ -240,6 +242,11 @@ class Regressors(Protocol):
     def columns(self, track: Track) -> Floats:
         """Regressors, shape (n, k)."""
         ...
+
+
+def comes_back(position_rad: Floats) -> bool:
+    """Whether a path, (n,), goes there, back and there again; its ways may end a little apart."""
+    return bool(np.abs(np.diff(position_rad)).sum() >= SHORTEST_PATH * np.ptp(position_rad))
 
 
 def ranges(lengths: Iterable[int]) -> tuple[tuple[int, int], ...]:
