@@ -32,7 +32,10 @@ class PayloadChange(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
         first, last = _judgeable(track)
-        steps = [{"since_s": float(time)} for time in np.linspace(first, last, GUESSES)]
+        # Where no recording comes back by itself, a step within one is a function of place.
+        between = track.starts_s[:: len(track.starts_s) // GUESSES + 1]
+        times = np.linspace(first, last, GUESSES) if track.comes_back else between
+        steps = [{"since_s": float(time)} for time in times if first <= time <= last]
         pairs = combinations(_rests(track), 2)
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
@@ -67,7 +70,7 @@ class PayloadChange(Effect):
         widest = first + int(np.argmax(np.diff(times[first : last + 1])))
         early, late = times[widest : widest + 2]
         # Tools are changed between recordings.
-        starts = [s for s in track.time_s[[s for s, _ in track.bounds]] if early < s <= late]
+        starts = [start for start in track.starts_s if early < start <= late]
         return parameters | {"since_s": float(np.median(starts or (early, late)))}
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.motion.track import Floats, Track, comes_back
+from opamc_cli.joint.motion.track import Floats, Track
 
 
 class Warmup(Effect):
@@ -21,14 +21,10 @@ class Warmup(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Time constants from a twentieth to one and a half of the session's length.
-
-        Since a recording's start only where one passes its places again, or place tells that time.
-        """
+        """Try from a twentieth to one and a half of the session's length."""
+        # In a recording that never comes back, time since its start is a function of place.
         length = float(np.ptp(track.time_s)) + 1e-9
-        start = np.round(track.time_s - track.run_time_s, 3)
-        runs = [track.position_rad[start == s] for s in np.unique(start)]
-        clocks = (0.0, 1.0) if len(runs) > 1 and any(map(comes_back, runs)) else (0.0,)
+        clocks = (0.0, 1.0) if len(track.starts_s) > 1 and track.comes_back else (0.0,)
         return [
             {"time_constant_s": constant, "per_recording": clock}
             for clock in clocks
