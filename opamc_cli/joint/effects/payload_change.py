@@ -33,8 +33,9 @@ class PayloadChange(Effect):
         """Try steps all over the session: a stroke too early or too late, little is explained."""
         first, last = _judgeable(track)
         # Where no recording comes back by itself, a step within one is a function of place.
-        between = track.starts_s[:: len(track.starts_s) // GUESSES + 1]
-        times = np.linspace(first, last, GUESSES) if track.comes_back else between
+        times = track.starts_s[1 :: len(track.starts_s) // GUESSES + 1]
+        if not times.size or track.comes_back:
+            times = np.linspace(first, last, GUESSES)
         steps = [{"since_s": float(time)} for time in times if first <= time <= last]
         pairs = combinations(_rests(track), 2)
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]

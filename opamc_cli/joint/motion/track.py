@@ -254,7 +254,7 @@ class Regressors(Protocol):
 
 
 def comes_back(position_rad: Floats) -> bool:
-    """Whether a path, (n,), goes there, back and there again; its ways may end a little apart."""
+    """Whether a path, (n,), goes there, back and there again."""
     return bool(np.abs(np.diff(position_rad)).sum() >= SHORTEST_PATH * np.ptp(position_rad))
 
 

@@ -17,8 +17,7 @@ MOST_CHARGED = 16
 itself charges for those that are of no use."""
 
 EXACT = 0.9
-"""Share of its domain's curve from which on a form has the name, of what offsets in time explain
-from which on it is more than drift, and of the ceiling from which on the loop is closed."""
+"""Share of its domain's curve, of the ceiling, or of what drift explains, that counts as all."""
 
 
 @dataclass(frozen=True)
