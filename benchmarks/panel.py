@@ -1,4 +1,4 @@
-"""The panel: measured joints and eight kinds of simulated ones, the loop beside its plain rivals.
+"""The panel: measured and simulated joints, the loop beside its plain rivals.
 
     python benchmarks/panel.py [--first-seed 50000] [--seeds 1] [--source measured,testbed]
         [--without-source NAME] [--contestants loop,plain,beam] [--sizes 0.6,1.5] [--effects none]
@@ -8,11 +8,11 @@
 
 A row is a recording and what was hidden in it; every contestant closes it in a child of its own.
 Each seals other parts of the motion, so both errors are given. Sources: measured, actuator,
-testbed, smooth (the tests' simulator), algebraic, two-mass, arm (another joint moves beside),
-cobot (coupled links and elastic gears, every effect in one size), servo (an industrial drive,
-logged slowly), and messy, of whose joints nobody knows what they lack. Sizes, rates and strokes
-take turns over effects and seeds; five seeds hold every effect at every size. One seed has some
-240 rows.
+testbed, smooth (the tests' simulator), algebraic, two-mass, arm (another joint moves beside), cobot
+(coupled links and elastic gears, every effect in one size), servo (an industrial drive, logged
+slowly), grafted (measured joints with an effect added to their current), and messy, of whose joints
+nobody knows what they lack. Sizes, rates and strokes take turns over effects and seeds; five seeds
+hold every effect at every size. One seed has some 240 rows.
 `--compare` lays an earlier result of the same seeds beside this one as a further contestant.
 """
 
@@ -33,6 +33,7 @@ from panel import (
     cobot,
     contestants,
     formulas,
+    grafted,
     measured,
     messy,
     run,
@@ -54,6 +55,7 @@ SOURCES: dict[str, Callable[[int, Wanted], Iterator[Case]]] = {
     "arm": arm.cases,
     "cobot": cobot.cases,
     "servo": servo.cases,
+    "grafted": grafted.cases,
 }
 MEASURED = ("measured", "actuator")
 

@@ -9,10 +9,10 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
-from opamc_cli.joint.name.chain import PRICE, Chain, chain_of, extended, released, without
+from opamc_cli.joint.name.chain import EXACT, PRICE, Chain, chain_of, extended, released, without
 from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
-from opamc_cli.joint.name.settle import EXACT, Named, lowering, settled, worth_their_price
+from opamc_cli.joint.name.settle import Named, lowering, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
 from opamc_cli.signal.motion.smoothing import measurement_noise
 

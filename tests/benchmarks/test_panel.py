@@ -66,6 +66,7 @@ def test_a_case_that_cannot_be_made_is_left_out(capsys):
     assert "no such joint" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_messy_joints_move_from_rest_to_rest_without_jumps():
     made = {case.name: case for case in messy.cases(2, Wanted())}
     assert len(made) == messy.JOINTS
@@ -86,6 +87,7 @@ def test_errors_are_summed_where_nobody_knows_a_name():
     )
 
 
+@pytest.mark.long
 def test_a_cobots_recording_is_the_same_each_time_and_holds_what_is_hidden():
     made = {case.name: case for case in cobot.cases(7, Wanted())}
     (pit,), (again,), (none,) = (made[f"{name} 7"].make() for name in ("pit", "pit", "none"))

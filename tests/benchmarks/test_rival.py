@@ -31,9 +31,10 @@ def test_finds_a_planted_stribeck_curve(search):
     assert plain.close([joint(0.0)], declared, search=search).names == []
 
 
+@pytest.mark.long
 @pytest.mark.measured
 @pytest.mark.skipif(not KINOVA.is_dir(), reason="measured data are not here")
-@pytest.mark.parametrize("search", ["stepwise", long("beam")])
+@pytest.mark.parametrize("search", ["stepwise", "beam"])
 def test_nearly_halves_the_error_of_a_measured_joint(search):
     table = np.genfromtxt(KINOVA / "joint_5_trapez.csv", delimiter=",", names=True)
     recording = plain.Signals(1000.0, table["Cur5"], np.unwrap(table["Position5"]))

@@ -690,6 +690,7 @@ def test_a_reader_that_has_seen_enough_changes_no_exit_code(tmp_path, pair):
     assert (ended.returncode, ended.stderr) == (0, b"")
 
 
+@pytest.mark.long
 def test_a_terminal_that_knows_no_greek_changes_no_exit_code(tmp_path):
     runs = [bad_runs.good(tmp_path / f"µ{k}.parquet", seed=k) for k in range(2)]
     arguments = ["segment", *map(str, runs), "--out", str(tmp_path / "out")]

@@ -43,6 +43,7 @@ def test_the_damaged_one_is_named_wherever_it_stands(damaged):
     assert at_fault(folder(1, damaged)) == [(3, NAMES[damaged])]
 
 
+@pytest.mark.long
 def test_healthy_folders_stay_healthy():
     assert [at_fault(folder(seed, None)) for seed in range(20)] == [[]] * 20
 

@@ -28,13 +28,14 @@ def p_values(plan, seeds=SEEDS):
     return np.array([[j.p_value for j in judge(cells(plan, seed)).values()] for seed in seeds])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "plan",
     [
         Fleet(),
-        long(Fleet(n_baseline=8, between_sessions=0.4, influences=2)),
-        long(Fleet(n_baseline=5, n_target=5, n_axes=3)),
-        long(Fleet(n_baseline=4, n_target=3, n_axes=3, between_sessions=0.3)),
+        Fleet(n_baseline=8, between_sessions=0.4, influences=2),
+        Fleet(n_baseline=5, n_target=5, n_axes=3),
+        Fleet(n_baseline=4, n_target=3, n_axes=3, between_sessions=0.3),
     ],
     ids=["six sessions", "wild sessions", "five and five", "four and three"],
 )

@@ -83,6 +83,7 @@ def test_two_of_four_sessions_do_not_tell_which_two_are_worn():
     assert odd_sessions(bundles, judge(bundles)) == {}
 
 
+@pytest.mark.long
 def test_healthy_baselines_hang_together():
     """At the level of 1 % a robot."""
     found = [odd_sessions(one, judge(one)) for one in (robot(seed) for seed in range(30))]

@@ -57,6 +57,7 @@ def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
 
 
+@pytest.mark.long
 def test_a_declared_effect_takes_the_best_of_its_forms():
     known, session = recording()
     library = built_in_library()

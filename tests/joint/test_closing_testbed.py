@@ -31,7 +31,7 @@ TIED = {"asymmetric_friction"}
 CASES = [
     long("ripple", "position and current"),
     ("stribeck", "phases"),
-    ("gravity", "position and current"),
+    long("gravity", "position and current"),
     long("asymmetric_friction", "position and current"),
     long("thermal_viscous", "position and current"),
     long("elasticity", "position and current"),

@@ -151,6 +151,7 @@ def check_a_closed_model_applied_to_other_runs(folder, extended, capsys):
     assert f"error {errors['other']:.4g} A" in capsys.readouterr().out
 
 
+@pytest.mark.long
 def test_a_model_is_applied_without_what_its_functions_took_from_its_terms(tmp_path):
     """Beside friction by the angle dry friction was anything, and was applied alone as it was."""
     made = simulate(3, (), rate=250.0, cycles=6)
@@ -194,6 +195,7 @@ def test_a_model_that_cannot_be_evaluated(folder, capsys, effects, said):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_torque_is_never_called_a_current(folder, capsys):
     table = pq.read_table(folder / "run.parquet")
     record = {"sampling_rate_hz": 250.0, "current_unit": "Nm"}
@@ -267,6 +269,7 @@ def test_gaps_are_said(folder, capsys):
     assert said in json.loads((folder / "out" / "loop.json").read_text())["axes"][0]["notes"][0]
 
 
+@pytest.mark.long
 def test_a_current_of_the_opposite_sign_is_said_and_closed_alike(folder, capsys):
     assert close(folder, "--axis", "1") == 0
     (straight,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
@@ -397,6 +400,7 @@ def test_position_and_speed_in_different_units_are_refused(folder, capsys, place
     assert words in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_a_joint_that_may_ask_for_another_is_told_of_where_none_is_logged(tmp_path, capsys):
     made = simulate(3, (), rate=250.0, cycles=5)
     hump = np.exp(-(((made.position - np.median(made.position)) / 0.1) ** 2))
@@ -482,6 +486,7 @@ def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp
     assert closed["opposite_sign"] is True
 
 
+@pytest.mark.long
 def test_workers_do_not_change_the_bytes(folder, capsys):
     made = simulate(4, ("offset",), 0.8, rate=250.0, cycles=6)
     n = min(made.current.size, pq.read_table(folder / "run.parquet").num_rows)
@@ -583,6 +588,7 @@ def test_phases_alone_are_enough(tmp_path):
     assert loop["after"]["rmse_a"] <= loop["before"]["rmse_a"]
 
 
+@pytest.mark.long
 def test_phase_currents_have_no_opposite_sign(tmp_path, monkeypatch, capsys):
     made = simulate(6, (), 1.0, rate=500.0, cycles=6)
     phases = {f"axis1_{p}": made.phases[:, k] for k, p in enumerate("abc")}

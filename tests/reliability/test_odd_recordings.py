@@ -122,6 +122,7 @@ def test_a_fixed_time_that_is_none(opamc, tmp_path, monkeypatch, text):
     assert "SOURCE_DATE_EPOCH" in ended.sentences[0]
 
 
+@pytest.mark.long
 def test_an_environment_that_libraries_stumble_over(diagnosed, tmp_path):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     odd = {"SOURCE_DATE_EPOCH": "", "MPLBACKEND": "rubbish", "COLUMNS": "-1", "TZ": ":rubbish"}

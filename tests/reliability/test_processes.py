@@ -148,7 +148,8 @@ NO_FULL = pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/ful
 FULL = pytest.param(">/dev/full", marks=NO_FULL)
 
 
-@pytest.mark.parametrize("shell", [FULL, long(">&-"), long(">&- 2>&- <&-")])
+@pytest.mark.long
+@pytest.mark.parametrize("shell", [FULL, ">&-", ">&- 2>&- <&-"])
 def test_the_exit_code_is_the_verdicts_whatever_becomes_of_the_output(diagnosed, tmp_path, shell):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     before = (out / "verdict.json").stat().st_mtime_ns

@@ -151,6 +151,7 @@ def test_one_baseline_run_that_is_wrong_is_left_out_aloud(
     assert [axis.get("not_compared") for axis in axes] == [None, {"baseline": ["odd"]}]
 
 
+@pytest.mark.long
 def test_one_baseline_run_at_another_speed_is_left_out_in_one_sentence(
     opamc, baseline, tonight, tmp_path
 ):
@@ -172,6 +173,7 @@ def test_the_stage_alone_says_which_run_is_of_another_speed(opamc, baseline, tmp
     assert sentence.startswith("opamc: odd: its motions last 0.97 times as long")
 
 
+@pytest.mark.long
 def test_a_recording_of_which_two_axes_are_wrong_is_not_said_to_lack_one_alone(
     opamc, baseline, tonight, tmp_path
 ):
@@ -186,6 +188,7 @@ def test_a_recording_of_which_two_axes_are_wrong_is_not_said_to_lack_one_alone(
     assert [s.endswith(end) for s, end in zip(ended.sentences, left_out, strict=True)] == [True] * 2
 
 
+@pytest.mark.long
 def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):
     """Three joints have siblings to be held against, two have not."""
     monkeypatch.setitem(recordings.MOTIONS, 3, ((48.0, 1.1, 1), (70.0, 1.2, -1)))
@@ -197,6 +200,7 @@ def test_a_joint_is_missed_by_however_many_others(opamc, tmp_path, monkeypatch):
     assert "xis 2 not judged" in ended.out
 
 
+@pytest.mark.long
 def test_one_recording_of_another_program_is_not_the_reference_of_all_others(
     opamc, tmp_path, monkeypatch
 ):
@@ -223,6 +227,7 @@ def grinding(columns):
     columns["axis2_current"][backwards] += np.random.default_rng(0).normal(0, 8, backwards.sum())
 
 
+@pytest.mark.long
 def test_a_fault_that_leaves_nothing_of_the_usual_current_is_one(opamc, tmp_path):
     for seed in range(4):
         record(tmp_path / "baseline" / f"{seed}.parquet", seed, made=recordings.reported)
@@ -403,7 +408,8 @@ def test_joints_exchanged_with_one_another_fit_nothing(opamc, baseline, tmp_path
     assert "no axis can be judged" in ended.sentences[0]
 
 
-@pytest.mark.parametrize("made", [recordings.columns, long(recordings.reported)])
+@pytest.mark.long
+@pytest.mark.parametrize("made", [recordings.columns, recordings.reported])
 def test_joints_in_step_that_are_exchanged_are_known_by_their_size(
     opamc, tmp_path, monkeypatch, made
 ):
@@ -475,6 +481,7 @@ def test_a_gain_of_ten_per_cent_is_a_change_without_its_name(opamc, tmp_path):
     assert {axis["state"] for axis in axes} == {"changed"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wrong", [gone, dead], ids=lambda w: w.__name__)
 def test_a_joint_that_one_night_of_several_lacks_is_said(opamc, baseline, tmp_path, wrong):
     week = [record(tmp_path / f"{k}.parquet", k, wrong if k == 10 else bool) for k in (9, 10)]

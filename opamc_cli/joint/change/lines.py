@@ -10,12 +10,7 @@ from opamc_cli.joint.change.slow import Shift, shift_current
 from opamc_cli.joint.change.units import Compared, own_fit, stretches
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.spectra import (
-    FEWEST_SAMPLES,
-    LOWEST_ORDER,
-    highest_order,
-    vertex,
-)
+from opamc_cli.joint.spectra import FEWEST_SAMPLES, LOWEST_ORDER, highest_order, vertex
 from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins
 
 SHORTEST_STROKE = 0.4

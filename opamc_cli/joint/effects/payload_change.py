@@ -32,7 +32,11 @@ class PayloadChange(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
         first, last = _judgeable(track)
-        steps = [{"since_s": float(time)} for time in np.linspace(first, last, GUESSES)]
+        # Where no recording comes back by itself, a step within one is a function of place.
+        times = track.starts_s[1 :: len(track.starts_s) // GUESSES + 1]
+        if not times.size or track.comes_back:
+            times = np.linspace(first, last, GUESSES)
+        steps = [{"since_s": float(time)} for time in times if first <= time <= last]
         pairs = combinations(_rests(track), 2)
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
@@ -54,7 +58,7 @@ class PayloadChange(Effect):
         )
 
     def settled(self, parameters: Parameters, track: Track) -> Parameters:
-        """Take the middle of a stretch that nothing open tells the time in."""
+        """Where nothing open tells the time, take a recording's start, or the middle."""
         rows = track.open_samples
         if rows is None or "since_s" not in parameters:
             return parameters
@@ -65,7 +69,10 @@ class PayloadChange(Effect):
         if last <= first:
             return parameters
         widest = first + int(np.argmax(np.diff(times[first : last + 1])))
-        return parameters | {"since_s": 0.5 * float(times[widest] + times[widest + 1])}
+        early, late = times[widest : widest + 2]
+        # Tools are changed between recordings.
+        starts = [start for start in track.starts_s if early < start <= late]
+        return parameters | {"since_s": float(np.median(starts or (early, late)))}
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Allow that the inertia's step is too small to see."""

@@ -21,9 +21,10 @@ class Warmup(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Time constants from a twentieth to one and a half of the session's length."""
+        """Try from a twentieth to one and a half of the session's length."""
+        # In a recording that never comes back, time since its start is a function of place.
         length = float(np.ptp(track.time_s)) + 1e-9
-        clocks = (0.0, 1.0) if np.any(track.run_time_s != track.time_s) else (0.0,)
+        clocks = (0.0, 1.0) if len(track.starts_s) > 1 and track.comes_back else (0.0,)
         return [
             {"time_constant_s": constant, "per_recording": clock}
             for clock in clocks

@@ -6,14 +6,12 @@ import numpy as np
 
 from opamc_cli.joint.motion.groups import Grouping, cycle_length, group_samples
 from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE, Recording, build_track
-from opamc_cli.joint.motion.track import Floats, Joint, Track
+from opamc_cli.joint.motion.track import Floats, Joint, Track, comes_back
 
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
-SHORTEST_PATH = 3.0
 MOST_PLACES, PROBED = 40_000, 100
-"""Of an arm's places those that are looked at, and those of which it is asked whether the arm comes
-back to them, a travel later."""
+"""Of an arm's places those looked at, and those of which it is asked whether it comes back."""
 SAME, MOSTLY = 0.05, 0.5
 """Share of each joint's travel within which a place is the same, and of places that are passed
 again."""
@@ -38,11 +36,9 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
 def _revisits(track: Track) -> bool:
     """Whether places are passed at different times; of an arm that moves, those of all its joints.
 
-    Of one joint they are where the path is three times the travel, or more.
+    From one recording's end to the next one's start a joint has gone, too.
     """
-    runs = [track.position_rad[start:stop] for start, stop in track.bounds]
-    path = sum(float(np.abs(np.diff(run)).sum()) for run in runs)
-    again = path >= SHORTEST_PATH * float(np.ptp(track.position_rad))
+    again = comes_back(track.position_rad)
     if track.others is None or not again or not track.moving.any():
         return again
     beside = track.others[:, : len(track.other_axes)]

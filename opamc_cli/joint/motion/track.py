@@ -20,6 +20,8 @@ Bools = NDArray[np.bool_]
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 """What has a value per sample, but in a block something else than their mean, or nothing."""
 
+SHORTEST_PATH = 2.9
+"""Travels of a path that passes its places again the same way; ways end a little apart."""
 MOST_LAID = 24
 """Terms whose regressors are kept for all models: twice what a joint's model holds, or 50 MB."""
 ENOUGH_ROWS = 4000
@@ -130,9 +132,7 @@ class Track:
         """Mean temperature of the moving samples; 0 where none is logged."""
         if self.reference is not None and self.reference.temperature_c is not None:
             return self.reference.temperature_c
-        return (
-            0.0 if self.temperature_c is None else float(np.mean(self.temperature_c[self.moving]))
-        )
+        return 0.0 if self.temperature_c is None else float(self.temperature_c[self.moving].mean())
 
     @property
     def load_inertia(self) -> float:
@@ -148,6 +148,17 @@ class Track:
         place = self.position_rad[rows]
         shapes = np.stack((self.acceleration[rows], np.sin(place), np.cos(place), place, place**0))
         return rows, inverse(shapes @ shapes.T)[0] @ shapes
+
+    @cached_property
+    def starts_s(self) -> Floats:
+        """When each recording began, in seconds; (r,)."""
+        return np.unique(np.round(self.time_s - self.run_time_s, 3))
+
+    @cached_property
+    def comes_back(self) -> bool:
+        """Whether a recording by itself passes its places again."""
+        began = np.round(self.time_s - self.run_time_s, 3)
+        return any(comes_back(self.position_rad[began == start]) for start in self.starts_s)
 
     @cached_property
     def laid(self) -> dict[Hashable, Floats]:
@@ -240,6 +251,11 @@ class Regressors(Protocol):
     def columns(self, track: Track) -> Floats:
         """Regressors, shape (n, k)."""
         ...
+
+
+def comes_back(position_rad: Floats) -> bool:
+    """Whether a path, (n,), goes there, back and there again."""
+    return bool(np.abs(np.diff(position_rad)).sum() >= SHORTEST_PATH * np.ptp(position_rad))
 
 
 def ranges(lengths: Iterable[int]) -> tuple[tuple[int, int], ...]:

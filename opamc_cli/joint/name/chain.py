@@ -16,6 +16,9 @@ MOST_CHARGED = 16
 """Coefficients of one effect that are charged: of a drive's answer in thirty, the held-out error
 itself charges for those that are of no use."""
 
+EXACT = 0.9
+"""Share of its domain's curve, of the ceiling, or of what drift explains, that counts as all."""
+
 
 @dataclass(frozen=True)
 class Chain:
@@ -119,12 +122,13 @@ class Chain:
     def no_more_than_drift(self, other: "Chain", least_share: float) -> bool:
         """Whether an offset for every half unit explains what this chain does and the other not.
 
-        What still helps beside the offsets is more; so is what explains as much as all of them,
-        with fewer coefficients: they follow a slow noise better than any one step.
+        What still helps beside the offsets is more; so is what explains nine tenths of what all of
+        them do, with fewer coefficients: they follow a slow noise better than any one step.
         """
-        left = float(self.fit.sums.held_out().sum())
+        before, left = (float(one.fit.sums.held_out().sum()) for one in (other, self))
         offsets = float(other.fit.drift_free_error.sum())
-        return self.gain_beside_drift(other)[0] < least_share and offsets < left
+        as_drift = before - left < EXACT * (before - offsets)
+        return self.gain_beside_drift(other)[0] < least_share and as_drift
 
     def gain_beside_smoothing(self, other: "Chain") -> float:
         """Share of the other's error, where both may make up for the smoothing of the motion."""

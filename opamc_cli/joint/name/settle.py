@@ -5,13 +5,10 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 from opamc_cli.joint.fit.model import SETTLED, Term
-from opamc_cli.joint.name.chain import Chain, extended, without
+from opamc_cli.joint.name.chain import EXACT, Chain, extended, without
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
 
-EXACT = 0.9
-"""Share of its domain's curve from which on a form has the name, and of the ceiling from which on
-the loop is closed."""
 MOST_ROUNDS = 4
 
 

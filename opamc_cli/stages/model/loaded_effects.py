@@ -4,8 +4,10 @@ import importlib.util
 import inspect
 from collections.abc import Callable
 from functools import wraps
+from importlib.machinery import SourceFileLoader
 from math import isfinite
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 import numpy as np
@@ -66,6 +68,18 @@ CHECKS: dict[str, Callable[[Any, Any], str | None]] = {
 TEXTS = ("needs", "searches", "forms")
 
 
+class _FromSource(SourceFileLoader):
+    """Reads a user's file each time, and leaves no bytecode beside it.
+
+    Bytecode counts as the file's while size and second of the last change are the same: a number
+    that was corrected within the second stayed as it was.
+    """
+
+    def get_code(self, fullname: str) -> CodeType:
+        code: CodeType = self.source_to_code(self.get_data(self.path), self.path)
+        return code
+
+
 def load_user_effects(path: Path) -> list[Effect]:
     """Effects that a user's Python file defines.
 
@@ -74,13 +88,15 @@ def load_user_effects(path: Path) -> list[Effect]:
     ConfigError
         If the file is missing, does not run, or defines no effect with a name and a domain.
     """
-    spec = importlib.util.spec_from_file_location(f"opamc_user_{path.stem}", path)
-    if spec is None or spec.loader is None or not path.is_file():
+    name = f"opamc_user_{path.stem}"
+    loader = _FromSource(name, str(path))
+    spec = importlib.util.spec_from_file_location(name, path, loader=loader)
+    if spec is None or path.suffix != ".py" or not path.is_file():
         msg = f"Effect file {path} cannot be read; name a Python file"
         raise ConfigError(msg)
     module = importlib.util.module_from_spec(spec)
     try:
-        spec.loader.exec_module(module)
+        loader.exec_module(module)
         found = [
             member()
             for _, member in inspect.getmembers(module, inspect.isclass)

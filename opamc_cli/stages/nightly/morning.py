@@ -148,12 +148,9 @@ def tell(
     if len(standing_lines) > MOST_STANDING:
         more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
         standing_lines[MOST_STANDING:] = [more]
-    standing = {(r.name, joint.axis) for r in summary.robots for joint in r.joints if joint.alarm}
     said: dict[tuple[int, str], list[str]] = {}
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
-        if event.kind in OVER and not (
-            event.kind == "cleared" and (event.robot, event.axis) in standing
-        ):
+        if event.kind in OVER:
             robots = said.setdefault((OVER[event.kind], event.text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing

@@ -68,7 +68,8 @@ def settle_cell(
         history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
     _prune(cell, history)
     named = None if cell.robots == "auto" else tuple(cell.robots)
-    summary = summarise(history, named or robots)
+    by_first_nights = cell.baseline.nights is not None
+    summary = summarise(history, named or robots, by_first_nights=by_first_nights)
     if named:  # what left the cell is no concern of its page
         summary = summary.only(named)
     write_page(cell, history, summary)

@@ -219,7 +219,9 @@ class Summary:
         return "; ".join(parts)
 
 
-def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
+def summarise(
+    history: History, robots: Sequence[str] = (), *, by_first_nights: bool = True
+) -> Summary:
     """Read how a cell stands.
 
     Parameters
@@ -228,6 +230,8 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
         Of the cell.
     robots
         Robots of the cell that may have no night yet.
+    by_first_nights
+        Whether baselines are the first nights, not given by dates or files.
     """
     # of a joint's alarms under several conditions the latest that nobody knows of
     by_news = sorted(
@@ -255,8 +259,9 @@ def summarise(history: History, robots: Sequence[str] = ()) -> Summary:
             missing.setdefault(row["robot"], row["time"])
     complete: dict[str, str] = {}
     for row in history.rows(COMPLETE):
-        # a baseline that a user began is recorded as any first one: nobody was watched by it yet
-        if row["since"] == begun.get(row["robot"], row["since"]):
+        # a baseline that a user began, or gave, is recorded as any first one: nobody was watched
+        # by it yet
+        if row["since"] == begun.get(row["robot"], "" if by_first_nights else None):
             complete[row["robot"]] = min(row["night"], complete.get(row["robot"], "9999"))
     joints: dict[str, list[JointSummary]] = {}
     query = (

@@ -57,6 +57,7 @@ def test_a_course_that_moved_on_all_joints_is_the_fault_of_none():
     assert states.count("healthy") >= len(states) - 1
 
 
+@pytest.mark.long
 def test_healthy_sessions_seldom_have_a_sure_course():
     p = [judged(seed, 0.0)[3].witnesses["profile"] for seed in range(40)]
     assert np.mean(np.array(p) < 0.1) < 0.25

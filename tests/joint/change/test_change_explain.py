@@ -79,13 +79,15 @@ def test_sessions_that_differ_by_their_friction_have_no_cause(seed, sessions):
     assert not change.harmless
 
 
-@pytest.mark.parametrize("seed", [1, long(2)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_friction_is_found_however_much_sessions_differ_in_what_it_is_not(seed):
     cause = change_of("friction", seed, wander=0.3).causes[0]
     assert "viscous" in (cause.effect, *cause.ties)
     assert change_of("nothing", seed, wander=0.3).causes == ()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("kind", "share"), [("friction", 1.0), ("payload", 0.0)])
 def test_friction_that_the_mean_square_does_not_show_is_measured_by_its_own(
     monkeypatch, kind, share
@@ -116,6 +118,7 @@ def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     assert not change.harmless
 
 
+@pytest.mark.long
 def test_tooth_damage_is_a_fault_even_where_a_payload_hides_it():
     change = change_of("tooth and payload")
     assert change.causes[0].effect == "ripple"
@@ -148,7 +151,8 @@ def test_payload_and_cold_grease_are_no_faults(kind, colder, effect, seed):
     assert change.harmless
 
 
-@pytest.mark.parametrize("seed", [1, long(2)])
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2])
 def test_cold_grease_is_no_excuse_for_a_joint_that_knocks(seed):
     change = change_of("friction and knocks", seed, colder=15.0)
     assert not change.harmless
@@ -188,6 +192,7 @@ def test_what_phases_pick_up_is_told_from_a_ripple(kind, effect, harmless):
     assert change.harmless == harmless
 
 
+@pytest.mark.long
 def test_more_friction_at_the_same_temperature_is_not_harmless():
     change = change_of("friction")
     assert "viscous" in {change.causes[0].effect, *change.causes[0].ties}

@@ -12,6 +12,7 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint
+from tests.marks import long
 
 RATE = 250.0
 DECLARED = ("inertia", "gravity", "offset", "coulomb", "viscous")
@@ -144,7 +145,9 @@ def test_the_joint_that_loads_this_one_is_named_and_another_is_not(mirrored):
     assert loop.verdict == "closed"
 
 
-@pytest.mark.parametrize("torque", [third_link, upright, across, partial(chain, 0)])
+@pytest.mark.parametrize(
+    "torque", [third_link, long(upright), long(across), long(partial(chain, 0))]
+)
 def test_two_joints_that_load_this_one_are_named_and_another_is_not(torque):
     noise = 0.05 * np.random.default_rng(4).normal(size=FIRST[0].size)
     current = torque(FIRST, SECOND, THIRD) + 0.3 * np.sign(FIRST[1]) + noise
@@ -158,6 +161,7 @@ def test_two_joints_that_load_this_one_are_named_and_another_is_not(torque):
     assert loop.rmse_after_a < 1.1 * 0.05 < 0.2 * loop.rmse_before_a
 
 
+@pytest.mark.long
 def test_friction_that_grows_with_what_another_joint_asks_is_found():
     noise = 0.02 * np.random.default_rng(4).normal(size=FIRST[0].size)
     load = shoulder(FIRST, SECOND)
@@ -200,6 +204,7 @@ def test_of_joints_beside_only_those_that_move_are_guessed():
     np.testing.assert_array_equal(part.others_rad[4], others[4][100:300])
 
 
+@pytest.mark.long
 def test_what_another_joint_asks_is_not_called_closed_where_no_effect_holds_it():
     first, second = waves(1), waves(2)
     noise = 0.05 * np.random.default_rng(4).normal(size=first[0].size)

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -253,3 +254,27 @@ def test_sublinear_friction_that_a_limit_cuts_off_is_dry():
     assert effect.plausible(resists, {"exponent": 0.11})
     assert not effect.plausible(resists, {"exponent": 0.1})
     assert not effect.plausible(-resists, {"exponent": 0.11})
+
+
+@pytest.mark.parametrize(("waves", "clocks", "steps"), [(0.5, {0.0}, 1), (2.0, {0.0, 1.0}, 32)])
+def test_time_within_a_recording_is_told_only_where_one_comes_back(waves, clocks, steps):
+    """Of strokes one way it is a function of the place: friction was a warm-up or a payload."""
+    place = -np.cos(2 * np.pi * waves * np.linspace(0, 1, 2000))
+    runs = [Recording(f"run {k}", 200.0, current_a=place, position_rad=place) for k in range(2)]
+    track = build_track(runs, Joint())
+    found = built_in_library()["warmup"].guesses(track, np.zeros(0))
+    assert {guess["per_recording"] for guess in found} == clocks
+    payloads = built_in_library()["payload_change"].guesses(track, np.zeros(0))
+    assert len(payloads) == steps
+    assert steps > 1 or payloads == [{"since_s": 10.0}]
+
+
+@pytest.mark.parametrize(("begins_s", "since"), [(4.0, 4.0), (8.0, 4.5)])
+def test_a_tool_is_changed_between_recordings_if_nothing_open_tells(begins_s, since):
+    """In the middle of what is sealed half of that was predicted with the wrong payload."""
+    rows = np.r_[0:30, 61:100]
+    track = SimpleNamespace(
+        open_samples=rows, time_s=np.arange(100) / 10, starts_s=np.array([0.0, begins_s])
+    )
+    found = built_in_library()["payload_change"].settled({"since_s": 3.3}, track)
+    assert found["since_s"] == pytest.approx(since)

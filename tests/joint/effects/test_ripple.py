@@ -15,7 +15,6 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import build_track
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.joint.spectra import order_resolution
-from tests.marks import long
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
 ANSWERED = EVERYTHING | {"answer": 2.0, "top_hz": 60.0}
@@ -61,7 +60,7 @@ def test_a_ripple_that_the_velocity_loop_shapes_is_one_line():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [long(4), 8])
+@pytest.mark.parametrize("seed", [4, 8])
 def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     made = simulate(seed, (), 0.0, rate=500.0)
     made = replace(made, gear_ratio=None, pole_pairs=None)

@@ -9,6 +9,7 @@ from opamc_cli.joint.explain.declared import best_fit, declared_fit
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
+from tests.marks import long
 
 LIBRARY = built_in_library()
 BASE = ("inertia", "gravity", "coulomb", "viscous", "offset")
@@ -94,7 +95,7 @@ def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(m
 
 @pytest.mark.parametrize(
     ("hidden", "size", "rate", "seed"),
-    [("time_delay", 15.0, 100.0, 14000014), ("elasticity", 5.0, 2000.0, 14000013)],
+    [("time_delay", 15.0, 100.0, 14000014), long("elasticity", 5.0, 2000.0, 14000013)],
 )
 def test_a_window_does_not_smooth_away_what_something_missing_answers_to(hidden, size, rate, seed):
     # With the declared model alone a window of 120 ms predicts better by 4 % of the error and more.

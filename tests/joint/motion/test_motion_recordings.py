@@ -114,10 +114,13 @@ def test_an_arm_comes_back_in_another_recording_of_its_program():
         assert ("revisits" in grouped_track(some, Joint())[0].channels) == known
 
 
-def test_what_lies_between_two_recordings_is_no_path():
-    runs = [stroke(rest_s=0.0, seconds=1.5, name=f"run {k}") for k in range(2)]
-    track, _ = grouped_track(runs, Joint())
-    assert "revisits" not in track.channels
+@pytest.mark.parametrize(("second", "known"), [(1, True), (-1, False)])
+def test_a_second_run_of_a_stroke_passes_its_places_again_and_the_way_back_does_not(second, known):
+    """A payload changed between two runs of a program, and could not be asked for."""
+    first = stroke(rest_s=0.0, seconds=1.5, name="run 0")
+    other = replace(first, name="run 1", position_rad=first.position_rad[::second])
+    track, _ = grouped_track([first, other], Joint())
+    assert ("revisits" in track.channels) == known
 
 
 def test_a_motion_repeats_where_all_joints_that_move_repeat():

@@ -10,6 +10,7 @@ from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
 from opamc_cli.signal.transform.averages import averaged, block_mean
+from tests.marks import long
 
 LIBRARY = built_in_library()
 MOTION = ("offset", "spring", "stribeck", "quadratic_friction", "asymmetric_friction",
@@ -78,7 +79,7 @@ def slow_gain(chain, columns, fine):
     return 1 - (deviation[1] / deviation[0]) ** 2
 
 
-@pytest.mark.parametrize("fine", [True, False])
+@pytest.mark.parametrize("fine", [long(True), False])
 @pytest.mark.parametrize("name", ["stribeck", "spring", "position_drag"])
 def test_the_gain_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chain, name, fine):
     dataset = fast_chain.fit.dataset

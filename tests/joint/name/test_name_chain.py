@@ -138,15 +138,15 @@ def test_beside_drift_or_smoothing_a_gain_is_that_of_the_errors_there():
 @pytest.mark.parametrize(
     ("beside", "left", "is_drift"),
     [
-        (1.9, 3.0, True),  # nothing more beside the offsets, which alone leave 2
-        (1.9, 2.0, False),  # it explains as much as they do
-        (1.7, 3.0, False),  # it helps beside them
+        (1.9, 3.2, True),  # nothing more beside the offsets, which alone leave 2
+        (1.9, 2.8, False),  # it explains more than nine tenths of what they do
+        (1.7, 3.2, False),  # it helps beside them
     ],
 )
 def test_a_change_that_offsets_explain_as_well_is_drift(beside, left, is_drift):
-    other = made(drift_free_error=np.array([1.0, 1.0]))
-    sums = SimpleNamespace(held_out=lambda: np.array([left / 2, left / 2]))
-    chain = made(drift_free_error=np.array([1.0, beside - 1]), sums=sums)
+    sums = [SimpleNamespace(held_out=lambda one=one: np.full(2, one / 2)) for one in (12.0, left)]
+    other = made(drift_free_error=np.array([1.0, 1.0]), sums=sums[0])
+    chain = made(drift_free_error=np.array([1.0, beside - 1]), sums=sums[1])
     assert chain.no_more_than_drift(other, 0.1) is is_drift
 
 

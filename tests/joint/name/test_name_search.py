@@ -80,6 +80,7 @@ def why_not(chain, term, *without):
     return objection(extended(chain, term), chain, pool)
 
 
+@pytest.mark.long
 def test_what_is_not_physical_hides_nothing(monkeypatch):
     """The best guess was refused, and what fell by less than a quarter of it was not looked at."""
 

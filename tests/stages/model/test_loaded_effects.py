@@ -1,5 +1,7 @@
 """What a user's effect answers is checked, and a mistake is told with its place."""
 
+import os
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -79,3 +81,15 @@ def test_lists_of_names_are_tuples_of_texts(tmp_path, name, given):
     with pytest.raises(ConfigError, match=f"{name} of effect 'mine' is"):
         effect_of(tmp_path, f"    {name} = {given}\n")
     assert getattr(effect_of(tmp_path, f"    {name} = ('a',)\n"), name) == ("a",)
+
+
+def test_a_file_that_was_corrected_within_the_second_is_read_anew(tmp_path, monkeypatch):
+    """Bytecode that an interpreter keeps is told from another's by size and second alone."""
+    monkeypatch.setattr(sys, "dont_write_bytecode", False)
+    path = tmp_path / "mine.py"
+    for size in (0.5, 0.7):
+        path.write_text(f"{HEAD}    size = {size}\n")
+        os.utime(path, (1e9, 1e9))
+        (effect,) = load_user_effects(path)
+        assert effect.size == size
+    assert [path.name for path in tmp_path.iterdir()] == ["mine.py"]

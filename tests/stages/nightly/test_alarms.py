@@ -1,6 +1,7 @@
 """What is said of a joint's nights, from the nights alone."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,8 +9,10 @@ import pytest
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
+from opamc_cli.stages.nightly.morning import tell
+from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
-from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, NightRow
+from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, Event, NightRow
 
 
 def nights_of(states, distances=None):
@@ -240,6 +243,20 @@ def test_an_alarm_that_a_new_baseline_ends_is_said_to_be_over_and_stays():
         found = settled(known, nights, declared)
         assert [one.cleared for one in found.alarms] == ["2026-03-06"]
         assert [one.text for one in found.events if one.kind == "cleared"] == [over]
+
+
+def test_an_alarm_that_is_over_is_said_though_another_stands_on_that_axis():
+    """Of another program, or of the same after some calm nights."""
+    alarm = AlarmRow("r1", "lift", 2, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
+    joints = tuple(
+        JointSummary(2, program, "fault", "2026-03-05", "", 5.0, stands)
+        for program, stands in (("cycle", None), ("lift", alarm))
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-05", "", "done"))
+    over = "axis 2 in program cycle: the alarm of 2026-03-01 is over"
+    said = [Event("2026-03-05", "r1", 2, "cleared", over)]
+    morning = tell(Summary((robot,)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
+    assert morning.lines == (f"r1 {over}",)
 
 
 def worn(per_night, weather, seed=3, nights=30):

@@ -13,6 +13,7 @@ from cell_logs import night
 from opamc_cli.errors import ExitCode
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
+from tests.marks import long
 
 
 @pytest.fixture
@@ -46,6 +47,7 @@ def set_robot(path, robot):
 GOOD = ["baseline"] * 3 + ["done"] * 2
 
 
+@pytest.mark.long
 def test_of_two_new_copies_neither_is_judged_until_one_is_gone(cell, logs, opamc):
     one, other = run_of(logs, "r1", 4), run_of(logs, "r3", 4)
     other.rename(logs / "kept")
@@ -63,6 +65,7 @@ def test_of_two_new_copies_neither_is_judged_until_one_is_gone(cell, logs, opamc
     assert (states(cell, "r1"), states(cell, "r3")) == (GOOD, GOOD)
 
 
+@pytest.mark.long
 def test_what_was_judged_stays_its_robots_where_a_copy_turns_up(cell, logs, opamc):
     late = run_of(logs, "r3", 4)
     late.rename(logs / "kept")
@@ -79,6 +82,7 @@ def test_what_was_judged_stays_its_robots_where_a_copy_turns_up(cell, logs, opam
     assert (states(cell, "r1"), states(cell, "r3")) == (GOOD, GOOD)
 
 
+@pytest.mark.long
 def test_one_of_several_files_of_a_night_is_left_out_and_taken_once_it_is_alone(cell, logs, opamc):
     more = run_of(logs, "r1", 4).with_name("more.parquet")
     run_of(logs, "r3", 3).rename(more)
@@ -129,7 +133,7 @@ def lay_apart(cell, logs):
     return text
 
 
-@pytest.mark.parametrize("asked", [(), ("--robot", "r3")])
+@pytest.mark.parametrize("asked", [(), long(("--robot", "r3"))])
 def test_a_night_that_is_a_copy_of_another_robots_baseline_is_not_judged(cell, logs, opamc, asked):
     lay_apart(cell, logs)
     late = run_of(logs, "r3", 4)
@@ -146,6 +150,7 @@ def test_a_night_that_is_a_copy_of_another_robots_baseline_is_not_judged(cell, l
     assert opamc("nightly", cell).code == ExitCode.DONE
 
 
+@pytest.mark.long
 def test_a_baseline_that_is_a_copy_of_another_robots_night_is_said_once(cell, logs, opamc):
     lay_apart(cell, logs)
     opamc("nightly", cell)
@@ -157,6 +162,7 @@ def test_a_baseline_that_is_a_copy_of_another_robots_night_is_said_once(cell, lo
     assert second.out == ""
 
 
+@pytest.mark.long
 def test_a_baseline_that_another_robot_has_as_well_is_said_once(cell, logs, opamc):
     text = lay_apart(cell, logs)
     shutil.copy(cell.parent / "normal/r1/0.parquet", cell.parent / "normal/r3/0.parquet")

@@ -38,6 +38,7 @@ def nightly(cell: Path, scheduler: str | None) -> stage.CellOutcome:
         return stage.run(loaded, str(cell), history, stage.Wanted(), scheduler=scheduler)
 
 
+@pytest.mark.long
 def test_a_cluster_with_a_killed_worker_ends_with_the_same_bytes(cell, cluster):
     """The bookkeeping, with a stand-in; the true diagnosis in benchmarks/cluster.py."""
     with nightly_kills.with_stand_in():
@@ -65,6 +66,7 @@ def test_a_scheduler_that_is_not_there_is_a_sentence(cell, opamc, monkeypatch):
     assert "does not answer" in ended.err
 
 
+@pytest.mark.long
 def test_a_scheduler_that_is_lost_ends_with_a_sentence_and_what_was_done(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
     with socket.socket() as free:

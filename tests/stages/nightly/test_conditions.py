@@ -47,6 +47,7 @@ def rows(cell, query):
         return db.execute(query).fetchall()
 
 
+@pytest.mark.long
 def test_nights_under_alarm_are_part_of_no_other_condition_s_baseline(cell, nights, opamc):
     said = {}
     for index in range(11):

@@ -5,6 +5,7 @@ import shutil
 import sqlite3
 
 import numpy as np
+import pytest
 from cell_logs import night
 
 from opamc_cli.errors import ExitCode
@@ -58,6 +59,7 @@ def test_a_copy_of_what_an_older_history_knows_is_one(cell, logs, opamc):
     assert "is a copy of" in opamc("nightly", cell, "--quiet").out
 
 
+@pytest.mark.long
 def test_a_copy_is_no_night_of_the_cell_and_is_forgotten_once_it_is_removed(cell, logs, opamc):
     opamc("nightly", cell)
     shutil.copytree(logs / "r1" / night(4), logs / "r1" / night(5))

@@ -50,6 +50,7 @@ def failed(cell):
     return [line.split('"')[1] for line in lines if "robot_failed{" in line and line[-1] == "1"]
 
 
+@pytest.mark.long
 def test_a_robot_that_delivers_nothing_is_not_counted_healthy(cell, logs, opamc):
     opamc("nightly", cell)
     for index in (5, 6):
@@ -95,6 +96,20 @@ def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
         assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
 
 
+def test_nights_of_a_baseline_that_dates_give_are_those_of_a_first_one(cell, logs, opamc):
+    said = "2 robots recording the baseline"
+    by_first_nights = cell.read_text()
+    assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
+    # though the first three were a complete one before
+    cell.write_text(by_first_nights.replace("nights: 3", f"from: {night(2)}, to: {night(4)}"))
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+    # though another program has no recording of the last night
+    lift = logs / "r3" / night(0) / "lift.parquet"
+    cell_logs.record(lift, 500, 100, program="another")
+    cell.write_text(by_first_nights.replace("nights: 3", f"from: {night(0)}, to: {night(4)}"))
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, said)
+
+
 def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, opamc):
     (logs / "r1" / night(4) / "empty.parquet").touch()
     assert "in part not judged" in opamc("nightly", cell, "--quiet").out
@@ -105,6 +120,7 @@ def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, op
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
+@pytest.mark.long
 def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_part(cell, opamc):
     logs = cell.parent / "logs"
     shutil.rmtree(logs / "r2")
@@ -123,6 +139,7 @@ def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_p
         assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
+@pytest.mark.long
 def test_a_night_without_a_program_that_each_night_of_the_baseline_has_is_judged_in_part(
     cell, logs, opamc
 ):
@@ -136,6 +153,7 @@ def test_a_night_without_a_program_that_each_night_of_the_baseline_has_is_judged
     assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
+@pytest.mark.long
 def test_what_is_over_and_comes_again_is_said_again(cell, logs, opamc):
     lacking, of_baseline = logs / "r3" / night(4), logs / "r1" / night(0)
     shutil.rmtree(lacking)
@@ -156,6 +174,7 @@ def test_what_is_over_and_comes_again_is_said_again(cell, logs, opamc):
         assert opamc("nightly", cell, "--quiet").out == ""
 
 
+@pytest.mark.long
 def test_a_night_that_was_judged_joins_one_that_failed_with_a_word(cell, logs, opamc):
     for index in (3, 4):
         path = logs / "r3" / night(index) / "cycle.parquet"
@@ -165,6 +184,7 @@ def test_a_night_that_was_judged_joins_one_that_failed_with_a_word(cell, logs, o
         assert (again.code, again.out) == (ExitCode.DONE if index == 3 else ExitCode.PARTIAL, "")
 
 
+@pytest.mark.long
 def test_a_robot_that_is_gone_is_back_with_files_that_tell_no_night(cell, logs, opamc):
     shutil.rmtree(logs / "r3" / night(4))
     opamc("nightly", cell)
@@ -175,6 +195,7 @@ def test_a_robot_that_is_gone_is_back_with_files_that_tell_no_night(cell, logs, 
     assert counted(cell, opamc)[0] == ExitCode.PARTIAL
 
 
+@pytest.mark.long
 def test_a_robot_whose_next_baseline_is_recorded_is_not_watched(cell, logs, opamc):
     for index in (5, 6, 7, 8):
         add_night(logs, index, "r1", program="pick_v2")
@@ -213,6 +234,7 @@ def test_a_key_that_metadata_had_not_is_named_with_the_condition_that_it_makes(c
     assert line.endswith("1 of 3 gathered")
 
 
+@pytest.mark.long
 def test_a_history_that_is_lost_is_said_with_what_its_results_tell(cell, opamc):
     why = "alarms of before are not known\n"
     nightly = cell.parent / "nightly"

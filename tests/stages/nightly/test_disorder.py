@@ -76,6 +76,7 @@ def test_hundreds_of_broken_files_are_one_short_line(cell, logs, opamc):
     assert line.endswith("; and 197 more files")
 
 
+@pytest.mark.long
 def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
     for name in ("r4", "r5"):
         shutil.copytree(logs / "r1", logs / name)
@@ -125,6 +126,7 @@ def test_the_weekday_on_which_a_robot_rests_is_not_said_for_ever():
     assert missing(back)[-1] == ("2026-04-19", "no file of 2026-04-19; others have some")
 
 
+@pytest.mark.long
 def test_a_renamed_robot_is_reminded_of_until_somebody_says_that_it_is_gone(cell, logs, opamc):
     shutil.rmtree(logs / "r1" / night(4))
     assert "r1 no file of" in opamc("nightly", cell, "--quiet").out
@@ -151,6 +153,7 @@ def test_a_silent_cell_is_said_again(tmp_path):
     assert times == [[], ["2026-03-01"], ["2026-03-01"], ["2026-03-08"], ["2026-03-15"]]
 
 
+@pytest.mark.long
 def test_a_baseline_that_loses_nights_is_said_before_it_is_too_late(cell, logs, opamc):
     opamc("nightly", cell)
     shutil.move(logs / "r1" / night(1), cell.parent / "aside")
@@ -200,6 +203,7 @@ def test_a_baseline_of_dates_or_files_that_loses_nights_leaves_verdicts(cell, lo
     assert "are gone; put them back" in failed.out
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("rule", ["nights: 3", "runs: 'good/{robot}/*.parquet'"])
 def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, logs, opamc, rule):
     shutil.rmtree(logs / "r3")
@@ -246,6 +250,7 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
     assert int(to_do()) >= 3
 
 
+@pytest.mark.long
 def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc):
     logs = cell.parent / "logs"
     for robot in ("r2", "r3"):
@@ -267,6 +272,7 @@ def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc
     assert states(cell) == ["baseline"] * 3 + ["done"] * 2
 
 
+@pytest.mark.long
 def test_verdicts_that_change_afterwards_are_said(cell, logs, opamc):
     opamc("nightly", cell)
     with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
@@ -300,6 +306,7 @@ def test_a_robot_that_the_last_line_counts_is_named_and_judged_by_what_is_in_for
     assert 'opamc_joint_state{robot="r3"' not in (cell.parent / "nightly/metrics.prom").read_text()
 
 
+@pytest.mark.long
 def test_joints_that_could_not_be_judged_are_no_good_night(cell, logs, opamc):
     assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
     unjudged = "UPDATE verdict SET state = 'insufficient-data' WHERE robot = 'r1' AND axis = 2"
@@ -316,6 +323,7 @@ def test_joints_that_could_not_be_judged_are_no_good_night(cell, logs, opamc):
     assert opamc("nightly", cell).code == ExitCode.DONE
 
 
+@pytest.mark.long
 def test_a_longer_or_shorter_baseline_is_taken_from_the_cell_s_file(cell, logs, opamc):
     opamc("nightly", cell)
     for nights, done in ((4, 1), (6, 1), (2, 3)):  # six nights are not there yet
@@ -337,6 +345,7 @@ def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opa
     assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
 
 
+@pytest.mark.long
 def test_recordings_of_a_folder_that_is_no_night_are_said(cell, logs, opamc):
     opamc("nightly", cell)
     odd = logs / "r1" / "mar-06"
@@ -370,6 +379,7 @@ def test_recordings_of_a_folder_that_is_no_night_are_said(cell, logs, opamc):
     assert f"{logs / 'r1' / 'mar-06'}: no night by name" in ended.err
 
 
+@pytest.mark.long
 def test_results_that_were_removed_are_made_again_or_said_to_be_gone(cell, logs, opamc):
     opamc("nightly", cell)
     results = cell.parent / "nightly" / "r1"
@@ -395,6 +405,7 @@ def test_results_that_were_removed_are_made_again_or_said_to_be_gone(cell, logs,
     assert states(cell) == ["baseline"] * 3 + ["done"] * 2
 
 
+@pytest.mark.long
 def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch):
     closed = [str(logs / "r1" / night(4))]
     file = logs / "r1" / night(4) / "cycle.parquet"
@@ -413,6 +424,7 @@ def test_what_may_not_be_read_is_read_when_it_may(cell, logs, opamc, monkeypatch
     assert (ended.code, ended.out) == (ExitCode.DONE, "")
 
 
+@pytest.mark.long
 def test_a_link_to_a_disk_that_is_not_there_is_said_and_read_when_it_is(cell, logs, opamc):
     file = logs / "r1" / night(4) / "cycle.parquet"
     disk = cell.parent / "disk.parquet"

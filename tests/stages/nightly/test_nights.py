@@ -30,6 +30,7 @@ def rows(cell: Path, query: str) -> list[tuple]:
         return db.execute(query).fetchall()
 
 
+@pytest.mark.long
 def test_a_healthy_robot_loads_nothing_that_only_a_sick_one_needs(tmp_path):
     cell = cell_logs.record_cell(tmp_path, 1, 3, {})
     code = (
@@ -53,6 +54,7 @@ def states(robots: dict) -> dict[str, str]:
     return {name: entry["state"] for name, entry in robots.items()}
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     ended = opamc("nightly", cell, "--json")
@@ -149,6 +151,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
     assert opamc("history", "--cell", cell, "--out", "x.xlsx").code == ExitCode.USAGE
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(cell, opamc):
     alarm = "r2 axis 2: ALARM"
@@ -189,6 +192,7 @@ def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
     ]
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     cell.write_text(cell.read_text() + "alarm: {nights: 1, of: 1, remind_after: 1}\n")
@@ -202,6 +206,7 @@ def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     assert again.out.startswith("r2 axis 2: STILL UNDER ALARM, not as it was since ")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     with nightly_kills.with_stand_in():
@@ -240,6 +245,7 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
         assert opamc("nightly", cell, "--quiet").out.startswith("r2 axis 2: ALARM, ")
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_that_is_over_and_stands_again_is_said_again(cell, opamc):
     rule = "alarm: {nights: 1, of: 1, remind_after: 99}\n"
@@ -262,6 +268,7 @@ def test_an_alarm_that_is_over_and_stands_again_is_said_again(cell, opamc):
         assert opamc("nightly", cell, "--quiet").out == ""
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_a_robot_without_any_night_stays_on_page_and_metrics(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r1: {}, r2: {}, r3: {}, r9: {}}\n")
@@ -274,6 +281,7 @@ def test_a_robot_without_any_night_stays_on_page_and_metrics(cell, opamc):
         assert 'opamc_robot_failed{robot="r9"} 1' in metrics.read_text()
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_history(cell, opamc):
     at = ("--why", "new gear", "--cell", cell)
@@ -310,6 +318,7 @@ def test_facts_of_thousands_of_known_files_are_read_at_once():
     assert time.process_time() - begun < 2.0  # 0.1 s; it was once 35 s
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     only = ("nightly", cell, "--quiet", "--robot", "r1", "--night", NIGHTS[4])
@@ -340,6 +349,7 @@ def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     assert opamc(*shown, "--robot", "r1", "--since", NIGHTS[0]).code == ExitCode.DONE
 
 
+@pytest.mark.long
 @pytest.mark.usefixtures("undrawn")
 def test_logs_out_of_reach_and_joints_that_are_not_there_are_said(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r2: {axes: [2, 7]}}\n")
@@ -530,6 +540,7 @@ def test_a_worker_does_not_wait_for_who_takes_its_answers(monkeypatch, tmp_path)
     assert [answer for _, answer in answers] == [marks[1]]
 
 
+@pytest.mark.long
 def test_workers_that_die_are_a_sentence(monkeypatch):
     here = str(Path(__file__).parent)
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([here, os.environ.get("PYTHONPATH", "")]))
@@ -565,6 +576,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux only")
 def test_workers_that_are_forked_hold_nothing_and_keep_the_limits(tmp_path):
     script = tmp_path / "start.py"
@@ -595,6 +607,7 @@ def test_workers_that_are_forked_hold_nothing_and_keep_the_limits(tmp_path):
     }
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="workers are forked on Linux only")
 def test_a_start_loads_no_pandas_and_can_be_copied(cell):
     asked = (
@@ -611,6 +624,7 @@ def test_a_start_loads_no_pandas_and_can_be_copied(cell):
     assert ended.stdout.split() == ["os.fork", "False"], ended.stderr
 
 
+@pytest.mark.long
 def test_what_follows_is_the_same_in_whatever_order_nights_come(cell, opamc):
     cell.write_text(cell.read_text() + "keep: {reports: 1}\n")
     with nightly_kills.with_stand_in():

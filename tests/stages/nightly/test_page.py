@@ -91,6 +91,7 @@ def in_browser(page: Path, folder: Path, width: int, dark: bool) -> tuple[str, b
     return dumped, shot.read_bytes()
 
 
+@pytest.mark.long
 @needs_browser
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
 def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
@@ -110,6 +111,7 @@ def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
     assert (pixels[5, 5].mean() < 0.5) == dark
 
 
+@pytest.mark.long
 @needs_browser
 def test_a_phone_shows_since_when_of_alarms_alone(page, tmp_path):
     told = (

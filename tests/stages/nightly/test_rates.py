@@ -51,6 +51,7 @@ def test_measured_rates_are_one_condition_with_a_baseline(cell, logs, opamc):
     assert "0 nights to be done" in opamc("nightly", cell, "--dry-run").out
 
 
+@pytest.mark.long
 def test_a_rate_that_is_another_has_no_baseline(cell, logs, opamc):
     set_rate(logs / "r1" / night(4) / "cycle.parquet", 2048 * 1.0012)
     said = opamc("nightly", cell, "--quiet").out

@@ -121,6 +121,7 @@ def test_names_that_are_no_text_are_their_robots_line(small, opamc):
     assert all(line.isprintable() for line in again.out.splitlines())
 
 
+@pytest.mark.long
 def test_joints_that_are_not_there_stay_a_failure(cell, opamc):
     for robot in ("r2", "r3"):
         shutil.rmtree(cell.parent / "logs" / robot)
@@ -217,6 +218,7 @@ def test_a_robot_called_as_a_file_of_the_results_is_its_own_line(small, opamc):
     assert "r1" in (small.parent / "nightly" / "index.html").read_text()
 
 
+@pytest.mark.long
 def test_a_file_that_tells_no_night_costs_no_report(small, opamc):
     logs = small.parent / "logs"
     for place in sorted((logs / "r1").glob("*/*.parquet")):

@@ -3,6 +3,8 @@
 import subprocess
 import sys
 
+import pytest
+
 LOAD = (
     "import scipy.special, scipy.ndimage, scipy.linalg, scipy.stats, scipy.optimize\n"
     "print('Student t' in scipy.special.stdtr.__doc__, scipy.special.stdtr(3.0, 1.0),\n"
@@ -20,6 +22,7 @@ def printed(program):
     return ran.stdout.split(" ", 1)
 
 
+@pytest.mark.long
 def test_a_process_of_ours_does_without():
     documented, numbers = printed(LOAD)
     assert documented == "True"
@@ -35,10 +38,12 @@ def test_numpy_s_tools_for_makers_of_libraries_are_loaded_by_who_asks_for_them()
     assert printed(FORGO + loaded + used) == ["numpy.f2py", "numpy.testing\n"]
 
 
+@pytest.mark.long
 def test_what_is_loaded_already_is_left_alone():
     assert printed("import scipy.special\n" + FORGO + LOAD) == printed(LOAD)
 
 
+@pytest.mark.long
 def test_a_scipy_without_that_part_loads_as_it_is():
     hidden = "import sys\nsys.modules['scipy._lib._docscrape'] = None\n"
     shown = "del sys.modules['scipy._lib._docscrape']\n"
@@ -61,6 +66,7 @@ FORGO_COMPILER = (
 )
 
 
+@pytest.mark.long
 def test_a_compiled_loop_is_read_without_the_compiler_and_compiled_with_it(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     ready, compiled = printed(LOOP.format(FORGO_COMPILER))
@@ -87,6 +93,7 @@ print("numba.np.random" in sys.modules, len(ours))
 """
 
 
+@pytest.mark.long
 def test_all_loops_that_are_kept_can_be_read_so():
     """One that lacks what the compiler would have loaded ends the process."""
     ready, number = printed(EVERY_LOOP)
@@ -94,6 +101,7 @@ def test_all_loops_that_are_kept_can_be_read_so():
     assert int(number) > 15
 
 
+@pytest.mark.long
 def test_loops_of_a_users_are_left_alone(tmp_path):
     effect = tmp_path / "effect.py"
     effect.write_text("import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2 * x\n")

@@ -97,6 +97,7 @@ def test_numbers_that_few_joints_have_are_said(model, capsys):
     assert "mA taken for A?" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_gravity_of_another_scale_is_said_where_no_effect_explains_it(model, tmp_path, capsys):
     code = model("close", "--quiet", axis1_current=OWN.current, axis1_position=OWN.position / 100)
     assert code == 0

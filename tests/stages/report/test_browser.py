@@ -37,7 +37,7 @@ addEventListener("load", () => {
 });
 """
 
-pytestmark = needs_browser
+pytestmark = [needs_browser, pytest.mark.long]
 
 
 @pytest.fixture(scope="module", params=["light", "dark"])

@@ -11,6 +11,7 @@ from opamc_cli.stages.report.figures import motion_signal
 from opamc_cli.stages.report.results.inputs import read_inputs
 
 
+@pytest.mark.long
 def test_the_page_is_the_same_and_the_baseline_is_drawn_once(folder, page, tmp_path, monkeypatch):
     kept = KeptResults(tmp_path / "kept")
     for _ in range(2):

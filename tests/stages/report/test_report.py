@@ -222,6 +222,7 @@ def test_a_table_without_a_needed_column_is_named(folder: Path) -> None:
         report.run(folder)
 
 
+@pytest.mark.long
 def test_one_healthy_axis_alone_with_reported_current(tmp_path: Path) -> None:
     out = tmp_path / "out"
     out.mkdir()
@@ -293,6 +294,7 @@ def test_a_loop_alone_makes_a_report(tmp_path: Path) -> None:
     assert outcome.omitted == ("diagnosis: scores.parquet is absent; `opamc diagnose` writes it",)
 
 
+@pytest.mark.long
 def test_figures_without_healthy_joints_show_one_that_is_not(folder: Path) -> None:
     verdict = json.loads((folder / "verdict.json").read_text())
     for entry in verdict["axes"]:  # a healthy joint is the worst of those that were judged
@@ -302,6 +304,7 @@ def test_figures_without_healthy_joints_show_one_that_is_not(folder: Path) -> No
     assert "envelopes" in _Page(made.path.read_text()).figures()
 
 
+@pytest.mark.long
 def test_one_joint_has_no_figures_that_compare_joints(folder: Path) -> None:
     verdict = json.loads((folder / "verdict.json").read_text())
     for entry in verdict["axes"]:

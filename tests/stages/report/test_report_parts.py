@@ -195,6 +195,7 @@ def test_reckoned_margins_hold_what_matplotlib_measures(rows, columns, scale) ->
         assert not one.overlaps(other)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("backend", "listed"), [("agg", False), ("svg", True)])
 def test_matplotlibs_own_documentation_is_left_out_by_the_command_alone(
     backend: str, listed: bool

@@ -21,7 +21,6 @@ from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
-from tests.marks import long
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
 KNOWN = JointConfig(gear_ratio=100, pole_pairs=5)
@@ -112,7 +111,8 @@ def test_without_the_joint_s_constants_the_order_is_electrical_and_read_with_a_c
     assert "if it has 5 pole pairs" in found["interpretation"]
 
 
-@pytest.mark.parametrize("axis", [1, long(2)])
+@pytest.mark.long
+@pytest.mark.parametrize("axis", [1, 2])
 def test_joints_that_nothing_happened_to_have_no_cause(axis):
     assert cause.explain(axis, sources("normal"), sources("fault"), KNOWN) == {}
 
@@ -237,6 +237,7 @@ def test_noise_beside_a_lag_is_told_beside_it(tmp_path):
     assert any("fluctuates 4" in sentence for sentence in found["why"])
 
 
+@pytest.mark.long
 def test_why_no_cause_could_be_sought_is_told(tmp_path):
     """A speed of the wrong sign is refused by the model alone: the cause went without a word."""
     sides = []
@@ -268,6 +269,7 @@ def test_a_ripple_is_not_the_sensor_s_whatever_its_noise(tmp_path, noise_a):
     assert (found["effect"], found["origin"]) == ("ripple", "joint")
 
 
+@pytest.mark.long
 def test_noise_beside_friction_is_told_beside_it(tmp_path):
     before, _ = paused(tmp_path / "before", 0.03)
     after, _ = paused(tmp_path / "after", 0.12, friction=2.0)
@@ -296,6 +298,7 @@ def test_motions_of_a_segment_table_are_kept_one_by_one():
     assert cause.strokes_of(table) == {1: {"a": [(3, 6), (9, 12)]}, 2: {"b": [(5, 8)]}}
 
 
+@pytest.mark.long
 def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
     found = []
     for rest in (150, 1500):
@@ -308,6 +311,7 @@ def test_nothing_is_looked_at_beside_an_axis_s_motion(tmp_path):
     assert found[0] == found[1]
 
 
+@pytest.mark.long
 def test_a_clock_s_drift_is_no_other_rate(tmp_path):
     baseline, target = (pushed(tmp_path / str(extra_a), extra_a) for extra_a in (0.0, 0.6))
     known = cause.explain(1, baseline, target, JointConfig())
@@ -339,6 +343,7 @@ def test_motions_of_an_axis_are_where_patterns_were_taken():
     assert cause.moving_samples(table) == {1: {"0": (100, 2300), "1": (100, 2300)}}
 
 
+@pytest.mark.long
 def test_an_effect_of_the_user_s_own_may_be_the_cause(tmp_path):
     before, after = pushed(tmp_path / "before", 0.0), pushed(tmp_path / "after", 0.6)
     assert (cause.explain(1, before, after, JointConfig()) or {}).get("effect") != "notch"

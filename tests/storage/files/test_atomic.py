@@ -10,6 +10,7 @@ import pytest
 from opamc_cli.errors import InputError, UsageError
 from opamc_cli.storage.files.atomic import atomic_path, ensure_directory, write_text
 from opamc_cli.storage.runs.finding import find_runs
+from tests.marks import long
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path):
@@ -45,7 +46,7 @@ with write_run({path!r}, RunInfo(1.0), schema) as writer:
 """
 
 
-@pytest.mark.parametrize("sent", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("sent", [signal.SIGKILL, long(signal.SIGTERM), long(signal.SIGINT)])
 def test_a_killed_writer_leaves_no_run(tmp_path, sent):
     path = tmp_path / "r.parquet"
     code = KILLED.format(path=str(path))

@@ -301,6 +301,7 @@ def test_shipped_maps_are_maps(path):
     load_map(path)
 
 
+@pytest.mark.long
 def test_ingesting_again_or_with_more_workers_gives_the_same_bytes(tmp_path):
     files = [write_table(tmp_path / f"{name}.csv") for name in ("a", "b", "c")]
     path = tmp_path / "map.yaml"

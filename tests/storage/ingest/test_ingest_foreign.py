@@ -142,6 +142,7 @@ def test_a_missing_library_is_named_with_its_extra(tmp_path, monkeypatch):
     assert "pip install 'opamc[ros]'" in str(outcome.errors[0])
 
 
+@pytest.mark.long
 def test_recordings_whose_rates_differ_by_jitter_end_at_one(tmp_path):
     rates = (93.3, 96.0)
     files = [
