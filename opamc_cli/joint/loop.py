@@ -151,7 +151,7 @@ def _closed(
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
     fits = before, only_named.fit, final.fit, best_before
-    loop = _opened(*fits, saturated, steps, tried, library)
+    loop = _opened(fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 
 
@@ -201,26 +201,23 @@ def _steps(
 
 
 def _opened(
-    before: Fit,
-    named: Fit,
-    after: Fit,
-    best_before: Fit,
+    fits: tuple[Fit, Fit, Fit, Fit],
     saturated: Sequence[Chain],
     steps: list[Step],
     tried: list[tuple[int, Tried]],
     library: Library,
 ) -> Loop:
+    before, named, after, best_before = fits
     # What either explains can be explained.
     ceilings = [(ceiling(before, chain.fit), chain) for chain in saturated]
     found, explained = max(ceilings, key=lambda pair: pair[0].share)
     rmse_named, rmse_after = named.rmse(sealed=True), after.rmse(sealed=True)
     # The declared model is not to look worse than where it was fitted best.
     least = min(before, best_before, key=lambda fit: fit.rmse(sealed=True))
-    rmse_before, scale = least.rmse(sealed=True), 1.0
-    if least is not before:
-        scale = (before.rmse(sealed=True) / max(rmse_before, 1e-300)) ** 2
-        share = max(1.0 - scale * (1.0 - found.share), 0.0)
-        found = Ceiling(share, scale * found.standard_error)
+    rmse_before = least.rmse(sealed=True)
+    scale = (before.rmse(sealed=True) / max(rmse_before, 1e-300)) ** 2
+    share = max(1.0 - scale * (1.0 - found.share), 0.0)
+    found = Ceiling(share, scale * found.standard_error)
     refused: list[Tried] = []
     # Functions alone have to be worth the price of one.
     worth = 1.0 - PRICE * (not any(step.named for step in steps))

@@ -5,9 +5,6 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.motion.track import Floats, Track
 
-OVERSHOOT = 0.1
-"""Share of the samples: a joint that goes back less at its strokes' ends moves one way."""
-
 
 class PositionDrag(Effect):
     """A dragging place of some width: friction that depends on the angle."""
@@ -31,7 +28,7 @@ class PositionDrag(Effect):
         span = high - low
         rows = track.moving if track.open_samples is None else track.open_samples
         ways = (np.sort(track.position_rad[rows & (track.direction * w > 0)]) for w in (-1, 1))
-        met = [way for way in ways if way.size > OVERSHOOT * np.count_nonzero(rows)]
+        met = [way for way in ways if way.size]
         return [
             {"place_rad": float(place), "width_rad": width, "flatness": 2.0}
             for width in geometric(span / 60, span / 5, 5)
