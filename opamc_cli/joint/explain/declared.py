@@ -19,6 +19,9 @@ from opamc_cli.joint.name.search import Pool, candidates
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
+HALF = 0.5
+"""Of the mean square error that functions without a name leave: another window than suits the
+declared model best hides less for certain. With a little more left, 0.6, they make up for noise."""
 ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
@@ -110,16 +113,15 @@ class _Ways:
 
         With so many functions without a name beside the model, where they help.
         """
-        best, error = first, np.inf
-        for smoothing in sorted(self._ways, key=lambda way: way != first):
-            fits = [declared_fit(self._dataset(smoothing, ENOUGH), model)]
+        left: dict[Smoothing | None, float] = {first: np.inf}
+        for way in self._ways:
+            fits = [declared_fit(self._dataset(way, ENOUGH), model)]
             if functions:
                 pool = with_links(Pool.of(fits[0].dataset, unnamed_library()))
                 fits.append(saturated(chain_of(fits[0], 0), pool, functions).fit)
-            found = min(fit.rmse(sealed=False) for fit in fits) ** 2
-            if found < BETTER * error:
-                best, error = smoothing, found
-        return best
+            left[way] = min(fit.rmse(sealed=False) for fit in fits) ** 2
+        least = min(left, key=lambda way: left[way])
+        return least if left[least] < (HALF if functions else BETTER) * left[first] else first
 
 
 def judged_alike(other: Track, track: Track) -> Track:

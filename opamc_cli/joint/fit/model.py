@@ -327,8 +327,8 @@ class Fit:
         """
         dataset, track, grid = self.dataset, self.dataset.fine.track, self.dataset.fine
         residual, current, sharp = self.residual_a, track.current_a, dataset.sharp
-        if sharp is grid:
-            return Judged(residual, current, grid.fit, grid.sealed)
+        if sharp is grid or dataset.coarse is grid:
+            return Judged(residual, current, sharp.fit, sharp.sealed)
         smooth = np.zeros(track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
             if term.effect.domain == "acceleration":
