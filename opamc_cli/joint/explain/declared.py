@@ -14,14 +14,14 @@ from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
-from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.chain import EXACT, chain_of
 from opamc_cli.joint.name.search import Pool, candidates
+from opamc_cli.signal.motion.smoothing import measurement_noise
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
 HALF = 0.5
-"""Of the mean square error that functions without a name leave: another window than suits the
-declared model best hides less for certain. With a little more left, 0.6, they make up for noise."""
+"""Likewise beside functions without a name: with 0.6 they make up for a short window's noise."""
 ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
@@ -109,17 +109,17 @@ class _Ways:
     def best_of(
         self, first: Smoothing | None, model: Declared, functions: int = 0
     ) -> Smoothing | None:
-        """Return the way that predicts best; the first, unless another is worth it.
-
-        With so many functions without a name beside the model, where they help.
-        """
+        """Return the way that predicts best, beside some functions, or the first if none is."""
         left: dict[Smoothing | None, float] = {first: np.inf}
-        for way in self._ways:
+        for way in sorted(self._ways, key=lambda way: way != first):
             fits = [declared_fit(self._dataset(way, ENOUGH), model)]
             if functions:
                 pool = with_links(Pool.of(fits[0].dataset, unnamed_library()))
                 fits.append(saturated(chain_of(fits[0], 0), pool, functions).fit)
             left[way] = min(fit.rmse(sealed=False) for fit in fits) ** 2
+            noise_a = measurement_noise(fits[-1].residual_a[fits[-1].dataset.sharp.fit])
+            if functions and EXACT * left[way] <= noise_a**2:
+                break  # All is explained.
         least = min(left, key=lambda way: left[way])
         return least if left[least] < (HALF if functions else BETTER) * left[first] else first
 
