@@ -34,5 +34,5 @@ def test_killed_commands():
 @pytest.mark.long
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_failing_system_calls():
-    said = script("faults.py", "--every", 30, "--first", 7, "--only", "score")
+    said = script("faults.py", "--every", 20, "--first", 7, "--only", "score")
     assert int(said.splitlines()[-1].split()[0]) > 5
