@@ -123,11 +123,13 @@ def close_loop(
     return other if better and other.rmse_after_a <= loop.rmse_before_a else loop
 
 
-def _closed(before: Fit, library: Library, seed: int, off: Collection[str], own: Fit) -> Loop:
+def _closed(
+    before: Fit, library: Library, seed: int, without_rules: Collection[str], best_before: Fit
+) -> Loop:
     start = chain_of(before, 0)
-    unnamed = Pool.of(before.dataset, unnamed_library(), without=off)
+    unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
     saturated = saturations(start, unnamed)
-    pool = Pool.of(before.dataset, library, without=off)
+    pool = Pool.of(before.dataset, library, without=without_rules)
     # An arm's own dynamics are there; beside them nothing else has to hold what they ask.
     arm = replace(pool, library={n: e for n, e in library.items() if "others" in e.needs})
     linked = beam(start, arm)
@@ -135,7 +137,7 @@ def _closed(before: Fit, library: Library, seed: int, off: Collection[str], own:
     best, named = settled(min(chains, key=lambda one: one.score), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     final = worth_their_price(beam(best, unnamed, width=1))
-    if "unnamed" not in off:  # Or beside the functions that explain most.
+    if "unnamed" not in without_rules:  # Or beside the functions that explain most.
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
@@ -148,7 +150,7 @@ def _closed(before: Fit, library: Library, seed: int, off: Collection[str], own:
     told = [t if id(t.term) in kept else replace(t, why_not=RAISES) for t in told]
     tried = [(i, t) for i, one in enumerate(named) for t in (told[i], *one.others)]
     tried += [(len(named), trial.told) for trial in trials(best, pool)]
-    fits = before, only_named.fit, final.fit, own
+    fits = before, only_named.fit, final.fit, best_before
     loop = _opened(fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
 

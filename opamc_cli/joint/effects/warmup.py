@@ -21,7 +21,7 @@ class Warmup(Effect):
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Try from a twentieth to one and a half of the session's length."""
+        """Try time constants of a twentieth to one and a half of the session's length."""
         # In a recording that never comes back, time since its start is a function of place.
         length = float(np.ptp(track.time_s)) + 1e-9
         clocks = (0.0, 1.0) if len(track.starts_s) > 1 and track.comes_back else (0.0,)

@@ -28,6 +28,7 @@ FUNCTIONS = 4
 """Without a name, beside a model that may lack something: 16 leave the least with the same way."""
 JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count: by its own, none near a reversal, a long window is the best."""
+Way = Smoothing | None
 Declared = tuple[tuple[Effect, Term | None], ...]
 """Effects, with their terms where parameters are given."""
 
@@ -85,7 +86,7 @@ def _differentiated(
     joint: Joint,
     track: Track,
     grouping: Grouping,
-    smoothing: Smoothing | None,
+    smoothing: Way,
     most: int = MOST_SAMPLES,
     ends: bool = True,
 ) -> Dataset:
@@ -100,26 +101,24 @@ class _Ways:
 
     def __init__(self, recordings: list[Recording], joint: Joint) -> None:
         track, grouping = grouped_track(recordings, joint)
-        self._ways: list[Smoothing | None] = []
+        self._ways: list[Way] = []
         if grouping is not None:
             self._ways = [None, *smoothings(recordings)]
             laid = recordings, joint, track, grouping
             self._dataset = partial(_differentiated, *laid, ends=False)
 
-    def best_of(
-        self, first: Smoothing | None, model: Declared, functions: int = 0
-    ) -> Smoothing | None:
-        """Return the way that predicts best, beside some functions, or the first if none is."""
-        left: dict[Smoothing | None, float] = {first: np.inf}
+    def best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
+        """Return the way that leaves least beside so many functions, or the first: see HALF."""
+        left: dict[Way, float] = {first: np.inf}
         for way in sorted(self._ways, key=lambda way: way != first):
             fits = [declared_fit(self._dataset(way, ENOUGH), model)]
             if functions:
                 pool = with_links(Pool.of(fits[0].dataset, unnamed_library()))
                 fits.append(saturated(chain_of(fits[0], 0), pool, functions).fit)
             left[way] = min(fit.rmse(sealed=False) for fit in fits) ** 2
-            noise_a = measurement_noise(fits[-1].residual_a[fits[-1].dataset.sharp.fit])
-            if functions and EXACT * left[way] <= noise_a**2:
-                break  # All is explained.
+            rest = fits[-1].residual_a[fits[-1].dataset.sharp.fit]
+            if functions and EXACT * left[way] <= measurement_noise(rest) ** 2:
+                break  # Noise is all that is left.
         least = min(left, key=lambda way: left[way])
         return least if left[least] < (HALF if functions else BETTER) * left[first] else first
 
