@@ -10,6 +10,9 @@ from pathlib import Path
 from opamc_cli.errors import UsageError
 from opamc_cli.stages.nightly.workers.night import AxisResult, NightJob, ProgramResult
 
+PAUSE_S = 0.02
+"""Time in which a kill may come."""
+
 
 def stand_in(job: NightJob) -> tuple[ProgramResult, ...]:
     """Answer like a diagnosis: the same for the same job, with work on the disk that can fail."""
@@ -22,7 +25,7 @@ def stand_in(job: NightJob) -> tuple[ProgramResult, ...]:
         msg = f"{place}: cannot be written ({error.strerror})"
         raise UsageError(msg) from error
     finally:
-        time.sleep(0.02)
+        time.sleep(PAUSE_S)
         shutil.rmtree(place, ignore_errors=True)
     found = []
     for program in job.programs:

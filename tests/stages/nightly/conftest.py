@@ -1,13 +1,18 @@
 """A small cell of virtual robots, recorded once."""
 
+import pickle
 import shutil
 from collections.abc import Iterator
 from datetime import date
 from pathlib import Path
 
 import cell_logs
+import night_stand_in
 import nightly_kills
 import pytest
+
+from opamc_cli.stages.nightly.start import run as stage
+from opamc_cli.stages.nightly.workers.workers import _attempt, called
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -39,7 +44,24 @@ def cell(recorded, tmp_path) -> Path:
 
 
 @pytest.fixture
-def logs(cell):
+def here(monkeypatch):
+    """Judge nights in this process: a worker takes longer to start than to judge one.
+
+    For who asks what becomes of a night, not who judges it; what is patched holds for it, too.
+    """
+
+    def run_all(function, works, _, **limits):
+        assert limits.keys() == {"seconds", "memory_gb"}
+        for work in works:
+            sent = pickle.loads(pickle.dumps(work))
+            yield work, pickle.loads(pickle.dumps(_attempt(called(function), sent, None)))
+
+    monkeypatch.setattr(stage, "run_all", run_all)
+    monkeypatch.setattr(night_stand_in, "PAUSE_S", 0.0)
+
+
+@pytest.fixture
+def logs(cell, here):
     """The logs of two robots of a cell whose nights are all healthy."""
     shutil.rmtree(cell.parent / "logs" / "r2")
     with nightly_kills.with_stand_in():

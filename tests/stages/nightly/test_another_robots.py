@@ -5,7 +5,6 @@ import shutil
 import sqlite3
 from dataclasses import replace
 
-import nightly_kills
 import pyarrow.parquet as pq
 import pytest
 from cell_logs import night
@@ -14,14 +13,6 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
 from tests.marks import long
-
-
-@pytest.fixture
-def logs(cell):
-    """The logs of two robots of a cell whose nights are all healthy."""
-    shutil.rmtree(cell.parent / "logs" / "r2")
-    with nightly_kills.with_stand_in():
-        yield cell.parent / "logs"
 
 
 def states(cell, robot):

@@ -29,7 +29,7 @@ def nights(tmp_path_factory):
 
 
 @pytest.fixture
-def cell(tmp_path):
+def cell(tmp_path, here):
     """A cell without a recording yet."""
     path = tmp_path / "cell.yaml"
     path.write_text("runs: logs/{robot}/{night}/*.parquet\nbaseline: {nights: 3}\n")

@@ -7,7 +7,6 @@ from dataclasses import replace
 from datetime import date, timedelta
 
 import cell_logs
-import nightly_kills
 import pyarrow.parquet as pq
 import pytest
 from cell_logs import night
@@ -19,14 +18,6 @@ from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
-
-
-@pytest.fixture
-def logs(cell):
-    """The logs of two robots whose nights are all healthy."""
-    shutil.rmtree(cell.parent / "logs" / "r2")
-    with nightly_kills.with_stand_in():
-        yield cell.parent / "logs"
 
 
 def add_night(logs, index, *robots, **said):
@@ -121,22 +112,21 @@ def test_a_night_that_is_judged_in_part_is_counted_until_the_next(cell, logs, op
 
 
 @pytest.mark.long
-def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_part(cell, opamc):
-    logs = cell.parent / "logs"
-    shutil.rmtree(logs / "r2")
+def test_a_night_with_fewer_recordings_than_those_of_the_baseline_is_judged_in_part(
+    cell, logs, opamc
+):
     for number, robot in enumerate(("r1", "r3")):
         for index in range(5):
             second = logs / robot / night(index) / "second.parquet"
             cell_logs.record(second, 500, 100 * number + 50 + index)
     (logs / "r1" / night(4) / "second.parquet").unlink()
-    with nightly_kills.with_stand_in():
-        said = f"r1 {night(4)}: in part not judged: 1 recording"
-        why = f"{said} of program 'cycle' where each night of the baseline has 2"
-        assert why in opamc("nightly", cell, "--quiet").out
-        assert counted(cell, opamc)[0] == ExitCode.PARTIAL
-        # the file comes late
-        cell_logs.record(logs / "r1" / night(4) / "second.parquet", 500, 54)
-        assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
+    said = f"r1 {night(4)}: in part not judged: 1 recording"
+    why = f"{said} of program 'cycle' where each night of the baseline has 2"
+    assert why in opamc("nightly", cell, "--quiet").out
+    assert counted(cell, opamc)[0] == ExitCode.PARTIAL
+    # the file comes late
+    cell_logs.record(logs / "r1" / night(4) / "second.parquet", 500, 54)
+    assert counted(cell, opamc) == (ExitCode.DONE, ExitCode.DONE, "2 robots healthy")
 
 
 @pytest.mark.long
@@ -235,6 +225,7 @@ def test_a_key_that_metadata_had_not_is_named_with_the_condition_that_it_makes(c
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("here", "undrawn")
 def test_a_history_that_is_lost_is_said_with_what_its_results_tell(cell, opamc):
     why = "alarms of before are not known\n"
     nightly = cell.parent / "nightly"

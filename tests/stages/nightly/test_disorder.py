@@ -251,6 +251,7 @@ def test_a_baseline_that_loses_one_recording_of_a_night_leaves_verdicts(cell, lo
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("here", "undrawn")
 def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc):
     logs = cell.parent / "logs"
     for robot in ("r2", "r3"):

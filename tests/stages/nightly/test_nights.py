@@ -152,7 +152,7 @@ def test_a_cell_from_the_first_night_to_the_alarm(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(cell, opamc):
     alarm = "r2 axis 2: ALARM"
     at = ("--why", "gear ordered", "--cell", cell)
@@ -174,7 +174,7 @@ def test_an_alarm_of_a_new_baseline_is_told_though_the_old_one_was_acknowledged(
         assert opamc("nightly", cell, "--quiet").code == ExitCode.DONE
 
 
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
     """It was what healthy nights differ by: the same fault in the next night was healthy."""
     rule = "alarm: {nights: 1, of: 1}\nrobots: {r2: {}}\n"
@@ -193,7 +193,7 @@ def test_a_worn_night_of_the_baseline_is_left_out_and_told_once(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
     cell.write_text(cell.read_text() + "alarm: {nights: 1, of: 1, remind_after: 1}\n")
     late = cell.parent / "logs" / "r2" / NIGHTS[4]
@@ -207,7 +207,7 @@ def test_an_alarm_that_is_told_again_is_not_taken_for_a_new_one(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_an_alarm_does_not_end_without_a_word(cell, opamc):
     with nightly_kills.with_stand_in():
         plain = cell.read_text()
@@ -246,7 +246,7 @@ def test_an_alarm_does_not_end_without_a_word(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_an_alarm_that_is_over_and_stands_again_is_said_again(cell, opamc):
     rule = "alarm: {nights: 1, of: 1, remind_after: 99}\n"
     cell.write_text(cell.read_text().replace("nights: 3", "nights: 2") + rule)
@@ -269,7 +269,7 @@ def test_an_alarm_that_is_over_and_stands_again_is_said_again(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_a_robot_without_any_night_stays_on_page_and_metrics(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r1: {}, r2: {}, r3: {}, r9: {}}\n")
     metrics = cell.parent / "nightly" / "metrics.prom"
@@ -282,7 +282,7 @@ def test_a_robot_without_any_night_stays_on_page_and_metrics(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_an_alarm_whose_nights_become_a_baseline_is_over_and_stays_in_the_history(cell, opamc):
     at = ("--why", "new gear", "--cell", cell)
     begin = ("nightly", "rebaseline", "r2", "--from", NIGHTS[3], *at)
@@ -319,7 +319,7 @@ def test_facts_of_thousands_of_known_files_are_read_at_once():
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
     only = ("nightly", cell, "--quiet", "--robot", "r1", "--night", NIGHTS[4])
     assert (opamc(*only).code, opamc(*only).out) == (ExitCode.DONE, "")
@@ -350,7 +350,7 @@ def test_what_is_asked_for_and_not_there_is_said(cell, opamc):
 
 
 @pytest.mark.long
-@pytest.mark.usefixtures("undrawn")
+@pytest.mark.usefixtures("here", "undrawn")
 def test_logs_out_of_reach_and_joints_that_are_not_there_are_said(cell, opamc):
     cell.write_text(cell.read_text() + "robots: {r2: {axes: [2, 7]}}\n")
     for night in NIGHTS[3:4]:
@@ -647,6 +647,7 @@ def test_compute_is_loaded_by_workers_only():
 
 
 @pytest.mark.long
+@pytest.mark.usefixtures("here", "undrawn")
 def test_logs_in_a_store_are_fetched_once_and_baselines_kept(cell, opamc):
     """A store by the path that object stores take, `file://` in the place of `s3://`."""
     shutil.rmtree(cell.parent / "logs" / "r1" / NIGHTS[4])

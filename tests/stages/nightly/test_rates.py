@@ -17,7 +17,7 @@ from opamc_cli.storage.runs.writing import save_run
 
 
 @pytest.fixture
-def logs(cell):
+def logs(cell, here):
     """The logs of one robot of a cell whose nights are all healthy."""
     for name in ("r2", "r3"):
         shutil.rmtree(cell.parent / "logs" / name)
