@@ -1,6 +1,7 @@
 """The decision on made-up fleets: quiet on healthy joints, right about the faulty one."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -24,8 +25,14 @@ from tests.marks import long
 SEEDS = range(40)
 
 
+@cache
+def judged(plan, seed):
+    """Return the judgements of a fleet, of which several tests ask."""
+    return judge(cells(plan, seed))
+
+
 def p_values(plan, seeds=SEEDS):
-    return np.array([[j.p_value for j in judge(cells(plan, seed)).values()] for seed in seeds])
+    return np.array([[j.p_value for j in judged(plan, seed).values()] for seed in seeds])
 
 
 @pytest.mark.long
@@ -75,11 +82,11 @@ def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
 
 @pytest.mark.long
 def test_the_health_index_is_zero_for_healthy_sessions_and_grows_with_severity():
-    healthy = [j.health_index for seed in SEEDS for j in judge(cells(Fleet(), seed)).values()]
+    healthy = [j.health_index for seed in SEEDS for j in judged(Fleet(), seed).values()]
     assert abs(np.mean(healthy)) < 0.2
     assert np.std(healthy) == pytest.approx(1.0, abs=0.35)
     by_severity = [
-        np.median([judge(cells(Fleet(severity=s), seed))[3].health_index for seed in range(10)])
+        np.median([judged(Fleet(severity=s), seed)[3].health_index for seed in range(10)])
         for s in (0.0, 0.2, 0.4, 0.8)
     ]
     assert (np.diff(by_severity) > 0).all()

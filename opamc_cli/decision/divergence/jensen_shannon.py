@@ -1,6 +1,7 @@
 """Divergence between ordinal-pattern distributions, and what chance alone makes of it."""
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -238,28 +239,52 @@ def chance_inflation(
     observed = float(values[usable].mean())
     sizes, weights = _few_sizes(segment[usable], rest[usable])
 
-    def expected(inflation: float) -> float:
+    def above(log_inflation: float) -> float:
+        inflation = math.exp(log_inflation)
         by_size = chance_divergence(pool, sizes[0] / inflation, sizes[1] / inflation, base)
-        return float(np.average(by_size, weights=weights))
+        return math.log(float(weights @ by_size) / float(weights.sum()) / observed)
 
-    # Chance grows with φ throughout; bisection needs no derivative and cannot run away.
     low, high = 1e-3, float(segment[usable].max())
-    if observed <= expected(low):
+    if observed <= 0.0 or above(math.log(low)) >= 0.0:
         return low
-    if observed >= expected(high):
+    if above(math.log(high)) <= 0.0:
         return high
-    while high / low > 1 + 1e-6:
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if expected(middle) < observed else (low, middle)
-    return math.sqrt(low * high)
+    return math.exp(_zero(above, math.log(low), math.log(high)))
+
+
+def _zero(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return, to 1e-6, where a function that grows from `low` to `high` is zero.
+
+    C. J. F. Ridders (IEEE Trans. Circuits Syst. 26, 1979, 979): it needs no derivative, cannot run
+    away, and two calls halve the interval at least. Chance over φ is nearly a line by logarithms:
+    ten calls find what bisection needed 26 for, which was a third of a decision.
+    """
+    at_low, at_high = function(low), function(high)
+    last = math.inf
+    while True:
+        middle = 0.5 * (low + high)
+        at_middle = function(middle)
+        if at_middle == 0.0:
+            return middle
+        found = middle - (middle - low) * at_middle / math.sqrt(at_middle**2 - at_low * at_high)
+        if abs(found - last) <= 1e-6 or high - low <= 1e-6:
+            return found
+        last, at_found = found, function(found)
+        for place, value in ((middle, at_middle), (found, at_found)):
+            if value < 0.0 and place > low:
+                low, at_low = place, value
+            elif value >= 0.0 and place < high:
+                high, at_high = place, value
 
 
 def _few_sizes(
     segment: FloatArray, rest: FloatArray, most: int = 32
 ) -> tuple[FloatArray, FloatArray]:
     """Stand a few pairs of sizes in for many: chance hardly differs between close ones."""
+    if len(segment) <= most:
+        return np.array([segment, rest]), np.ones(len(segment))
     order = np.argsort(1 / segment + 1 / rest, kind="stable")
-    groups = np.array_split(order, min(most, len(order)))
+    groups = np.array_split(order, most)
     sizes = np.array([[segment[g].mean(), rest[g].mean()] for g in groups]).T
     return sizes, np.array([len(g) for g in groups], dtype=np.float64)
 

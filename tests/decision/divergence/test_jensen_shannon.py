@@ -114,6 +114,32 @@ def test_excess_is_fair_to_targets_of_another_length():
     assert abs(excess.mean()) < 0.06 * raw.mean()
 
 
+@pytest.mark.parametrize("n_segments", [2, 20, 60])
+@pytest.mark.parametrize("repeats", [1, 7, 300])
+def test_the_inflation_makes_chance_the_mean_that_was_seen(n_segments, repeats):
+    rng = np.random.default_rng([n_segments, repeats])
+    for concentration in (0.05, 0.5, 3.0):
+        pmf = rng.dirichlet(np.full(24, concentration))
+        sizes = 1 + rng.integers(20, 400, n_segments) // repeats
+        rows = repeats * np.array([rng.multinomial(n, pmf) for n in sizes])
+        pool, n = rows.sum(axis=0), rows.sum(axis=1)
+        seen = jensen_shannon(rows, pool - rows)
+        phi = chance_inflation(seen, pool, n, pool.sum() - n)
+        chance = chance_divergence(pool, n / phi, (pool.sum() - n) / phi)
+        # sizes that differ little are one another's stand-in
+        within = 1e-5 if n_segments <= 32 else 0.02
+        assert phi == 1e-3 or phi == n.max() or chance.mean() == pytest.approx(seen.mean(), within)
+
+
+def test_the_inflation_ends_where_no_number_of_patterns_does():
+    pool, n, rest = np.full(24, 100.0), np.full(5, 240.0), np.full(5, 960.0)
+    assert chance_inflation(np.zeros(5), pool, n, rest) == 1e-3
+    assert chance_inflation(np.full(5, 1e-9), pool, n, rest) == 1e-3
+    assert chance_inflation(np.ones(5), pool, n, rest) == 240.0
+    assert np.isnan(chance_inflation(np.full(5, np.nan), pool, n, rest))
+    assert np.isnan(chance_inflation(np.ones(5), pool, n, np.zeros(5)))
+
+
 def test_effect_size_is_the_relative_change_of_probabilities():
     q = np.full(100, 0.01)
     p = q * (1 + 0.1 * np.where(np.arange(100) % 2, 1, -1))
