@@ -29,6 +29,9 @@ demo-nightly: $(STAMP)  ## Three virtual robots, ten nights, one joint that wear
 	@$(BIN)/opamc nightly opamc-cell/cell.yaml --since 2026-03-01 --jobs 0 || test $$? -eq 1
 	@echo "open $(CURDIR)/opamc-cell/nightly/index.html"
 
+# processes that tests start need not compile what others have compiled
+unexport PYTHONDONTWRITEBYTECODE
+
 # a file's tests stay together for their fixtures, until one core would wait for the other
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal -q
 

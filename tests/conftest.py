@@ -10,6 +10,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
+# a worker for every core has no core for more threads, which wait for each other at full speed;
+# set before numpy is loaded, for the processes that tests start as well
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # studies and tests share made-up recordings and plain rivals
 sys.path[:0] = [str(ROOT / "benchmarks"), str(ROOT / "benchmarks" / "sources")]
 
