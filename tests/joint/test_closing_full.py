@@ -52,7 +52,7 @@ def close(names, **options):
 
 @pytest.mark.long
 def test_vibration_that_the_model_does_not_hold_is_not_called_a_delay():
-    loop = close(RIGID, cycles=3, rate_hz=1024.0)
+    loop = close(RIGID, cycles=2, rate_hz=512.0)
     assert "time_delay" not in {step.term.effect.name for step in loop.steps}
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
 
