@@ -6,7 +6,6 @@ from pathlib import Path
 
 import cell_logs
 import pytest
-from marks import long
 
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.stages.model import kept_tracks
@@ -15,6 +14,7 @@ from opamc_cli.stages.nightly.workers import ahead
 from opamc_cli.stages.nightly.workers.workers import called
 from opamc_cli.stages.report.figures import motion_signal
 from opamc_cli.stages.verdict import cause
+from tests.marks import long
 
 HEALTHY, FAULTY = cell_logs.night(3), cell_logs.night(4)
 
