@@ -197,7 +197,9 @@ class Judgement:
         return _largest(heard or list(self.effects.values()))
 
 
-def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int, Judgement]:
+def judge(
+    bundles: Mapping[int, Bundle], policy: Policy = Policy(), *, sized: bool = True
+) -> dict[int, Judgement]:
     """Decide about every joint of a diagnosis.
 
     Parameters
@@ -206,6 +208,9 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
         What is known of each axis; one without cells has insufficient data.
     policy : Policy
         Levels and limits.
+    sized : bool
+        Whether the effects are wanted of joints, too, whose shift is not improbable: a sixth of the
+        work, and no matter of their state.
 
     Returns
     -------
@@ -241,7 +246,8 @@ def judge(bundles: Mapping[int, Bundle], policy: Policy = Policy()) -> dict[int,
     alone = dict(zip(axes, holm([p_alone[axis] for axis in axes]).tolist(), strict=True))
     judgements = {}
     for axis in axes:
-        known = methods[axis] != "none"
+        wanted = sized or max(adjusted[axis], alone[axis]) <= policy.false_alarm_rate
+        known = wanted and methods[axis] != "none"
         every = {PATTERNS: PatternEvidence(cells[axis]), **bundles[axis].witnesses}
         effects = {name: kind.effect() if known else math.nan for name, kind in every.items()}
         judgement = Judgement(

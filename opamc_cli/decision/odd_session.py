@@ -108,7 +108,7 @@ def _odd_one(
             for axis, bundle in bundles.items()
             if name in bundle.baseline_sessions
         }
-        for axis, judged in judge(held_out, _stricter(policy, bundles)).items():
+        for axis, judged in judge(held_out, _stricter(policy, bundles), sized=False).items():
             differs = (name, axis) in asked and judged.state in UNHEALTHY
             if differs and (judged.health_index, name) > found.get(axis, (0.0, "")):
                 found[axis] = judged.health_index, name
@@ -131,7 +131,7 @@ def _worn_end(
                 axis: bundles[axis].of_sessions(order[:-number], [order[-back]])
                 for axis, order in long.items()
             }
-            judged = judge(held_out, _stricter(policy, bundles))
+            judged = judge(held_out, _stricter(policy, bundles), sized=False)
             differ = {axis for axis in differ if _worn(judged[axis], last=back == 1)}
         for axis in differ - found.keys():
             names = bundles[axis].baseline_sessions

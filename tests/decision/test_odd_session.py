@@ -113,3 +113,16 @@ def test_a_session_that_is_held_out_is_judged_as_a_target_of_the_others():
     # who has no names is asked nothing
     unnamed = replace(bundle, baseline_sessions=())
     assert odd_sessions({1: unnamed}, judge({1: unnamed})) == {}
+
+
+@pytest.mark.parametrize("severity", [0.0, 0.15, 1.0])
+def test_without_the_effects_of_healthy_joints_a_judgement_is_the_same(severity):
+    for seed in range(5):
+        made = cells(Fleet(severity=severity), seed)
+        bundles = {axis: Bundle(tuple(own)) for axis, own in made.items()}
+        plain, unsized = judge(bundles), judge(bundles, sized=False)
+        for axis, judged in plain.items():
+            improbable = max(judged.p_adjusted, judged.p_alone) <= Policy().false_alarm_rate
+            effects = judged.effects if improbable else dict.fromkeys(judged.effects, np.nan)
+            assert repr(unsized[axis]) == repr(replace(judged, effects=effects))
+        assert (plain[3].state == "fault") == (severity == 1.0)

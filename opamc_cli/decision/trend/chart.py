@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
+from opamc_cli.decision.trend.median import median
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -98,7 +99,7 @@ def usual_nights(reference: FloatArray, n_baseline: int) -> tuple[float, float]:
     n = len(reference)
     if not n:
         return 0.0, USUAL_SPREAD
-    middle = float(np.median(reference))
-    own = (MAD_TO_SIGMA * float(np.median(np.abs(reference - middle)))) ** 2
+    middle = median(reference)
+    own = (MAD_TO_SIGMA * median(np.abs(reference - middle))) ** 2
     variance = (USUAL_NIGHTS * USUAL_SPREAD**2 + n * own) / (USUAL_NIGHTS + n)
     return n * middle / (n_baseline + n), max(float(np.sqrt(variance)), LEAST_SPREAD)

@@ -3,6 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.decision.trend.median import median
+
 FloatArray = NDArray[np.float64]
 
 LEAST_AFTER = 2
@@ -50,9 +52,9 @@ def onset(nights: FloatArray, values: FloatArray) -> int:
     starts, errors = [], []
     for start in range(1, n - LEAST_AFTER + 1):
         before, after = values[:start], values[start:]
-        level = float(np.median(before))
+        level = median(before)
         below = float(np.abs(before - level).sum())
-        step = float(np.abs(after - np.median(after)).sum())
+        step = float(np.abs(after - median(after)).sum())
         time = nights[start:] - nights[start - 1]
         for of_form in (step, *(_misfit(after - level, time**power) for power in RISES)):
             starts.append(start)

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.decision.trend.median import median
+
 FloatArray = NDArray[np.float64]
 
 LEAST_NIGHTS = 6
@@ -67,7 +69,7 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
         return None
     first, second = np.triu_indices(n, 1)
     slopes = np.sort((values[second] - values[first]) / (nights[second] - nights[first]))
-    slope, middle = float(np.median(slopes)), float(np.median(nights))
+    slope, middle = median(slopes), median(nights)
     reach = NORMAL_90 * np.sqrt(n * (n - 1) * (2 * n + 5) / 18)
     low = int(np.floor((len(slopes) - reach) / 2))
     high = int(np.ceil((len(slopes) + reach) / 2))
@@ -75,7 +77,7 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
         slope,
         float(slopes[low]) if low >= 0 else -np.inf,
         float(slopes[high]) if high < len(slopes) else np.inf,
-        float(np.median(values - slope * (nights - middle))),
+        median(values - slope * (nights - middle)),
         float(nights[-1] - middle),
     )
 

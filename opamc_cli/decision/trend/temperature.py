@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from opamc_cli.decision.trend.median import median
 from opamc_cli.decision.trend.slope import robust_slope
 
 FloatArray = NDArray[np.float64]
@@ -70,4 +71,4 @@ def without_temperature(
 def _flat(nights: FloatArray, values: FloatArray) -> FloatArray:
     """Return what is left of values by their line over the nights."""
     line = robust_slope(nights, values)
-    return values if line is None else values - line.per_night * (nights - np.median(nights))
+    return values if line is None else values - line.per_night * (nights - median(nights))

@@ -2,8 +2,9 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from functools import partial
+from types import ModuleType
 from typing import Any
 
 UNUSED = ("f2py", "testing")
@@ -12,20 +13,39 @@ UNUSED = ("f2py", "testing")
 OURS = "opamc_cli."
 
 
-def forgo_documentation() -> None:
-    """Have scipy loaded without its functions' documentation, in a process that is ours.
+class _Unread(dict[str, list[Any]]):
+    """A function's documentation for who parses it, adds to it and writes it anew: no parts."""
 
-    From 1.16 on it reads all of it, adds what kinds of array each function takes, and writes it
-    anew: a third of what it takes to load, and a twentieth of a lone night. Nobody reads it here.
-    Of what numpy has, it copies all: a sixth of the rest is parts that nobody uses here.
+    def __init__(self, *_: object) -> None:
+        super().__init__()
+
+    def __missing__(self, part: str) -> list[Any]:
+        return self.setdefault(part, [])
+
+    def __str__(self) -> str:
+        return "\n"
+
+
+def forgo_documentation() -> None:
+    """Have scipy and pyarrow loaded without their functions' documentation, in a process of ours.
+
+    From 1.16 on scipy reads all of it, adds what kinds of array each function takes, and writes it
+    anew: a third of what it takes to load, and a twentieth of a lone night. pyarrow reads that of
+    its functions' options: a third of what its functions take. Nobody reads it here. Of what numpy
+    has, scipy copies all: a sixth of the rest is parts that nobody uses here.
     """
+    if "pyarrow.compute" not in sys.modules:
+        with suppress(ImportError):  # private; left alone if absent
+            from pyarrow.vendored import docscrape
+
+            docscrape.NumpyDocString = _Unread
     if "scipy._lib._array_api" in sys.modules:
         return
     with suppress(ImportError, AttributeError):  # private; left alone if absent
         from scipy._lib import _docscrape
 
         reader: Any = _docscrape
-        reader.FunctionDoc = partial(reader.FunctionDoc, doc="")
+        reader.FunctionDoc = _Unread
         with _unseen(UNUSED):
             import scipy._lib.array_api_compat.numpy  # noqa: F401 - who loads it first, fills it
 
@@ -34,13 +54,15 @@ def forgo_compiler() -> None:
     """Have our compiled loops read from where they are kept without all that could compile them.
 
     numba makes its compiler ready before it looks, which takes a quarter of a second, an eighth of
-    a healthy lone night; who has to compile makes it ready then. Loops of a user's may call what
-    that alone would load: theirs are left alone. To be called once numba is loaded.
+    a healthy lone night, and loads the sources of all functions of its own that a loop calls, 60 to
+    90 ms; who has to compile loads them then. Loops of a user's may call what that alone would
+    load: theirs are left alone. To be called once numba is loaded.
     """
     caching: Any = sys.modules.get("numba.core.caching")
     if caching is None:
         return
     with suppress(ImportError, AttributeError):  # private; left alone if absent
+        from numba.core import environment
         from numba.core.runtime.nrt import rtsys
 
         loaded, initialize = caching.Cache.load_overload, rtsys.initialize
@@ -49,7 +71,9 @@ def forgo_compiler() -> None:
 
         def load_overload(self: Any, sig: Any, target_context: Any) -> Any:
             ours = self._py_func.__module__.startswith(OURS)
-            with _ready(target_context, initialize) if ours else nullcontext():
+            if not ours:
+                return loaded(self, sig, target_context)
+            with _ready(target_context, initialize), _without_sources(environment):
                 return loaded(self, sig, target_context)
 
         caching.Cache.load_overload = load_overload
@@ -63,6 +87,30 @@ def _ready(context: Any, initialize: Callable[[Any], None]) -> Iterator[None]:
         yield
     finally:
         del context.refresh  # what lay over the method
+
+
+@contextmanager
+def _without_sources(environment: Any) -> Iterator[None]:
+    """Have what numba keeps beside each compiled function made without the module it comes from.
+
+    Of its names only code that is not compiled asks.
+    """
+    rebuilt = environment._rebuild_env
+
+    def rebuild(name: str, *kept: Any) -> Any:
+        if name in sys.modules or not name.startswith("numba."):
+            return rebuilt(name, *kept)
+        sys.modules[name] = ModuleType(name)
+        try:
+            return rebuilt(name, *kept)
+        finally:
+            del sys.modules[name]
+
+    environment._rebuild_env = rebuild
+    try:
+        yield
+    finally:
+        environment._rebuild_env = rebuilt
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.report import wording
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     import jinja2
 
     from opamc_cli.stages.report.figures.figure import Figure
+
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -81,6 +83,23 @@ def run(
     path = out / files.REPORT
     write_text(path, page)
     return ReportOutcome(path, inputs, omitted)
+
+
+def draw_baseline(out: Path, kept: KeptResults) -> None:
+    """Keep what `run` draws of the baseline alone, of each joint in an output folder.
+
+    Raises
+    ------
+    InputError
+        As `run` does.
+    """
+    inputs = replace(read_inputs(out, {"baseline": [], "target": []}), kept=kept)
+    with undocumented():
+        from opamc_cli.stages.report.figures import motion_signal
+
+    focus = choose_focus(inputs)
+    every = [(str(axis), replace(focus, axis=axis)) for axis in inputs.axes]
+    _draw(every, lambda of_axis: motion_signal.figure(inputs, of_axis))
 
 
 def _folders(paths: Sequence[Path]) -> list[Path]:
@@ -149,10 +168,7 @@ def _loop_part(inputs: ReportInputs, entry: Mapping[str, Any]) -> dict[str, Any]
     return {**view, "section": _draw(LOOP, lambda draw: draw(inputs, view["axis"]))}
 
 
-def _draw(
-    parts: "Sequence[tuple[str, Callable[..., Figure]]]",
-    call: "Callable[[Callable[..., Figure]], Figure]",
-) -> Section:
+def _draw(parts: "Sequence[tuple[str, Part]]", call: "Callable[[Part], Figure]") -> Section:
     figures, omitted = [], []
     with warnings.catch_warnings():
         # a sign that the font lacks is drawn by the browser, which has more fonts

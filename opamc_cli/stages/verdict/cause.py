@@ -147,6 +147,27 @@ def explain(
     return found or {}
 
 
+def follow_baseline(
+    axis: int,
+    baseline: Sequence[RunSource],
+    config: JointConfig,
+    moving: Mapping[str, tuple[int, int]],
+    kept: KeptResults,
+) -> None:
+    """Keep how one joint moved in its baseline, for whoever has a change of it to explain.
+
+    Parameters
+    ----------
+    axis, baseline, config, moving, kept
+        As of `explain`, which finds it there.
+    """
+    seconds, rate_hz = 60.0 * config.explain_minutes, baseline[0].info.sampling_rate_hz
+    recordings, *_ = _recordings(axis, baseline[-MAX_RUNS:], seconds, moving, {}, rate_hz)
+    follow = following(kept)
+    for recording in recordings:
+        follow(recording, Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs))
+
+
 def library_of(config: JointConfig) -> Library:
     """Return the effects that may be a cause: those that come with the package, and the user's.
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.decision.trend.chart import usual_nights
+from opamc_cli.decision.trend.median import median
 from opamc_cli.decision.trend.slope import Slope, nights_until, robust_slope, slope_of_spread
 from opamc_cli.decision.trend.temperature import without_temperature
 from opamc_cli.stages.nightly.alarms.course import days, distances
@@ -31,7 +32,7 @@ def trend_of(
     healthy = np.array([row["state"] == "healthy" for row in rows], dtype=np.bool_)
     warmth = np.array([row["temperature_c"] for row in rows], dtype=np.float64)
     logged = warmth[np.isfinite(warmth)]
-    usual = float(np.median(logged)) if logged.size else math.nan
+    usual = median(logged) if logged.size else math.nan
     effects, log_distances = np.array([row["effect"] or 0.0 for row in rows]), distances(rows)
     nights = days(rows)[changed]
     effect, distance = (
@@ -43,7 +44,7 @@ def trend_of(
         few = slope_of_spread(nights, log_distances[changed], spread)
         if few is None or not few.clear:
             return {}
-        reached = float(np.median(effects[changed][-3:])) >= fault_effect
+        reached = median(effects[changed][-3:]) >= fault_effect
         return {"distance": _rounded(few), "reach": [0, 0] if reached else None}
     reach = nights_until(effect, fault_effect)
     return {

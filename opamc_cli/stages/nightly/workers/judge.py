@@ -14,6 +14,7 @@ from opamc_cli import __version__
 from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
 from opamc_cli.stages import diagnose
 from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.nightly.workers.ahead import look_ahead
 from opamc_cli.stages.nightly.workers.night import (
     AxisResult,
     Input,
@@ -81,6 +82,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
         return ProgramResult(wanted.program, failures=(wanted.missing,))
     # a machine that does not see `out` throws its copies away
     copies = job.copies if job.copies.parent.is_dir() else folder / "copies"
+    kept = None if job.kept is None else KeptResults(job.kept)
     try:
         sides = [
             _laid_out(inputs, folder / role, copies)
@@ -92,10 +94,12 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
                 [sides[1]],
                 job.config,
                 folder / "out",
-                kept=None if job.kept is None else KeptResults(job.kept),
+                kept=kept,
                 figures_of_healthy=False,
                 worded=lambda note: _plain(note, folder),
             )
+            if kept is not None:
+                look_ahead(wanted.baseline, folder / "out", job.config, kept)
         temperatures = _temperatures(folder / "out" / "target" / files.PATTERNS)
         written = {
             files.VERDICT: outcome.verdict_path.read_bytes(),
