@@ -75,6 +75,8 @@ def close(
                 "name": step.term.effect.name,
                 "ties": list(step.ties),
                 "parameters": dict(step.term.parameters),
+                "gain": step.trial.gain,
+                "t_value": step.trial.t_value,
             }
             for step in loop.steps
             if step.named

@@ -95,8 +95,7 @@ class Ways:
             if EXACT * left[first] <= measurement_noise(rest) ** 2:
                 return first  # Noise is all that is left.
             same = {way: _left(fit_terms(one.dataset, found.terms)) for way, one in fits.items()}
-            near = [way for way in same if HALF * same[way] < left[first]]
-            for way in sorted(near, key=lambda way: same[way])[:OTHERS]:
+            for way in sorted(same, key=lambda way: same[way])[:OTHERS]:
                 left[way] = min(left[way], _left(_with_functions(fits[way], functions)))
         best = min(left, key=lambda way: left[way])
         return best if left[best] < (HALF if functions else BETTER) * left[first] else first
