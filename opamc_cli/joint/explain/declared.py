@@ -8,14 +8,12 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
-from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
-from opamc_cli.joint.name.chain import EXACT, chain_of
+from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
-from opamc_cli.signal.motion.smoothing import measurement_noise
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
@@ -26,7 +24,8 @@ ENOUGH = 12_500
 FUNCTIONS = 4
 """Without a name, beside a model that may lack something: 16 leave the least with the same way."""
 OTHERS = 2
-"""Ways besides the first: one would miss a payload of 15 times the noise (0.08 of what is left)."""
+"""Ways beside the first in which they are searched, those in which what it found leaves least: by
+one more a payload of 15 times the noise would be missed (0.08 of what the first way leaves)."""
 JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count: by its own, none near a reversal, a long window is the best."""
 Way = Smoothing | None
@@ -35,10 +34,9 @@ Declared = tuple[tuple[Effect, Term | None], ...]
 
 
 class Ways:
-    """A declared model on recordings, and ways to differentiate these.
+    """A declared model on recordings in time order, at one rate, and ways to differentiate these.
 
-    The recordings are in time order, all at one rate. A way of None is what the noise of each path
-    asks for.
+    A way of None is what the noise of each path asks for.
     """
 
     def __init__(
@@ -63,7 +61,7 @@ class Ways:
             part = excerpts(self._laid[0], track), self._laid[1]
             laid = *part, *grouped_track(*part)
             ways = (None, *smoothings(part[0])) if laid[-1] is not None else ()
-            self._short = {way: _differentiated(*laid, way, ENOUGH, ends=False) for way in ways}
+            self._short = {way: _differentiated(*laid, way, short=True) for way in ways}
         best = self._best_of(None, model)
         return declared_fit(dataset if best is None else self._whole(best), model)
 
@@ -82,18 +80,12 @@ class Ways:
         return _differentiated(*self._laid, *grouped_track(*self._laid), way)
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
-        """Return the way that leaves least beside so many functions, or the first: see HALF.
-
-        They are searched in the first way, and in the OTHERS in which what is found leaves least.
-        """
+        """Return the way that leaves least beside so many functions, or the first: see HALF."""
         fits = {way: declared_fit(dataset, model) for way, dataset in self._short.items()}
         left = {first: np.inf} | {way: _left(fit) for way, fit in fits.items()}
         if functions and first in fits:
             found = _with_functions(fits.pop(first), functions)
             left[first] = min(left[first], _left(found))
-            rest = found.residual_a[found.dataset.sharp.fit]
-            if EXACT * left[first] <= measurement_noise(rest) ** 2:
-                return first  # Noise is all that is left.
             same = {way: _left(fit_terms(one.dataset, found.terms)) for way, one in fits.items()}
             for way in sorted(same, key=lambda way: same[way])[:OTHERS]:
                 left[way] = min(left[way], _left(_with_functions(fits[way], functions)))
@@ -107,14 +99,14 @@ def _differentiated(
     track: Track,
     grouping: Grouping | None,
     smoothing: Way,
-    most: int = MOST_SAMPLES,
-    ends: bool = True,
+    short: bool = False,
 ) -> Dataset:
-    """Differentiate recordings, judged by a first track's samples."""
+    """Differentiate recordings, judged by a first track's samples; by ENOUGH of them if `short`."""
     assert grouping is not None
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
-    return replace(dataset_of(track, grouping, most, ends), smoothing=smoothing)
+    laid = dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
+    return replace(laid, smoothing=smoothing)
 
 
 def _with_functions(fit: Fit, functions: int) -> Fit:

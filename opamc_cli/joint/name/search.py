@@ -229,9 +229,10 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
-    share, _ = child.gain_over(parent)
-    if share < pool.least_share:
-        return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
+    share, t_value = child.gain_over(parent)
+    if share - (error := share / max(t_value, 1.0)) < pool.least_share:
+        told = f"takes {share:.1%} ± {error:.1%} off the held-out error"
+        return f"{told}, {pool.least_share:.0%} is asked"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     effect = child.terms[-1].effect
