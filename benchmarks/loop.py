@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).parent / "sources"))
 from simulator import DECLARED, EFFECTS, ELECTRICAL, Simulated, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -117,7 +117,7 @@ def run_trial(
     )
     full = built_in_library()
     terms = tuple((full[name], None) for name in base)
-    before = best_fit([recording], joint, lambda _: terms)
+    before = Ways([recording], joint, lambda _: terms).best_fit()
     if before is None:
         msg = f"seed {seed} moves too little"
         raise TooLittleError(msg)

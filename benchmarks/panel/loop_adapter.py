@@ -1,11 +1,10 @@
 """The one place where the panel calls the package's loop."""
 
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit, fit_anew
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -59,12 +58,12 @@ def close(
     library = built_in_library()
     terms = tuple((library[name], None) for name in declared)
     joint = Joint(*gear) if gear else Joint()
-    ask = laid, joint, lambda _: terms
-    fit = best_fit(*ask, without_rules)
+    ways = Ways(laid, joint, lambda _: terms)
+    fit = ways.best_fit(without_rules)
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)
-    anew = None if "windows" in without_rules else partial(fit_anew, *ask)
+    anew = None if "windows" in without_rules else ways.fit_anew
     loop = close_loop(fit, library, seed, without_rules, anew)
     return Closed(
         loop.rmse_before_a,
@@ -76,6 +75,8 @@ def close(
                 "name": step.term.effect.name,
                 "ties": list(step.ties),
                 "parameters": dict(step.term.parameters),
+                "gain": step.trial.gain,
+                "t_value": step.trial.t_value,
             }
             for step in loop.steps
             if step.named

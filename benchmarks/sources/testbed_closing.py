@@ -8,7 +8,7 @@ import numpy as np
 
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.fit.model import Fit
 from opamc_cli.joint.loop import Loop, close_loop
 from opamc_cli.joint.motion.kinematics import Recording
@@ -79,7 +79,7 @@ def declared_on_testbed(
     )
     library = built_in_library()
     terms = tuple((library[name], None) for name in DECLARED if name not in names)
-    fitted = best_fit([recording], joint, lambda dataset: terms)
+    fitted = Ways([recording], joint, lambda dataset: terms).best_fit()
     assert fitted is not None
     return fitted
 

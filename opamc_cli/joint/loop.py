@@ -91,6 +91,8 @@ class Loop:
     """Share of the ceiling that named effects reach, 0 to 1."""
     remaining_domain: str | None
     """Where something without a name is left."""
+    unconfirmed: tuple[str, ...]
+    """Effects of the library, found in the open data, that do not hold on the sealed ones."""
     asked: tuple[Term, ...] = ()
     """Named effects before any was dropped for the error that it raised."""
 
@@ -228,6 +230,7 @@ def _opened(
         steps = [one for one in steps if one.named and hold]
         after, rmse_named = (named, rmse_named) if hold else (before, rmse_before)
         rmse_after = rmse_named
+    unconfirmed = tuple(t.term.effect.name for t in refused if not t.term.effect.unnamed)
     added = {one.term.effect.name for one in [step.trial for step in steps] + refused}
     # What is above the noise may all be there to explain, where functions tell nothing for certain.
     final = after.residual_a[after.dataset.sharp.fit]
@@ -245,7 +248,7 @@ def _opened(
         verdict = "closed" if reached >= EXACT and predicts else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
-        unknown |= not at_noise and any(not one.term.effect.unnamed for one in refused)
+        unknown |= not at_noise and bool(unconfirmed)
         verdict = "not-in-library" if unknown else "nothing-missing"
         reached = 0.0 if verdict == "not-in-library" else 1.0
     domain = None
@@ -271,6 +274,7 @@ def _opened(
         noise_a=noise_a,
         explained_share=float(np.clip(reached, 0.0, 1.0)),
         remaining_domain=domain,
+        unconfirmed=unconfirmed,
     )
 
 

@@ -1,13 +1,12 @@
 """Simulate a joint and close the loop on it."""
 
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 from simulator import DECLARED, simulate
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit, fit_anew
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
@@ -30,13 +29,12 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
         temperature_c=made.temperature,
     )
     joint = Joint(made.gear_ratio, made.pole_pairs)
-    anew = partial(fit_anew, [recording], joint, terms_of(base))
-    fitted = fit_declared([recording], joint, base)
-    return made, close_loop(fitted, built_in_library(without), seed, anew=anew)
+    ways = Ways([recording], joint, terms_of(base))
+    return made, close_loop(ways.best_fit(), built_in_library(without), seed, anew=ways.fit_anew)
 
 
 def fit_declared(recordings, joint=None, base=DECLARED):
-    fitted = best_fit(recordings, joint or Joint(), terms_of(base))
+    fitted = Ways(recordings, joint or Joint(), terms_of(base)).best_fit()
     assert fitted is not None
     return fitted
 

@@ -13,7 +13,7 @@ import pytest
 
 from opamc_cli.config.testbed import load_testbed
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -47,7 +47,7 @@ def close(names, **options):
     known, session = recording(**options)
     library = built_in_library()
     declared = tuple((library[name], None) for name in names)
-    return close_loop(best_fit([session], known, lambda _: declared), library, SEED)
+    return close_loop(Ways([session], known, lambda _: declared).best_fit(), library, SEED)
 
 
 @pytest.mark.long
@@ -62,6 +62,6 @@ def test_a_declared_effect_takes_the_best_of_its_forms():
     known, session = recording()
     library = built_in_library()
     declared = tuple((library[name], None) for name in (*RIGID, "load_friction"))
-    fitted = best_fit([session], known, lambda _: declared)
+    fitted = Ways([session], known, lambda _: declared).best_fit()
     # Half of the inertia is the rotor's, whose torque does not pass the gear.
     assert fitted.terms[-1].parameters["inertia_share"] == pytest.approx(0.5)

@@ -132,7 +132,7 @@ def close(
         *(str(published(path)) for path in outcome.written),
     )
     for entry in outcome.results:
-        if quiet and entry["fails"]:
+        if quiet and (entry["fails"] or entry["unconfirmed"]):
             output.failure(headline(entry))
     _end(outcome, output)
 

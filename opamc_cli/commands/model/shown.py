@@ -63,9 +63,7 @@ def _headline(result: Mapping[str, Any]) -> str:
     from opamc_cli.stages.report import wording
 
     error = f"error {before} → {after} {unit}"
-    fails = "".join(
-        f"; {why}" for why in (result.get("fails"), wording.sealed_apart(result)) if why
-    )
+    fails = "".join(f"; {why}" for why in wording.unreliable(result))
     functions = wording.without_name(steps)
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
@@ -82,7 +80,8 @@ def _headline(result: Mapping[str, Any]) -> str:
         noise, left = result.get("noise_a"), wording.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
         if left is None:
-            said = f"Axis {axis} lacks nothing worth naming: error {before} {unit}{of_it}"
+            lacks = "nothing for certain" if result.get("unconfirmed") else "nothing worth naming"
+            said = f"Axis {axis} lacks {lacks}: error {before} {unit}{of_it}"
             return f"{said}{fails}"
         check = ""
         if wording.beyond_noise(result, wording.FAR_ABOVE_NOISE) is not None:

@@ -2,21 +2,18 @@
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
-from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
-from opamc_cli.joint.name.chain import EXACT, chain_of
+from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, candidates
-from opamc_cli.signal.motion.smoothing import measurement_noise
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
@@ -26,6 +23,9 @@ ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4
 """Without a name, beside a model that may lack something: 16 leave the least with the same way."""
+OTHERS = 2
+"""Ways beside the first in which they are searched, those in which what it found leaves least: by
+one more a payload of 15 times the noise would be missed (0.08 of what the first way leaves)."""
 JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count: by its own, none near a reversal, a long window is the best."""
 Way = Smoothing | None
@@ -33,94 +33,89 @@ Declared = tuple[tuple[Effect, Term | None], ...]
 """Effects, with their terms where parameters are given."""
 
 
-def best_fit(
-    recordings: list[Recording],
-    joint: Joint,
-    declared: Callable[[Dataset], Declared],
-    without_rules: Collection[str] = (),
-) -> Fit | None:
-    """Fit a declared model to recordings, differentiated in the way that predicts best.
+class Ways:
+    """A declared model on recordings in time order, at one rate, and ways to differentiate these.
 
-    The recordings are in time order, all at one rate; the rule "windows" may be switched off. None
-    where too little moves to seal anything off.
+    A way of None is what the noise of each path asks for.
     """
-    track, grouping = grouped_track(recordings, joint)
-    if grouping is None or not is_moving(track):
-        return None
-    dataset = dataset_of(track, grouping)
-    model = declared(dataset)
-    if "windows" in without_rules or not smoothings(recordings):
-        return declared_fit(dataset, model)
-    best = _Ways(excerpts(recordings, track), joint).best_of(None, model)
-    if best is None:
-        return declared_fit(dataset, model)
-    return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
 
+    def __init__(
+        self, recordings: list[Recording], joint: Joint, declared: Callable[[Dataset], Declared]
+    ) -> None:
+        self._laid = recordings, joint
+        self._declared = declared
+        self._short: dict[Way, Dataset] = {}
 
-def fit_anew(
-    recordings: list[Recording],
-    joint: Joint,
-    declared: Callable[[Dataset], Declared],
-    before: Fit,
-    found: Sequence[Term] = (),
-) -> Fit | None:
-    """Fit a declared model anew, to the motion that predicts best beside terms that were found.
+    def best_fit(self, without_rules: Collection[str] = ()) -> Fit | None:
+        """Fit the model to what is differentiated in the way that predicts best.
 
-    Before any is, beside functions without a name: what fits best as declared may have smoothed
-    away what something missing answers to. None if it is the motion of the fit `before`.
-    """
-    if not smoothings(recordings):
-        return None
-    present, model = before.dataset.smoothing, declared(before.dataset)
-    track, grouping = grouped_track(recordings, joint)
-    beside = (*model, *((term.effect, term) for term in found))
-    ways = _Ways(excerpts(recordings, track), joint)
-    best = ways.best_of(present, beside, 0 if found else FUNCTIONS)
-    if best == present or grouping is None:
-        return None
-    return declared_fit(_differentiated(recordings, joint, track, grouping, best), model)
+        The rule "windows" may be switched off. None where too little moves to seal anything off.
+        """
+        track, grouping = grouped_track(*self._laid)
+        if grouping is None or not is_moving(track):
+            return None
+        dataset = dataset_of(track, grouping)
+        model = self._declared(dataset)
+        self._short = {}
+        if "windows" not in without_rules and smoothings(self._laid[0]):
+            part = excerpts(self._laid[0], track), self._laid[1]
+            laid = *part, *grouped_track(*part)
+            ways = (None, *smoothings(part[0])) if laid[-1] is not None else ()
+            self._short = {way: _differentiated(*laid, way, short=True) for way in ways}
+        best = self._best_of(None, model)
+        return declared_fit(dataset if best is None else self._whole(best), model)
+
+    def fit_anew(self, before: Fit, found: Sequence[Term] = ()) -> Fit | None:
+        """Fit the model anew, to the motion that predicts best beside terms that were found.
+
+        Before any is, beside functions without a name: what fits best as declared may have smoothed
+        away what something missing answers to. None if it is the motion of the fit `before`.
+        """
+        present, model = before.dataset.smoothing, self._declared(before.dataset)
+        beside = (*model, *((term.effect, term) for term in found))
+        best = self._best_of(present, beside, 0 if found else FUNCTIONS)
+        return None if best == present else declared_fit(self._whole(best), model)
+
+    def _whole(self, way: Way) -> Dataset:
+        return _differentiated(*self._laid, *grouped_track(*self._laid), way)
+
+    def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
+        """Return the way that leaves least beside so many functions, or the first: see HALF."""
+        fits = {way: declared_fit(dataset, model) for way, dataset in self._short.items()}
+        left = {first: np.inf} | {way: _left(fit) for way, fit in fits.items()}
+        if functions and first in fits:
+            found = _with_functions(fits.pop(first), functions)
+            left[first] = min(left[first], _left(found))
+            same = {way: _left(fit_terms(one.dataset, found.terms)) for way, one in fits.items()}
+            for way in sorted(same, key=lambda way: same[way])[:OTHERS]:
+                left[way] = min(left[way], _left(_with_functions(fits[way], functions)))
+        best = min(left, key=lambda way: left[way])
+        return best if left[best] < (HALF if functions else BETTER) * left[first] else first
 
 
 def _differentiated(
     recordings: list[Recording],
     joint: Joint,
     track: Track,
-    grouping: Grouping,
+    grouping: Grouping | None,
     smoothing: Way,
-    most: int = MOST_SAMPLES,
-    ends: bool = True,
+    short: bool = False,
 ) -> Dataset:
-    """Differentiate recordings, judged by a first track's samples."""
+    """Differentiate recordings, judged by a first track's samples; by ENOUGH of them if `short`."""
+    assert grouping is not None
     if smoothing is not None:
         track = judged_alike(build_track(recordings, joint, smoothing), track)
-    return replace(dataset_of(track, grouping, most, ends), smoothing=smoothing)
+    laid = dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
+    return replace(laid, smoothing=smoothing)
 
 
-class _Ways:
-    """Ways to differentiate recordings; None is what the noise of each path asks for."""
+def _with_functions(fit: Fit, functions: int) -> Fit:
+    pool = with_links(Pool.of(fit.dataset, unnamed_library()))
+    return saturated(chain_of(fit, 0), pool, functions).fit
 
-    def __init__(self, recordings: list[Recording], joint: Joint) -> None:
-        track, grouping = grouped_track(recordings, joint)
-        self._ways: list[Way] = []
-        if grouping is not None:
-            self._ways = [None, *smoothings(recordings)]
-            laid = recordings, joint, track, grouping
-            self._dataset = partial(_differentiated, *laid, ends=False)
 
-    def best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
-        """Return the way that leaves least beside so many functions, or the first: see HALF."""
-        left: dict[Way, float] = {first: np.inf}
-        for way in sorted(self._ways, key=lambda way: way != first):
-            fits = [declared_fit(self._dataset(way, ENOUGH), model)]
-            if functions:
-                pool = with_links(Pool.of(fits[0].dataset, unnamed_library()))
-                fits.append(saturated(chain_of(fits[0], 0), pool, functions).fit)
-            left[way] = min(fit.rmse(sealed=False) for fit in fits) ** 2
-            rest = fits[-1].residual_a[fits[-1].dataset.sharp.fit]
-            if functions and EXACT * left[way] <= measurement_noise(rest) ** 2:
-                break  # Noise is all that is left.
-        least = min(left, key=lambda way: left[way])
-        return least if left[least] < (HALF if functions else BETTER) * left[first] else first
+def _left(fit: Fit) -> float:
+    return fit.rmse(sealed=False) ** 2
 
 
 def judged_alike(other: Track, track: Track) -> Track:

@@ -229,12 +229,13 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
 
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
-    share, _ = child.gain_over(parent)
-    if share < pool.least_share:
-        return f"takes {share:.1%} off the held-out error, {pool.least_share:.0%} is asked"
+    share, t_value = child.gain_over(parent)
+    effect = child.terms[-1].effect
+    error = 0.0 if effect.unnamed else share / max(t_value, 1.0)  # Those claim nothing.
+    if share - error < (least := pool.least_share):
+        return f"takes {share:.1%} ± {error:.1%} off the held-out error, {least:.0%} is asked"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
-    effect = child.terms[-1].effect
     drifts = effect.changes_in_time and "drift" not in pool.without
     if drifts and child.no_more_than_drift(parent, pool.least_share):
         return "slow noise explains it as well: within parts of the data nothing speaks for it"

@@ -45,9 +45,9 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
         if not term.effect.unnamed:
             parent = without(best, place)
             # What an effect ties with is of interest once nothing changes any more.
-            others = trials(parent, pool) if changed is None else []
+            others = trials(parent, pool, {best.signature}) if changed is None else []
             ties = ties_of(best, term.effect.name, others)
-            told = tuple(other.told for other in others if other.chain.signature != best.signature)
+            told = tuple(one.told for one in others)
             named.append(Named(_trial(parent, best, term, pool), told, ties))
     return best, named
 

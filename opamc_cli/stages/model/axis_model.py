@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -10,7 +9,7 @@ from opamc_cli.config.joint_model import DeclaredEffect, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
-from opamc_cli.joint.explain.declared import Declared, best_fit, fit_anew
+from opamc_cli.joint.explain.declared import Declared, Ways
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
 from opamc_cli.joint.loop import Anew
@@ -134,12 +133,12 @@ def lay(
         track = dataset.coarse.track
         return tuple((effect, declared_term(effect, entry, track)) for effect, entry in declared)
 
-    fit = best_fit(recordings, joint, on)
+    ways = Ways(recordings, joint, on)
+    fit = ways.best_fit()
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    anew = partial(fit_anew, recordings, joint, on)
-    return AxisModel(axis, fit, anew, declared, allowed, read)
+    return AxisModel(axis, fit, ways.fit_anew, declared, allowed, read)
 
 
 def declared_effects(

@@ -230,6 +230,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
             }
             for rejected in loop.rejected
         ],
+        "unconfirmed": [*loop.unconfirmed],
         "untestable": [{"effect": name, "why": why} for name, why in loop.untestable.items()],
         "verdict": loop.verdict,
         "domain": loop.remaining_domain,

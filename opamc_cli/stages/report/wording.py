@@ -329,14 +329,31 @@ SEALED_APART = 1.5
 whose friction steps once 1.8; 20 measured ones 0.7 to 1.5."""
 
 
-def sealed_apart(entry: Mapping[str, Any]) -> str | None:
-    """Return that the sealed data are explained far worse than those searched, where they are.
+def unreliable(entry: Mapping[str, Any]) -> list[str]:
+    """Return why what was found of a joint may not hold, each in a sentence without its stop.
 
     Parameters
     ----------
     entry
         One object of loop.json's `axes`.
     """
+    reasons = entry.get("fails"), _sealed_apart(entry), _unconfirmed(entry)
+    return [why for why in reasons if why]
+
+
+def _unconfirmed(entry: Mapping[str, Any]) -> str | None:
+    gains = {one.get("effect"): one.get("gain", 0.0) for one in entry.get("rejected", ())}
+    told = [f"{n} ({gains.get(n, 0.0):.0%} of the error)" for n in entry.get("unconfirmed", ())]
+    if not told:
+        return None
+    return (
+        f"the data that were searched show {' and '.join(told)}, the sealed ones do not: record "
+        "more motion to tell"
+    )
+
+
+def _sealed_apart(entry: Mapping[str, Any]) -> str | None:
+    """Return that the sealed data are explained far worse than those searched, where they are."""
     after = entry.get("after") or {}
     sealed, searched = after.get("rmse_a"), after.get("searched_rmse_a")
     if not sealed or not searched or entry.get("fails") or sealed <= SEALED_APART * searched:
@@ -480,6 +497,6 @@ def remains(entry: Mapping[str, Any]) -> str:
     ]
     if domains:
         parts.append(f"what is left has structure over {', '.join(domains)}")
-    parts += [said for said in (entry.get("fails"), sealed_apart(entry)) if said]
+    parts += unreliable(entry)
     text = "; ".join(parts) or "loop.json does not say"
     return text[0].upper() + text[1:] + "."

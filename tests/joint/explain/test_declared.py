@@ -5,7 +5,7 @@ import pytest
 from closing import MODEL, close_on, joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.explain.declared import best_fit, declared_fit
+from opamc_cli.joint.explain.declared import Ways, declared_fit
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
@@ -74,7 +74,7 @@ def rest(seconds=10.0):
 
 
 def test_a_joint_at_rest_has_no_fit():
-    assert best_fit([rest()], Joint(), lambda dataset: declared(*BASE)) is None
+    assert Ways([rest()], Joint(), lambda dataset: declared(*BASE)).best_fit() is None
 
 
 @pytest.mark.parametrize("motion", ["cyclic", "steps of torque"])
@@ -83,7 +83,8 @@ def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(m
     seen = 1e-4 * np.round(made.position_rad / 1e-4)
     recording = Recording("run", made.rate_hz, current_a=made.current_a, position_rad=seen)
     ask = [recording], Joint(), lambda dataset: declared(*BASE)
-    best, plain = best_fit(*ask), best_fit(*ask, without_rules=("windows",))
+    ways = Ways(*ask)
+    best, plain = ways.best_fit(), ways.best_fit(without_rules=("windows",))
     one, other = best.dataset.fine.track, plain.dataset.fine.track
     assert one.kernel.size != other.kernel.size
     np.testing.assert_array_equal(one.moving, other.moving)
@@ -107,7 +108,8 @@ def test_a_window_does_not_smooth_away_what_something_missing_answers_to(hidden,
 
 def test_without_a_reason_the_window_stays():
     ask = [joint_of("cyclic", None)], Joint(), lambda dataset: declared(*BASE)
-    best, plain = best_fit(*ask), best_fit(*ask, without_rules=("windows",))
+    ways = Ways(*ask)
+    best, plain = ways.best_fit(), ways.best_fit(without_rules=("windows",))
     assert best.dataset.fine.track.kernel.size == plain.dataset.fine.track.kernel.size
     coulomb, viscous = best.coefficients[2], best.coefficients[3]
     assert coulomb == pytest.approx(MODEL["coulomb"], rel=0.02)

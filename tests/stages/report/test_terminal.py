@@ -154,6 +154,17 @@ def test_an_error_that_is_mostly_noise_lacks_nothing_worth_naming(error: float) 
     assert loop_phrase(entry) == "nothing worth naming is missing"
 
 
+def test_what_the_sealed_data_do_not_bear_out_is_said_where_nothing_was_added() -> None:
+    rejected = [{"effect": "inertia", "gain": 0.59, "why": "does not hold on the sealed data"}]
+    entry = left_alone(0.0204, 0.02) | {"unconfirmed": ["inertia"], "rejected": rejected}
+    assert headline(entry).startswith("Axis 2 lacks nothing for certain: error 0.0204 A")
+    assert headline(entry).endswith(
+        "; the data that were searched show inertia (59% of the error), the sealed ones do not: "
+        "record more motion to tell"
+    )
+    assert "the sealed ones do not" in remains(entry)
+
+
 def step(effect: str, interpretation: str) -> dict[str, Any]:
     return {"effect": effect, "interpretation": interpretation}
 
