@@ -1,6 +1,7 @@
 """`opamc model` on run files, and what it says where it cannot."""
 
 import json
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.signal.motion.signs import friction_drives
+from opamc_cli.stages.model import model as stage
 
 MODEL = (
     "joint: {gear_ratio: null, pole_pairs: null}\neffects: [inertia, gravity, coulomb, viscous]\n"
@@ -74,6 +76,23 @@ def test_a_fit_that_fails_on_the_sealed_data_is_said_also_if_quiet(tmp_path, cap
     assert "times that of the rest: the fit fails there" in said.err
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     assert entry["fails"] in said.err
+
+
+def test_what_the_sealed_data_do_not_show_is_said_also_if_quiet(tmp_path, capsys, monkeypatch):
+    made = simulate(3, (), rate=250.0, cycles=5)
+    write_run(
+        tmp_path / "run.parquet", 250.0, axis1_current=made.current, axis1_position=made.position
+    )
+    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    assert capsys.readouterr().err == ""
+    true = stage.close_loop
+    monkeypatch.setattr(
+        stage, "close_loop", lambda *a, **k: replace(true(*a, **k), unconfirmed=("spring",))
+    )
+    assert close(tmp_path, "--quiet", model=MODEL) == 5
+    assert "searched show spring" in capsys.readouterr().err
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert (entry["verdict"], entry["unconfirmed"]) == ("nothing-missing", ["spring"])
 
 
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):

@@ -134,7 +134,9 @@ def close(
     for entry in outcome.results:
         if quiet and (entry["fails"] or entry["unconfirmed"]):
             output.failure(headline(entry))
-    _end(outcome, output)
+    # Nothing may be missing, or something of which the sealed data hold nothing.
+    unknown = any(e["unconfirmed"] and e["verdict"] == "nothing-missing" for e in outcome.results)
+    _end(outcome, output, ExitCode.NOT_ENOUGH_DATA if unknown else ExitCode.DONE)
 
 
 @app.command()
