@@ -47,13 +47,15 @@ def exchanged_joints(
     if not bad or tables[0] is None or tables[1] is None:
         return {}
     known = _courses(tables[0])
+    news: dict[str, Courses] = {}
     found: dict[int, tuple[str, ...]] = {}
     for pair in combinations(sorted(known), 2):
         if not bad & set(pair):
             continue
         # one night alone may have them exchanged
         runs = min((targets[axis] for axis in pair if axis in targets), key=len)
-        alike = [_exchanged(_courses(tables[1], run), known, pair) for run in runs]
+        news |= {run: _courses(tables[1], run) for run in runs if run not in news}
+        alike = [_exchanged(news[run], known, pair) for run in runs]
         if sum(alike) > len(alike) / 2:
             why = (
                 f"The target's currents of axes {pair[0]} and {pair[1]} each follow the other's "
