@@ -45,12 +45,13 @@ def _place(fig: Canvas) -> None:
     grid = next(iter(spans.values())).get_gridspec()
     left, right = [0.0] * grid.ncols, [0.0] * grid.ncols
     top, bottom = [0.0] * grid.nrows, [0.0] * grid.nrows
+    under = {panel: _tick_labels(panel.xaxis, "bottom") for panel in spans}
     for panel, spec in spans.items():
         if panel.get_visible() and panel.axison:
             _widen(left, spec.colspan.start, _beside(panel))
-            _widen(right, spec.colspan.stop - 1, _after(panel))
+            _widen(right, spec.colspan.stop - 1, _after(under[panel]))
             _widen(top, spec.rowspan.start, _above(panel))
-            _widen(bottom, spec.rowspan.stop - 1, _below(panel))
+            _widen(bottom, spec.rowspan.stop - 1, _below(panel, under[panel]))
     legend = _lines(1) + EDGE_PT if fig.legends else 0.0
     wide = (width - 2 * EDGE_PT - sum(left) - sum(right)) / grid.ncols
     high = (height - 2 * EDGE_PT - legend - sum(top) - sum(bottom)) / grid.nrows
@@ -68,7 +69,7 @@ def _place(fig: Canvas) -> None:
         panel.set_position((x[0] / width, 1 - y[1] / height, (x[1] - x[0]) / width, tall / height))
         panel.set_title(panel.get_title("left"), loc="left", y=1 + _lines(_factors(panel)) / tall)
         # else matplotlib measures every tick's label to find the place of the axis's name
-        panel.xaxis.set_label_coords(0.5, -_ticks_below(panel) / tall)
+        panel.xaxis.set_label_coords(0.5, -_ticks_below(under[panel]) / tall)
         panel.yaxis.set_label_coords(-_ticks_beside(panel) / (x[1] - x[0]), 0.5)
 
 
@@ -86,9 +87,9 @@ def _ticks_beside(panel: Axes) -> float:
     return TICK_PT + _width(labels) if labels else 0.0
 
 
-def _after(panel: Axes) -> float:
+def _after(labels: Sequence[str]) -> float:
     # half of the last tick's label reaches over the panel's end
-    return EDGE_PT + 0.5 * _width(_tick_labels(panel.xaxis, "bottom"))
+    return EDGE_PT + 0.5 * _width(labels)
 
 
 def _above(panel: Axes) -> float:
@@ -100,13 +101,13 @@ def _factors(panel: Axes) -> int:
     return int(bool(panel.yaxis.get_major_formatter().get_offset()))
 
 
-def _below(panel: Axes) -> float:
+def _below(panel: Axes, labels: Sequence[str]) -> float:
     name = bool(panel.get_xlabel())
-    return EDGE_PT + _lines(name) + _ticks_below(panel)
+    return EDGE_PT + _lines(name) + _ticks_below(labels)
 
 
-def _ticks_below(panel: Axes) -> float:
-    return _lines(1) + TICK_PT if _tick_labels(panel.xaxis, "bottom") else 0.0
+def _ticks_below(labels: Sequence[str]) -> float:
+    return _lines(1) + TICK_PT if labels else 0.0
 
 
 def _tick_labels(axis: Axis, side: str) -> Sequence[str]:
