@@ -134,7 +134,7 @@ def score_table(sides: Sides, base: float) -> pa.Table:
     overlapping patterns would show by themselves, `excess` the rest.
     """
     baseline, target = sides.rows
-    tables = [SCORES.empty_table()]
+    parts = []
     for key in common_keys(baseline, target):
         own, other = baseline[key], target[key]
         several = len(np.unique(own.sessions)) > 1
@@ -144,7 +144,7 @@ def score_table(sides: Sides, base: float) -> pa.Table:
         _, place = np.unique(label, return_inverse=True)
         n_rest = pool.sum() - np.bincount(place, n_own)[place]
         inflation = sides.inflations[key]
-        tables.append(
+        parts.append(
             _score_rows(
                 "baseline",
                 own,
@@ -156,7 +156,7 @@ def score_table(sides: Sides, base: float) -> pa.Table:
             )
         )
         n_other = other.counts.sum(axis=1)
-        tables.append(
+        parts.append(
             _score_rows(
                 "target",
                 other,
@@ -167,7 +167,14 @@ def score_table(sides: Sides, base: float) -> pa.Table:
                 base,
             )
         )
-    return pa.concat_tables(tables).combine_chunks()
+    if not parts:
+        return SCORES.empty_table()
+    # to make a table of each and put these together takes most of a comparison
+    columns = {
+        name: pa.array(np.concatenate([part[name] for part in parts]), from_pandas=True)
+        for name in SCORES.names
+    }
+    return pa.table(columns).cast(SCORES)
 
 
 def feature_table(
@@ -226,22 +233,21 @@ def _score_rows(
     left_out: str,
     chance: npt.NDArray[np.float64],
     base: float,
-) -> pa.Table:
+) -> dict[str, npt.NDArray[Any]]:
     n = len(jsd)
-    columns: dict[str, Any] = {
-        "role": [role] * n,
+    return {
+        "role": np.full(n, role),
         **{
             name: part.rows[name]
             for name in ("run", "axis", "cycle", "motion", "segment", "order", "tau", "n_patterns")
         },
         "n_pool": n_pool.astype(np.int64),
-        "left_out": [left_out] * n,
-        "jsd": pa.array(jsd, from_pandas=True),
-        "chance": pa.array(chance, from_pandas=True),
-        "excess": pa.array(jsd - chance, from_pandas=True),
+        "left_out": np.full(n, left_out),
+        "jsd": jsd,
+        "chance": chance,
+        "excess": jsd - chance,
         "base": np.full(n, base),
     }
-    return pa.table(columns).select(SCORES.names).cast(SCORES)
 
 
 def _chance(
