@@ -159,7 +159,7 @@ def _encoded(result: object) -> bytes:
     tree = json.dumps(_tree(result, tables), allow_nan=True).encode()
     sink = pa.BufferOutputStream()
     for table in tables:
-        options = pa.ipc.IpcWriteOptions(compression="zstd")
+        options = pa.ipc.IpcWriteOptions(compression="lz4")
         with pa.ipc.new_stream(sink, table.schema, options=options) as writer:
             writer.write_table(table)
     return tree + b"\n" + bytes(sink.getvalue())
