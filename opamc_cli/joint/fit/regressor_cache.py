@@ -1,7 +1,6 @@
 """What fits of the same recordings share: regressors that do not follow the model, and products."""
 
 from collections.abc import Callable, Hashable, Sequence
-from itertools import chain
 
 import numpy as np
 
@@ -26,18 +25,11 @@ class RegressorCache:
         self._taken: dict[tuple[int, bool, int], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
-        # What is kept, by identity, and how large its owners are: to look through all of it for
-        # every set of terms took a seventh of a cause.
-        self._own: set[int] = set()
-        self._sizes: dict[int, int] = {}
-        self._passing = False
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
         if key not in self._columns:
-            self._columns[key] = block = compute()
-            self._own.add(id(block))
-            self._count(block)
+            self._columns[key] = compute()
         return self._columns[key]
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
@@ -46,10 +38,7 @@ class RegressorCache:
         Of one grid, current, shape (n,), and parts are the same in every call.
         """
         self._bounded()
-        if fine not in self._currents:
-            self._currents[fine] = current[:, None]
-            self._own.add(id(self._currents[fine]))
-        every = [*blocks, self._currents[fine]]
+        every = [*blocks, self._currents.setdefault(fine, current[:, None])]
         for i, block in enumerate(every):
             missing = [
                 other
@@ -77,24 +66,19 @@ class RegressorCache:
             rows = rows if every == 1 else np.asfortranarray(rows[::every])
             # The block itself is kept beside its rows, so that its identity stays its own.
             self._taken[key] = (block, rows)
-            self._passing |= id(block) not in self._own
-            self._count(block, rows)
         return self._taken[key][1]
-
-    def _count(self, *blocks: Floats) -> None:
-        """Add to what is kept; rows may be a view of the block, and both of what was computed."""
-        owners = (block if block.base is None else block.base for block in blocks)
-        self._sizes |= {id(one): one.nbytes for one in owners}
 
     def _bounded(self) -> None:
         """Forget what follows the model, which nothing meets again; all where it is too much."""
-        if self._passing:
-            own = self._own
-            self._taken = {key: pair for key, pair in self._taken.items() if key[0] in own}
-            pairs = [key for key in self._products if own.issuperset(key[:2])]
+        kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
+        # Products are known by their blocks. To look through all of them took a sixth of a cause.
+        if not kept.issuperset(key[0] for key in self._taken):
+            self._taken = {key: pair for key, pair in self._taken.items() if key[0] in kept}
+            pairs = [key for key in self._products if kept.issuperset(key[:2])]
             self._products = {key: self._products[key] for key in pairs}
-            self._sizes, self._passing = {}, False
-            self._count(*self._columns.values(), *chain.from_iterable(self._taken.values()))
-        settled = chain.from_iterable(self.settled.values())
-        if sum((self._sizes | {id(one): one.nbytes for one in settled}).values()) > MOST_BYTES:
+        fitted = (one for pair in (*self._taken.values(), *self.settled.values()) for one in pair)
+        # Rows may be a view of the block, and both of what was computed.
+        every = (*self._columns.values(), *fitted)
+        owners = (block if block.base is None else block.base for block in every)
+        if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()
