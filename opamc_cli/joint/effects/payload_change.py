@@ -37,7 +37,8 @@ class PayloadChange(Effect):
         if not times.size or track.comes_back:
             times = np.linspace(first, last, GUESSES)
         steps = [{"since_s": float(time)} for time in times if first <= time <= last]
-        pairs = combinations(_rests(track), 2)
+        # Where phases follow the joint, half turns that are lost from rest to rest look the same.
+        pairs = combinations(_rests(track) if "logged" in track.channels else (), 2)
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:

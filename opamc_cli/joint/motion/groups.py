@@ -9,6 +9,7 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 REPEAT_ERROR = 0.02
 LONGEST_SHARE = 0.7
+FEWEST_PAIRS = 0.5  # Of what is known at both times where the gaps lie alike.
 BLOCKS = 12
 FEWEST_CYCLES = 6
 """Two of six are sealed: nothing tells when a payload changed in a sealed one, and if it is all
@@ -42,17 +43,19 @@ class Grouping:
         return tuple(g for g in range(len(self.names)) if g not in self.sealed)
 
 
-def cycle_length(*paths: Floats) -> int | None:
+def cycle_length(*paths: Floats, known: Bools | None = None) -> int | None:
     """Shortest lag, in samples, at which the speed (or position) of a recording repeats itself.
 
-    None where it does not. A lag counts if the mean square of ``path[t + lag] - path[t]`` is below
-    2 % of twice the variance, up to 70 % of the recording; of such neighbours the best. Of several
-    joints' paths, (n,) each, all have to repeat themselves at once.
+    None where it does not. A lag counts if the mean square of ``path[t + lag] - path[t]``, where
+    both are `known`, (n,), is below 2 % of twice the variance, up to 70 % of the recording; of such
+    neighbours the best. All of several joints' paths, (n,) each, have to repeat at once.
     """
-    n, variances = paths[0].size, [float(np.var(path)) for path in paths]
+    n = paths[0].size
+    counts = np.ones(n, dtype=bool) if known is None else known
+    variances = [float(np.var(path[counts])) if counts.any() else 0.0 for path in paths]
     if n < 16 or min(variances) <= 0:
         return None
-    every = [_mismatch(path) / (2 * of) for path, of in zip(paths, variances, strict=True)]
+    every = [_mismatch(path, counts) / (2 * of) for path, of in zip(paths, variances, strict=True)]
     mismatch = np.max(every, axis=0)[: int(n * LONGEST_SHARE)]
     # Everything looks alike at short lags: first leave that neighbourhood.
     away = int(np.argmax(mismatch > 0.5))
@@ -63,16 +66,16 @@ def cycle_length(*paths: Floats) -> int | None:
     return int(alike[0] + np.argmin(near))
 
 
-def _mismatch(path: Floats) -> Floats:
-    """Mean square of ``path[t + lag] - path[t]`` for every lag below n, by one correlation."""
-    n = path.size
-    centred = path - path.mean()
+def _mismatch(path: Floats, counts: Bools) -> Floats:
+    """Mean square of ``path[t + lag] - path[t]`` for every lag below n, infinite of too few."""
+    n, lags = path.size, np.arange(path.size)
+    centred = np.where(counts, path - path[counts].mean(), 0.0)
     length = next_fast_len(2 * n, real=True)
-    products = irfft(np.abs(rfft(centred, length)) ** 2, length)[:n]
-    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
-    lags = np.arange(n)
-    overlap = n - lags
-    return np.asarray((squares[overlap] + squares[n] - squares[lags] - 2 * products) / overlap)
+    ones, values, squares = (rfft(one, length) for one in (1.0 * counts, centred, centred**2))
+    both = irfft(np.abs(ones) ** 2, length)[:n]
+    sums = 2 * irfft((np.conj(ones) * squares).real - np.abs(values) ** 2, length)[:n]
+    enough = both >= FEWEST_PAIRS * np.mean(counts) * (n - lags)
+    return np.where(enough, sums / np.maximum(both, 1.0), np.inf)
 
 
 def group_samples(

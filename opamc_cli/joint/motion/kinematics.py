@@ -110,11 +110,9 @@ class Motion:
     kernel: Floats
     """Moving average that the acceleration has gone through."""
     blur: Floats | None = None
-    """What the acceleration would gain or lose by a third and by three times the window; (n, 2) or
-    None."""
+    """What it would gain or lose by a third and by three times the window; (n, 2) or None."""
     taken_noise: float = 0.0
-    """Standard deviation of the noise in what the window would take from the acceleration a second
-    time; 0 where it is not known."""
+    """Standard deviation of noise in what the window would take a second time; 0: not known."""
     evenly_smooth: bool = False
     """True where position and speed have gone through the same."""
 
@@ -134,8 +132,7 @@ def motion_from_position(
 ) -> Motion:
     """Position, speed and acceleration by Savitzky-Golay filters of the shortest clean window.
 
-    A logged speed, (n,) beside the position, is used where it agrees with it and is the cleaner
-    one.
+    A logged speed, (n,) beside the position, is used where it agrees and is the cleaner one.
     """
     if smoothing is None:
         window = smoothing_window(position_rad, rate_hz, derivative=2)
@@ -265,7 +262,7 @@ def _one(
         motion, known = _logged_motion(recording, smoothing)
         usable &= known
     elif phase_angle is not None:
-        period = cycle_length(phase_angle.velocity_rad_s)
+        period = cycle_length(phase_angle.velocity_rad_s, known=phase_angle.strong)
         if period is not None:
             phase_angle = without_slips(phase_angle, period, rate)
         motion = _scaled(phase_angle, 1.0 if turns is None else 1.0 / turns)

@@ -269,6 +269,18 @@ def test_time_within_a_recording_is_told_only_where_one_comes_back(waves, clocks
     assert steps > 1 or payloads == [{"since_s": 10.0}]
 
 
+def test_a_payload_is_held_from_rest_to_rest_where_the_position_is_logged():
+    """Half turns that are lost at one rest and found at another displace the load, too."""
+    moves = np.tile(np.repeat([0.0, 1.0, 0.0, -1.0], 250), 6)
+    run = Recording("run", 250.0, current_a=moves, position_rad=np.cumsum(moves) / 250)
+    track = build_track([run], Joint())
+    track = replace(track, period_s=4.0, group=np.zeros(track.size, dtype=np.int64))
+    effect = built_in_library()["payload_change"]
+    assert any("gripped_s" in guess for guess in effect.guesses(track, np.zeros(0)))
+    followed = replace(track, channels=track.channels - {"logged"})
+    assert not any("gripped_s" in guess for guess in effect.guesses(followed, np.zeros(0)))
+
+
 @pytest.mark.parametrize(("begins_s", "since"), [(4.0, 4.0), (8.0, 4.5)])
 def test_a_tool_is_changed_between_recordings_if_nothing_open_tells(begins_s, since):
     """In the middle of what is sealed half of that was predicted with the wrong payload."""

@@ -109,7 +109,8 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
         edges += [float(start), float(stop)]
         slips += [slip, slip]
     correction = np.interp(np.arange(path.size), edges, slips)
-    return replace(angle, angle_rad=path - correction)
+    speed = angle.velocity_rad_s - rate_hz * np.gradient(correction)
+    return replace(angle, angle_rad=path - correction, velocity_rad_s=speed)
 
 
 def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> Floats | None:

@@ -32,10 +32,8 @@ class PhaseAngle:
     acceleration_rad_s2: Floats
     """With `angle_rad`, `velocity_rad_s`: electrical; s of shape (n,)."""
     strong: Bools
-    """Samples with enough current to tell an angle; bool array of shape (n,)."""
     clear: Bools
-    """Samples with enough current for an acceleration that is not mostly noise; bool array of shape
-    (n,)."""
+    """With `strong`: samples with enough current to tell an angle, and an acceleration; (n,)."""
     window: int
     """Samples over which it is smooth."""
     kernel: Floats
