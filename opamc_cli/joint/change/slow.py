@@ -39,8 +39,7 @@ class Population:
     names: tuple[str, ...]
     """Effect of each coefficient."""
     between: float
-    """Variance, in shares of the slow current's power, by which sessions differ beyond what units
-    of one session can show."""
+    """Variance, in shares of the slow current's power, that units of one session cannot show."""
 
     @cached_property
     def precision(self) -> Floats:

@@ -72,8 +72,7 @@ class Effect:
     """True where regressors never look at what was fitted (load, model, static columns): they
     are computed once and kept from one fit to the next."""
     from_terms: bool = False
-    """True where they look at the static columns alone: at which terms there are, not at how they
-    fit."""
+    """True where they look at the static columns alone: at which terms there are, not how large."""
 
     def untestable(self, track: Track) -> str | None:
         """Why the recording cannot show this effect, or None where it can."""

@@ -78,8 +78,7 @@ class Grid:
     """At this grid's rate."""
     fit: Bools
     sealed: Bools
-    """With `fit`: moving samples of the groups that are open, and of those that are sealed; bool
-    arrays of shape (n,)."""
+    """With `fit`: moving samples of groups that are open, and of sealed ones; bool, shape (n,)."""
     parts: Parts
     """The `fit` samples in parts."""
     near: Ints

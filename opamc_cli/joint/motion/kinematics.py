@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.motion.corners import clear_of_corners, widened
 from opamc_cli.joint.motion.groups import cycle_length
@@ -31,6 +32,8 @@ LEAST_CORNER = 0.05 / 3
 SLOWEST_SHARE = 0.02
 """Samples below this share of the top speed do not count: their direction is not certain. Another
 joint that goes less than this share of the way beside is held still."""
+STEADY = 0.9
+"""Share of samples with current over the angle's window, from which on its speed is no guess."""
 LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
 
 
@@ -262,9 +265,10 @@ def _one(
         motion, known = _logged_motion(recording, smoothing)
         usable &= known
     elif phase_angle is not None:
-        period = cycle_length(phase_angle.velocity_rad_s, known=phase_angle.strong)
+        steady = uniform_filter1d(1.0 * phase_angle.strong, phase_angle.window) > STEADY
+        period = cycle_length(phase_angle.velocity_rad_s, known=steady)
         if period is not None:
-            phase_angle = without_slips(phase_angle, period, rate)
+            phase_angle = without_slips(phase_angle, steady, period, rate)
         motion = _scaled(phase_angle, 1.0 if turns is None else 1.0 / turns)
         # Where there is too little current to tell an angle, the motion is a guess.
         usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear

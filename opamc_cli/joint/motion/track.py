@@ -46,8 +46,7 @@ class Track:
     """Half-open (start, stop) of each recording on the grid."""
     time_s: Floats
     run_time_s: Floats
-    """With `time_s`: seconds since the first recording began, and since the sample's own recording
-    began; (n,)."""
+    """With `time_s`: seconds since the first recording began, and since the sample's own; (n,)."""
     current_a: Floats
     """Torque-producing motor current with its sign; (n,)."""
     position_rad: Floats
@@ -68,12 +67,10 @@ class Track:
     coarse grid, where the current is equally smooth, others count as well; at the full rate
     residuals are looked at on these; bool array of shape (n,)."""
     group: Ints
-    """Cycle, recording or block that is left out as one; -1 outside all of them; int array of shape
-    (n,)."""
+    """Cycle, recording or block that is left out as one, -1 outside all of them; int, (n,)."""
     load_a: Floats
     model_a: Floats
-    """With `load_a`: current that carries the load, and the whole fitted current (zero before a
-    fit); (n,)."""
+    """With `load_a`: current that carries the load, and the whole fitted one, 0 at first; (n,)."""
     joint: Joint
     channels: frozenset[str]
     """What was logged or follows from it: position, logged (motion beside the current), scale,
@@ -87,11 +84,9 @@ class Track:
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
     None."""
     kernel: Floats = field(default_factory=lambda: np.ones(1))
-    """Moving average that the acceleration has gone through; the coarse grid puts the current
-    through it too."""
+    """Moving average of the acceleration; the coarse grid puts the current through it too."""
     evenly_smooth: bool = False
-    """True where position and speed have gone through it as well; otherwise the coarse grid puts
-    them through it."""
+    """True where position and speed have gone through it; else the coarse grid does that."""
     blur: Floats | None = None
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2) or None."""
     others: Floats | None = None

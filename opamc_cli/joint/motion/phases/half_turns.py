@@ -25,6 +25,8 @@ REST_MARGIN_S = 0.02
 
 FEWEST_CYCLES = 3
 LARGEST_DRIFT = 0.1
+AGREED = 2 / 3
+"""Share of cycles that agree where they tell what was turned in a gap."""
 
 
 def bridged(
@@ -73,21 +75,21 @@ def bridged(
     return angle - np.cumsum(turns), speed
 
 
-def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
+def without_slips(angle: PhaseAngle, sure: Bools, period: int, rate_hz: float) -> PhaseAngle:
     """Let the angle of a motion that repeats repeat.
 
-    While the current is too small to be followed, the angle may slip by a multiple of pi. A stretch
-    of current has the angle that it had one cycle earlier; in the first cycle, the one that follows
-    from the median of all cycles' steps. The angle stays as it was where there are fewer than three
-    cycles, or where a cycle ends elsewhere than it began by more than a tenth of its travel: that
-    is no slip.
+    While the current is too small to be `sure`, (n,), the angle may slip by a multiple of pi. A
+    stretch of current has the angle that it had one cycle earlier; in the first cycle, the one that
+    follows from the median of all cycles' steps. The angle stays as it was where there are fewer
+    than three cycles, or where a cycle ends elsewhere than it began by more than a tenth of its
+    travel, and all by as much: that is no slip.
     """
     path = angle.angle_rad
     cycles = path.size // period
     pieces = stretches(angle.strong, rate_hz)
     if cycles < FEWEST_CYCLES or not pieces:
         return angle
-    course = _common_course(path, angle.strong, period, rate_hz)
+    course = _common_course(path, sure, period, rate_hz)
     if course is None:
         return angle
     repeated = path.copy()
@@ -97,7 +99,7 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
         rest = path[start:stop] - course[np.arange(start, stop) % period]
         # A cycle is no whole number of samples: the cycle before is nearer than the first.
         later = np.arange(max(start, period), max(stop, period))
-        later = later[angle.strong[later - period]]
+        later = later[sure[later - period]]
         if later.size:
             rest = path[later] - repeated[later - period]
             slip = np.pi * np.round(float(np.median(rest)) / np.pi)
@@ -109,7 +111,7 @@ def without_slips(angle: PhaseAngle, period: int, rate_hz: float) -> PhaseAngle:
         edges += [float(start), float(stop)]
         slips += [slip, slip]
     correction = np.interp(np.arange(path.size), edges, slips)
-    speed = angle.velocity_rad_s - rate_hz * np.gradient(correction)
+    speed = angle.velocity_rad_s - rate_hz * np.gradient(correction) * lost(angle.strong, rate_hz)
     return replace(angle, angle_rad=path - correction, velocity_rad_s=speed)
 
 
@@ -117,7 +119,9 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
     """One cycle of a path that repeats, NaN where few cycles have current.
 
     From one stretch of current to the next the angle changes by what most cycles say; of a whole
-    cycle nothing may be left. None where that is no matter of a few turns in the longest gap.
+    cycle nothing may be left: that was turned in the gap in which cycles differ most, if no two of
+    three agree there, else in the longest. None if more than a tenth of the travel is left and no
+    cycles differ by as much.
     """
     cycles = path.size // period
     folded = path[: cycles * period].reshape(cycles, period)
@@ -126,7 +130,7 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
     anchors = stretches(common, rate_hz)
     if not anchors:
         return None
-    steps = []
+    steps, doubts = [], []
     places = [(start + stop) // 2 for start, stop in anchors]
     for here, there in zip(places, [*places[1:], places[0] + period], strict=True):
         known = np.flatnonzero(strong[here : path.size - there + here : period]) * period + here
@@ -137,17 +141,17 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
         often = values[counts == counts.max()]
         chosen = often[np.argmin(np.abs(often - np.median(whole)))]
         steps.append(float(np.median(changes[whole == chosen])))
+        doubts.append(float(np.ptp(whole)) if counts.max() < AGREED * counts.sum() else 0.0)
     left = float(np.sum(steps))
     heights = np.concatenate([[0.0], np.cumsum(steps)])
-    if abs(left) > LARGEST_DRIFT * float(np.ptp(heights)):
+    drifts = np.pi * max(doubts) < LARGEST_DRIFT * float(np.ptp(heights)) < abs(left)
+    if drifts:
         return None
     turns = np.pi * np.round(left / np.pi)
     if turns:
-        gaps = [
-            (start - stop) % period
-            for (_, stop), (start, _) in zip(anchors, [*anchors[1:], anchors[0]], strict=True)
-        ]
-        heights[int(np.argmax(gaps)) + 1 :] -= turns
+        starts, stops = np.array(anchors).T
+        gaps = (np.roll(starts, -1) - stops) % period
+        heights[np.lexsort((gaps, doubts))[-1] + 1 :] -= turns
     course = np.full(period, np.nan)
     for (start, stop), place, height in zip(anchors, places, heights, strict=False):
         rows = np.flatnonzero(common[start:stop]) + start
