@@ -67,7 +67,7 @@ def cycle_length(*paths: Floats, known: Bools | None = None) -> int | None:
 
 
 def _mismatch(path: Floats, counts: Bools) -> Floats:
-    """Mean square of ``path[t + lag] - path[t]`` for every lag below n, infinite of too few."""
+    """Mean square of ``path[t + lag] - path[t]`` where both count, by lag; infinite of too few."""
     n, lags = path.size, np.arange(path.size)
     centred = np.where(counts, path - path[counts].mean(), 0.0)
     length = next_fast_len(2 * n, real=True)

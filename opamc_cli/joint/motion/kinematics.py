@@ -113,7 +113,7 @@ class Motion:
     kernel: Floats
     """Moving average that the acceleration has gone through."""
     blur: Floats | None = None
-    """What it would gain or lose by a third and by three times the window; (n, 2) or None."""
+    """What the acceleration would gain by a third and three times the window; (n, 2) or None."""
     taken_noise: float = 0.0
     """Standard deviation of noise in what the window would take a second time; 0: not known."""
     evenly_smooth: bool = False
