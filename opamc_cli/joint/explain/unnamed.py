@@ -97,7 +97,7 @@ class Response(Effect):
         filters = [2 * np.pi * hz for hz in geometric(1.5, highest, count)]
         parts = [answers(signal, w, RESPONSE_DAMPING, rate_hz, bounds, asked) for w in filters]
         columns = np.concatenate(parts).T
-        return columns if full is track else track.own_means(columns)[rows]
+        return columns if full is track else np.asfortranarray(track.own_means(columns)[rows])
 
 
 class Shift(Effect):

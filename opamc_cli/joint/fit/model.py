@@ -407,7 +407,7 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     rows = parts.rows[::every]
     count, widths = sum(moves), [values.size for values in known]
     blocks = [dataset.columns(term, fine=True) for term in terms]
-    some = [dataset.cache.rows(block, parts, True, every) for block in blocks]
+    some = [dataset.cache.rows(block, parts, True, every)[: rows.size] for block in blocks]
     columns, others = np.concatenate(some[:count], axis=1), some[count:]
     kept = dataset.sums((), True, *blocks[count:]).gram.sum(axis=0) / every
     carries, follows = np.repeat(roles[:count], widths[:count], axis=0).T

@@ -59,10 +59,14 @@ class RegressorCache:
         return Sums(whole[:, :-1, :-1], whole[:, :-1, -1], whole[:, -1, -1], parts, ridge)
 
     def rows(self, block: Floats, parts: Parts, fine: bool, every: int = 1) -> Floats:
-        """Return the parts' rows of a regressor array, or one in `every` of them."""
+        """Return the parts' rows of a regressor array, or one in `every` of them.
+
+        Of one that begins with them the array itself: each regressor stays contiguous, and others
+        behind are in no part.
+        """
         key = (id(block), fine, every)
         if key not in self._taken:
-            rows = parts.taken(block)
+            rows = block if every == 1 and len(block) < parts.size else parts.taken(block)
             rows = rows if every == 1 else np.asfortranarray(rows[::every])
             # The block itself is kept beside its rows, so that its identity stays its own.
             self._taken[key] = (block, rows)

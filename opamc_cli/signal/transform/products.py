@@ -39,21 +39,28 @@ def products_over(ranges: Ints, left: Floats, right: Floats) -> Floats:
 
 @njit(cache=True, nogil=True, fastmath={"reassoc", "nsz", "contract"})
 def _by_loops(ranges: Ints, wide: Floats, narrow: Floats, found: Floats) -> None:
-    """Two by two, so that half as much is read; the last one may be its own neighbour."""
+    """Four by two, so that each wide signal is read from memory once; the last may be met again."""
     last, least = len(wide) - 1, len(narrow) - 1
     for p in range(len(ranges)):
         start, stop = ranges[p]
-        for j in range(0, least + 1, 2):
-            j1 = min(j + 1, least)
-            x, y = narrow[j, start:stop], narrow[j1, start:stop]
-            for i in range(0, last + 1, 2):
-                i1 = min(i + 1, last)
-                a, b = wide[i, start:stop], wide[i1, start:stop]
-                ax = ay = bx = by = 0.0
+        for i in range(0, last + 1, 4):
+            i1, i2, i3 = min(i + 1, last), min(i + 2, last), min(i + 3, last)
+            a, b = wide[i, start:stop], wide[i1, start:stop]
+            c, d = wide[i2, start:stop], wide[i3, start:stop]
+            for j in range(0, least + 1, 2):
+                j1 = min(j + 1, least)
+                x, y = narrow[j, start:stop], narrow[j1, start:stop]
+                ax = ay = bx = by = cx = cy = dx = dy = 0.0
                 for n in range(stop - start):
                     ax += a[n] * x[n]
                     ay += a[n] * y[n]
                     bx += b[n] * x[n]
                     by += b[n] * y[n]
+                    cx += c[n] * x[n]
+                    cy += c[n] * y[n]
+                    dx += d[n] * x[n]
+                    dy += d[n] * y[n]
                 found[p, i, j], found[p, i, j1] = ax, ay
                 found[p, i1, j], found[p, i1, j1] = bx, by
+                found[p, i2, j], found[p, i2, j1] = cx, cy
+                found[p, i3, j], found[p, i3, j1] = dx, dy
