@@ -66,22 +66,9 @@ class Output:
         if self.as_json:
             say(json.dumps(values, indent=2, sort_keys=True, allow_nan=False) + "\n", sys.stdout)
         elif urgent or not self.quiet:
-            from rich.console import Console
-
-            # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched;
-            # brackets in a path are brackets, not markup
-            shown_text = StringIO()
-            console = Console(
-                file=shown_text,
-                force_terminal=sys.stdout.isatty() or None,
-                width=None if sys.stdout.isatty() else 120,
-                markup=False,
-                emoji=False,
-                highlight=False,
-            )
-            for item in shown:
-                console.print(item, soft_wrap=isinstance(item, str))
-            text = shown_text.getvalue()
+            # sentences, as those of a night, do without what tables take a hundredth of it to load
+            sentences = all(isinstance(item, str) for item in shown)
+            text = "".join(f"{item}\n" for item in shown) if sentences else _rendered(shown)
             if not sys.stdout.isatty():
                 text = "".join(f"{line.rstrip()}\n" for line in text.splitlines())
             say(text, sys.stdout)
@@ -95,6 +82,25 @@ class Output:
             self.note(f"{count}; all else of {n_done} run{'s' * (n_done > 1)} is done")
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
+
+
+def _rendered(shown: "Sequence[RenderableType]") -> str:
+    from rich.console import Console
+
+    # a file or pipe gets whole lines: a log that wraps at 80 columns cannot be searched;
+    # brackets in a path are brackets, not markup
+    text = StringIO()
+    console = Console(
+        file=text,
+        force_terminal=sys.stdout.isatty() or None,
+        width=None if sys.stdout.isatty() else 120,
+        markup=False,
+        emoji=False,
+        highlight=False,
+    )
+    for item in shown:
+        console.print(item, soft_wrap=isinstance(item, str))
+    return text.getvalue()
 
 
 def folded(texts: Sequence[str]) -> list[str]:

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import eigh
 
 Floats = NDArray[np.float64]
 
@@ -57,6 +56,8 @@ def eigenvectors(symmetric: Floats) -> tuple[Floats, Floats]:
     try:
         values, vectors = np.linalg.eigh(symmetric)
     except np.linalg.LinAlgError:
+        from scipy.linalg import eigh  # a hundredth of a lone night to load, for a rare matrix
+
         values, vectors = eigh(symmetric, driver="ev")
     return values, vectors
 

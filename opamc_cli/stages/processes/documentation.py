@@ -7,8 +7,9 @@ from functools import partial
 from types import ModuleType
 from typing import Any
 
-UNUSED = ("f2py", "testing")
-"""Parts of numpy that it loads only when they are asked for, and scipy asks for all."""
+UNUSED = ("char", "ctypeslib", "f2py", "ma", "rec", "testing")
+"""Parts of numpy that it loads only when they are asked for, and scipy asks for all: those that no
+one else asks for, and masked arrays, of which only figures are drawn."""
 
 OURS = "opamc_cli."
 

@@ -5,16 +5,17 @@ import os
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import active_children, get_context, parent_process
 from time import perf_counter
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from opamc_cli.errors import OpamcError, UsageError
 from opamc_cli.stages.processes.interruption import held_back
+
+if TYPE_CHECKING:
+    from concurrent.futures import Future
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -80,6 +81,9 @@ def map_items(
     workers = min(jobs, len(items))
     if workers <= 1:
         return _gather([_Immediate(function, item) for item in items], watch)
+    from concurrent.futures import ProcessPoolExecutor  # who works alone does without
+    from concurrent.futures.process import BrokenProcessPool
+
     pool = ProcessPoolExecutor(workers, get_context("spawn"), _end_with_parent, (os.getpid(),))
     try:
         with one_thread_each():
@@ -184,7 +188,7 @@ class _Immediate(Generic[Item, Result]):
 
 
 def _gather(
-    calls: Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]],
+    calls: "Sequence[Future[Result]] | Sequence[_Immediate[Item, Result]]",
     watch: Watch,
 ) -> Outcome[Result]:
     results: list[Result] = []

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 from rich.console import Console, RenderableType
+from rich.text import Text
 
 from opamc_cli import __main__
 from opamc_cli.commands.model.shown import headline, loop_tables
@@ -346,6 +347,19 @@ def test_piped_text_has_no_trailing_blanks(capsys) -> None:
     shown = capsys.readouterr().out
     assert shown.endswith("a line\n")
     assert not [line for line in shown.splitlines() if line != line.rstrip()]
+
+
+@pytest.mark.parametrize("terminal", [False, True])
+def test_sentences_alone_are_printed_as_beside_a_table(capsys, monkeypatch, terminal) -> None:
+    """They are printed without what tables need, which takes a hundredth of a night to load."""
+    from opamc_cli.commands.terminal.output import Output
+
+    monkeypatch.setattr("sys.stdout.isatty", lambda: terminal)
+    sentences = ["r1 [b]axis 3[/b]: ALARM :bell: 0.79", "see " + "a/long/path/" * 20, "trailing  "]
+    Output().result({}, *sentences)
+    alone = capsys.readouterr().out
+    Output().result({}, *sentences, Text("a table"))
+    assert capsys.readouterr().out == f"{alone}a table\n"
 
 
 def test_a_faulty_joint_takes_few_lines() -> None:
