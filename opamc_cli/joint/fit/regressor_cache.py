@@ -25,6 +25,7 @@ class RegressorCache:
         self._taken: dict[tuple[int, bool, int], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
+        self._seen = self._sizes()
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
@@ -74,6 +75,8 @@ class RegressorCache:
 
     def _bounded(self) -> None:
         """Forget what follows the model, which nothing meets again; all where it is too much."""
+        if self._sizes() == self._seen:
+            return  # half of a search asks for what is there: to look again took a tenth of it
         kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
         # Products are known by their blocks. To look through all of them took a sixth of a cause.
         if not kept.issuperset(key[0] for key in self._taken):
@@ -86,3 +89,8 @@ class RegressorCache:
         owners = (block if block.base is None else block.base for block in every)
         if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()
+        self._seen = self._sizes()
+
+    def _sizes(self) -> tuple[int, int, int]:
+        """Arrays of each kind; what takes the place of one is as large."""
+        return len(self._columns), len(self._taken), len(self.settled)
