@@ -5,13 +5,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
 from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
-from opamc_cli.stages.chain.compared.discriminants import LatentModels
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
@@ -30,6 +29,9 @@ from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import SEGMENTS
 from opamc_cli.storage.sources import RunSource, check_comparable, other_robot
 from opamc_cli.storage.tables import read_table
+
+if TYPE_CHECKING:
+    from opamc_cli.stages.chain.compared.discriminants import LatentModels
 
 FILES = (
     files.VERDICT,
@@ -74,7 +76,7 @@ def run(
     config: Config,
     out: Path,
     *,
-    models: LatentModels | None = None,
+    models: "LatentModels | None" = None,
     jobs: int = 1,
     progress: Steps = unshown,
     kept: KeptResults | None = None,
@@ -128,7 +130,7 @@ def _diagnose(
     target: Sequence[Path],
     config: Config,
     out: Path,
-    models: LatentModels | None,
+    models: "LatentModels | None",
     jobs: int,
     progress: Steps,
     kept: KeptResults | None,

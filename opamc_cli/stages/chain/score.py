@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import factorial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -18,13 +18,15 @@ from opamc_cli.decision.divergence.jensen_shannon import (
     leave_cycle_out_divergences,
 )
 from opamc_cli.errors import InputError
-from opamc_cli.stages.chain.compared.discriminants import LatentModels
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows, common_keys
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import FEATURES, SCORES
 from opamc_cli.storage.sources import check_comparable
 from opamc_cli.storage.tables import record_at, table_input, write_table
+
+if TYPE_CHECKING:
+    from opamc_cli.stages.chain.compared.discriminants import LatentModels
 
 FILES = (files.SCORES, files.FEATURES)
 ALL_MOTIONS = -1
@@ -51,7 +53,7 @@ def run(
     config: Config,
     out: Path,
     *,
-    models: LatentModels | None = None,
+    models: "LatentModels | None" = None,
 ) -> ScoreOutcome:
     """Compare the target's patterns with the baseline's.
 
@@ -77,7 +79,7 @@ def run(
 
 
 def compare_sides(
-    sides: Sides, config: Config, out: Path, *, models: LatentModels | None = None
+    sides: Sides, config: Config, out: Path, *, models: "LatentModels | None" = None
 ) -> ScoreOutcome:
     """Compare the target's patterns with the baseline's, both read before; see `run`."""
     notes = check_comparable(sides.baseline.sources, sides.target.sources)
@@ -181,7 +183,7 @@ def feature_table(
     scores: pa.Table,
     target: Mapping[Key, PatternRows],
     base: float,
-    models: LatentModels | None = None,
+    models: "LatentModels | None" = None,
 ) -> pa.Table:
     """Δμ, Δσ² and KS of every axis and order: for each motion, and for all pooled (motion -1)."""
     columns = {
