@@ -31,6 +31,9 @@ other to show it."""
 LEAST_DISTANCE = 1e-9
 """Identical recordings have distance zero; a billionth of a healthy one's stands for it."""
 
+MOST_AT_ONCE = 2_000_000
+"""Products of pairs of sessions that are held at once, 16 MB."""
+
 
 @dataclass(frozen=True)
 class Block:
@@ -70,7 +73,7 @@ def distances(
         All motions of one axis.
     target, rest : ndarray of bool, shape (R, S)
         Which sessions are compared with which; one row for each comparison.
-    healthy : ndarray of bool, shape (R, S) or (1, S), optional
+    healthy : ndarray of bool, shape (1, S), optional
         Whose scatter is the unit; the rest by default.
 
     Returns
@@ -88,33 +91,63 @@ def distances(
     """
     shape = (len(blocks), len(target))
     orthogonal, score = np.full(shape, np.nan), np.full(shape, np.nan)
-    for number, block in enumerate(blocks):
-        known = np.isfinite(block.sessions).all(axis=1) & (block.weight > 0)
-        if not known.any():
-            continue
-        x, weight = block.sessions[known], block.weight[known]
-        x = x - x.mean(axis=0)
+    for numbers, known in _alike(blocks):
         both = target[:, known].any(axis=1) & rest[:, known].any(axis=1)
+        if not both.any():
+            continue
         own, others = target[both][:, known], rest[both][:, known]
         unit = others if healthy is None else healthy[:, known]
-        variance, noise = _variances(block, x, weight, unit)
-        if not both.any() or not np.isfinite(variance).all():
-            continue
-        scaled = x / np.sqrt(variance * x.shape[1])[:, np.newaxis]
-        of_unit, of_own = (_mean_inverse(weight, group) for group in (unit, own))
-        with np.errstate(invalid="ignore"):
-            expected = np.fmax(variance + noise * (of_own - of_unit), noise * of_own)
-        relative = np.where(np.isfinite(noise).all(), expected / variance, 1.0).mean(axis=1)
-        beyond, score[number, both] = _of_kernel(
-            scaled @ scaled.transpose(0, 2, 1),
-            own,
-            others,
-            _ridge(noise * of_unit, variance),
-            relative,
-        )
-        # the unit of a lone session is chance
-        orthogonal[number, both] = beyond + ROUNDING * (unit.sum(axis=1) == 1)
+        at_once = max(MOST_AT_ONCE // (own.size * own.shape[1]), 1)
+        for first in range(0, len(numbers), at_once):
+            some = numbers[first : first + at_once]
+            beyond, along = _of_alike([blocks[i] for i in some], known, own, others, unit)
+            # the unit of a lone session is chance
+            places = np.ix_(np.array(some), both)
+            orthogonal[places] = beyond + ROUNDING * (unit.sum(axis=1) == 1)
+            score[places] = along
     return Distances(_log_mean(orthogonal), _log_mean(score))
+
+
+def _alike(blocks: Sequence[Block]) -> list[tuple[list[int], BoolArray]]:
+    """Return the places of blocks of one width in which the same sessions are known, and which.
+
+    Mostly all of them: one by one they take twice as long.
+    """
+    found: dict[tuple[bytes, int], tuple[list[int], BoolArray]] = {}
+    for number, block in enumerate(blocks):
+        known = np.isfinite(block.sessions).all(axis=1) & (block.weight > 0)
+        if known.any():
+            key = known.tobytes(), block.sessions.shape[1]
+            found.setdefault(key, ([], known))[0].append(number)
+    return list(found.values())
+
+
+def _of_alike(
+    blocks: Sequence[Block], known: BoolArray, own: BoolArray, others: BoolArray, unit: BoolArray
+) -> tuple[FloatArray, FloatArray]:
+    """Distances of some blocks' sessions, shape (blocks, R); NaN where no variance is known."""
+    x = np.stack([block.sessions[known] for block in blocks])
+    x = x - x.mean(axis=1, keepdims=True)
+    weights = [block.weight[known] for block in blocks]
+    found = [_variances(*one, unit) for one in zip(blocks, x, weights, strict=True)]
+    variance, noise = (np.stack(parts) for parts in zip(*found, strict=True))
+    noise = noise[:, np.newaxis]
+    of_unit, of_own = (
+        np.stack([_mean_inverse(weight, group) for weight in weights]) for group in (unit, own)
+    )
+    told = np.isfinite(noise).all(axis=2)
+    with np.errstate(invalid="ignore"):
+        scaled = x[:, np.newaxis] / np.sqrt(variance * x.shape[2])[:, :, np.newaxis]
+        expected = np.fmax(variance + noise * (of_own - of_unit), noise * of_own)
+    relative = np.where(told, (expected / variance).mean(axis=2), 1.0)
+    ridge = np.where(told, _ridge(noise * of_unit, variance), USUAL_RIDGE)
+    usable = np.isfinite(variance).all(axis=(1, 2))
+    shape = len(blocks), len(own)
+    beyond, along = np.full(shape, np.nan), np.full(shape, np.nan)
+    scaled = scaled[usable]
+    kernel = scaled @ scaled.swapaxes(2, 3)
+    beyond[usable], along[usable] = _of_kernel(kernel, own, others, ridge[usable], relative[usable])
+    return beyond, along
 
 
 def influences(blocks: Sequence[Block], sessions: NDArray[np.int64]) -> float:
@@ -197,9 +230,8 @@ def _mean_inverse(weight: FloatArray, group: BoolArray) -> FloatArray:
 
 
 def _ridge(noise: FloatArray, variance: FloatArray) -> FloatArray:
-    if not np.isfinite(noise).all():
-        return np.full(len(variance), USUAL_RIDGE)
-    share = np.broadcast_to(noise, variance.shape).mean(axis=1) / variance.mean(axis=1)
+    """Ridge over the mean variance, shape (..., R) of variances of shape (..., R, F)."""
+    share = np.broadcast_to(noise, variance.shape).mean(axis=-1) / variance.mean(axis=-1)
     share = np.clip(share, LEAST_RIDGE, 1 - LEAST_RIDGE)
     return np.asarray(share / (1 - share))
 
@@ -215,13 +247,14 @@ def _of_kernel(
 
     Parameters
     ----------
-    kernel : ndarray, shape (R, S, S) or (1, S, S)
-        Products of all pairs of sessions, each part in units of its standard deviation.
+    kernel : ndarray, shape (M, R, S, S) or (M, 1, S, S)
+        Products of all pairs of sessions of M motions, each part in units of its standard
+        deviation.
     target, rest : ndarray of bool, shape (R, S)
         The two groups.
-    ridge : ndarray, shape (R,) or (1,)
+    ridge : ndarray, shape (M, R) or (M, 1)
         Share of noise in the sessions' variance.
-    relative : ndarray, shape (R,)
+    relative : ndarray, shape (M, R)
         Variance of a session of the target over that of one of the rest.
     """
     n_target, n_rest = target.sum(axis=1), rest.sum(axis=1)
@@ -231,20 +264,19 @@ def _of_kernel(
     own_mean = np.where(target[:, :, np.newaxis], mean_target[:, np.newaxis], 0.0)
     own_mean = np.where(rest[:, :, np.newaxis], mean_rest[:, np.newaxis], own_mean)
     # a session less its group's mean; nothing for those in neither group
-    scatter = (target | rest)[:, :, np.newaxis] * np.eye(kernel.shape[1]) - own_mean
-    shifted = (contrast[:, np.newaxis] @ kernel)[:, 0]
-    square = (shifted * contrast).sum(axis=1)
-    along = np.einsum("rij,rj->ri", scatter, shifted)
+    scatter = (target | rest)[:, :, np.newaxis] * np.eye(kernel.shape[-1]) - own_mean
+    shifted = (contrast[:, np.newaxis] @ kernel)[:, :, 0]
+    square = (shifted * contrast).sum(axis=2)
+    along = np.einsum("rij,mrj->mri", scatter, shifted)
     gram = scatter @ kernel @ scatter.transpose(0, 2, 1)
     dof = np.maximum(n_target + n_rest - 2, 1)
-    mean_variance = np.trace(gram, axis1=1, axis2=2) / dof
-    penalty = (ridge * mean_variance + LEAST_DISTANCE)[:, np.newaxis, np.newaxis]
-    weights = np.linalg.solve(gram + penalty * np.eye(kernel.shape[1]), along[:, :, np.newaxis])[
-        ..., 0
-    ]
-    explained = 2 * (weights * along).sum(axis=1)
-    explained -= np.einsum("ri,rij,rj->r", weights, gram, weights)
-    leverage = (weights**2).sum(axis=1)
+    mean_variance = np.trace(gram, axis1=2, axis2=3) / dof
+    penalty = (ridge * mean_variance + LEAST_DISTANCE)[..., np.newaxis, np.newaxis]
+    weights = np.linalg.solve(gram + penalty * np.eye(kernel.shape[-1]), along[..., np.newaxis])
+    weights = weights[..., 0]
+    explained = 2 * (weights * along).sum(axis=2)
+    explained -= np.einsum("mri,mrij,mrj->mr", weights, gram, weights)
+    leverage = (weights**2).sum(axis=2)
     error = relative / n_target + 1 / n_rest + leverage
     return np.maximum(square - explained, 0.0) / error, leverage
 

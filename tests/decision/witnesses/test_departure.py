@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from opamc_cli.decision.witnesses import departure
 from opamc_cli.decision.witnesses.departure import LEAST_RIDGE, Block, distances, influences
 from opamc_cli.decision.witnesses.deviation import PRIOR_DOF
 
@@ -55,6 +56,24 @@ def test_distances_are_those_of_their_definition(seed, n_target):
     beyond, along = slow_distances(one, target, ~target)
     assert found.orthogonal == pytest.approx([beyond], rel=1e-6)
     assert found.score == pytest.approx([along], rel=1e-6)
+
+
+@pytest.mark.parametrize("at_once", [1, 200, 10**6])
+def test_distances_of_several_motions_are_the_mean_of_each_ones_own(monkeypatch, at_once):
+    """They are reckoned together where they are alike: of other sessions or widths they are not."""
+    monkeypatch.setattr(departure, "MOST_AT_ONCE", at_once)
+    blocks = [block(seed=seed, n_parts=(12, 5)[seed % 2]) for seed in range(8)]
+    for number, session in ((1, 3), (2, 6), (4, 0)):
+        blocks[number].sessions[session] = np.nan
+    blocks[6].within[:] = np.nan
+    blocks[7].sessions[:] = np.nan
+    target = np.eye(7, dtype=bool)
+    found = distances(blocks, target, ~target)
+    alone = [distances([one], target, ~target) for one in blocks]
+    for kind in ("orthogonal", "score"):
+        each = np.exp([getattr(one, kind) for one in alone])
+        mean = np.nanmean(each, axis=0)
+        np.testing.assert_allclose(np.exp(getattr(found, kind)), mean, rtol=1e-12)
 
 
 def test_what_one_influence_does_lies_along_and_what_is_new_beyond():
