@@ -1,12 +1,15 @@
 """What a new night of one robot costs beside `opamc diagnose` of the same recordings.
 
 Both are whole processes begun cold, in seconds of computing (their workers' too) and of the clock;
-six baseline nights, which an earlier night has read, and one target night of one recording.
+six baseline nights, which an earlier night has read, and one target night of one recording. With
+several robots also what a night costs among others: the start that judges all but the first, less
+the one that judged the first alone, for each robot that it judged more.
 
-    python benchmarks/nightly_cost.py --rounds 3
+    python benchmarks/nightly_cost.py --rounds 3 --robots 6
 """
 
 import argparse
+import math
 import os
 import shutil
 import subprocess
@@ -30,23 +33,25 @@ from opamc_cli.testbed.robot import simulate
 BASELINE = 6
 FAULTY_AXIS = 3
 KINDS = ("healthy", "first faulty", "next faulty")
-Pair = tuple[tuple[float, float], tuple[float, float]]
-"""A night's and its diagnosis's seconds of computing and of the clock."""
+Seconds = tuple[float, float]
+"""Of computing and of the clock."""
+Costs = tuple[Seconds, Seconds, Seconds]
+"""Of a lone night, of one among others (NaN where there are none), and of its diagnosis."""
 OPTIONS = {"joint.gear_ratio": 100, "joint.pole_pairs": 5}
 
 
-def record_short(path: Path, index: int, faulty: bool) -> None:
+def record_short(path: Path, robot: int, index: int, faulty: bool) -> None:
     """Record six channels for 6 s, as in the demo."""
-    cell_logs.record(path, 500, index, severity=1.0 if faulty else 0.0)
+    cell_logs.record(path, 500 + robot, index, severity=1.0 if faulty else 0.0)
 
 
-def record_long(path: Path, index: int, faulty: bool, cycles: int = 4) -> None:
+def record_long(path: Path, robot: int, index: int, faulty: bool, cycles: int = 4) -> None:
     """Record eighteen channels for 104 s, or 30 s of one cycle."""
     config = load_testbed(cell_logs.ROOT / "configs" / "testbed.yaml")
     damage = {FAULTY_AXIS: config.robot.damage} if faulty else {}
     # the same robot on another day of its own
     program = replace(config.program, cycles=cycles)
-    made = simulate(config.robot, program, seed=5, session=index, faults=damage)
+    made = simulate(config.robot, program, seed=5 + robot, session=index, faults=damage)
     columns = {
         f"axis{number}_{phase}": np.ascontiguousarray(signals.phases_a[:, k])
         for number, signals in made.axes.items()
@@ -70,11 +75,18 @@ def seconds(*arguments: object) -> tuple[float, float]:
 
 
 def measure(
-    folder: Path, record: Callable[[Path, int, bool], None], rounds: int
-) -> dict[str, list[Pair]]:
+    folder: Path, record: Callable[[Path, int, int, bool], None], rounds: int, robots: int
+) -> dict[str, list[Costs]]:
     """Return a night's and its diagnosis's seconds, by kind of night."""
+
+    def record_all(index: int, faulty: bool) -> str:
+        night = cell_logs.night(index)
+        for robot in range(robots):
+            record(folder / "logs" / f"r{robot}" / night / "run.parquet", robot, index, faulty)
+        return night
+
     for index in range(BASELINE + 1):
-        record(folder / "logs" / "r1" / cell_logs.night(index) / "run.parquet", index, False)
+        record_all(index, False)
     cell = folder / "cell.yaml"
     options = ", ".join(f"{key}: {value}" for key, value in OPTIONS.items())
     cell.write_text(
@@ -85,20 +97,23 @@ def measure(
     shutil.copytree(folder / "nightly", folder / "before")
     given = [part for key, value in OPTIONS.items() for part in ("--set", f"{key}={value}")]
     for index in range(BASELINE):
-        given += ["--baseline", folder / "logs" / "r1" / cell_logs.night(index)]
-    found: dict[str, list[Pair]] = {kind: [] for kind in KINDS}
+        given += ["--baseline", folder / "logs" / "r0" / cell_logs.night(index)]
+    found: dict[str, list[Costs]] = {kind: [] for kind in KINDS}
     index = BASELINE + 1
     for _ in range(rounds):
         shutil.rmtree(folder / "nightly")
         shutil.copytree(folder / "before", folder / "nightly")
         for kind in KINDS:
-            night = cell_logs.night(index)
-            target = folder / "logs" / "r1" / night
-            record(target / "run.parquet", index, kind != "healthy")
-            nightly = seconds("nightly", cell, "--night", night)
-            out = folder / "diagnosed" / night
+            night = record_all(index, kind != "healthy")
+            lone = seconds("nightly", cell, "--night", night, "--robot", "r0")
+            among = (math.nan, math.nan)
+            if robots > 2:
+                others = seconds("nightly", cell, "--night", night)
+                more = [(all_ - one) / (robots - 2) for all_, one in zip(others, lone, strict=True)]
+                among = more[0], more[1]
+            out, target = folder / "diagnosed" / night, folder / "logs" / "r0" / night
             diagnosed = seconds("diagnose", *given, "--target", target, "--out", out)
-            found[kind].append((nightly, diagnosed))
+            found[kind].append((lone, among, diagnosed))
             index += 1
     return found
 
@@ -107,6 +122,7 @@ def main() -> None:
     """Print a line per length and state."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--robots", type=int, default=1, help="of the cell; three for `among`")
     parser.add_argument("--long-only", action="store_true")
     arguments = parser.parse_args()
     lengths = {
@@ -118,18 +134,19 @@ def main() -> None:
         del lengths["6 channels, 6 s"]
     for name, record in lengths.items():
         with tempfile.TemporaryDirectory() as folder:
-            found = measure(Path(folder), record, arguments.rounds)
-        for kind, pairs in found.items():
-            for index, measure_of in enumerate(("computing", "clock")):
-                nights = [night[index] for night, _ in pairs]
-                diagnoses = [diagnosis[index] for _, diagnosis in pairs]
-                shares = [one / other for one, other in zip(nights, diagnoses, strict=True)]
-                print(
-                    f"{name}, {kind}, {measure_of}: {median(nights):.1f} s beside "
-                    f"{median(diagnoses):.1f} s; {min(shares):.0%} to {max(shares):.0%}, "
-                    f"median {median(shares):.0%}",
-                    flush=True,
-                )
+            found = measure(Path(folder), record, arguments.rounds, arguments.robots)
+        for kind, costs in found.items():
+            for of, which in (("lone", 0), ("among others", 1))[: 1 + (arguments.robots > 2)]:
+                for index, measure_of in enumerate(("computing", "clock")):
+                    nights = [each[which][index] for each in costs]
+                    diagnoses = [each[2][index] for each in costs]
+                    shares = [one / other for one, other in zip(nights, diagnoses, strict=True)]
+                    print(
+                        f"{name}, {kind}, {of}, {measure_of}: {median(nights):.1f} s beside "
+                        f"{median(diagnoses):.1f} s; {min(shares):.0%} to {max(shares):.0%}, "
+                        f"median {median(shares):.0%}",
+                        flush=True,
+                    )
 
 
 if __name__ == "__main__":
