@@ -25,7 +25,7 @@ class RegressorCache:
         self._taken: dict[tuple[int, bool, int], tuple[Floats, Floats]] = {}
         self._products: dict[tuple[int, int, bool], Floats] = {}
         self._currents: dict[bool, Floats] = {}
-        self._seen = self._sizes()
+        self._grown = False
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
@@ -62,8 +62,7 @@ class RegressorCache:
     def rows(self, block: Floats, parts: Parts, fine: bool, every: int = 1) -> Floats:
         """Return the parts' rows of a regressor array, or one in `every` of them.
 
-        Of one that begins with them the array itself: each regressor stays contiguous, and others
-        behind are in no part.
+        Where the array begins with them it is itself: each regressor is contiguous.
         """
         key = (id(block), fine, every)
         if key not in self._taken:
@@ -71,12 +70,14 @@ class RegressorCache:
             rows = rows if every == 1 else np.asfortranarray(rows[::every])
             # The block itself is kept beside its rows, so that its identity stays its own.
             self._taken[key] = (block, rows)
+            self._grown = True
         return self._taken[key][1]
 
     def _bounded(self) -> None:
         """Forget what follows the model, which nothing meets again; all where it is too much."""
-        if self._sizes() == self._seen:
+        if not self._grown:
             return  # half of a search asks for what is there: to look again took a tenth of it
+        self._grown = False
         kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
         # Products are known by their blocks. To look through all of them took a sixth of a cause.
         if not kept.issuperset(key[0] for key in self._taken):
@@ -89,8 +90,3 @@ class RegressorCache:
         owners = (block if block.base is None else block.base for block in every)
         if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()
-        self._seen = self._sizes()
-
-    def _sizes(self) -> tuple[int, int, int]:
-        """Arrays of each kind; what takes the place of one is as large."""
-        return len(self._columns), len(self._taken), len(self.settled)
