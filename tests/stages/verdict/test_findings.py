@@ -2,9 +2,11 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from opamc_cli.stages.verdict.agreement.findings import _coarser
+from opamc_cli.stages.verdict.agreement.findings import _coarser, _other_steps
+from opamc_cli.stages.verdict.agreement.measured import _changing, _steps
 
 
 @pytest.mark.parametrize(
@@ -18,3 +20,28 @@ def test_a_current_that_lost_its_steps_is_another_log_and_one_that_gained_some_m
     told = _coarser(own, SimpleNamespace(changing={2: usual}))
     assert (told is not None) == refused
     assert not refused or f"changes in {tonight:.0%} of its samples" in told
+
+
+@pytest.mark.parametrize(
+    ("usual", "tonight", "said"),
+    [
+        (0.0, 2.0, "comes in steps of 2, the baseline's in finer ones"),
+        (0.5, 0.0, "comes in finer steps than the baseline's of 0.5"),
+        (0.5, 0.5, None),
+        (0.1, 2.0, "comes in steps of 2, the baseline's in finer ones"),
+        (0.0, 0.1, None),
+        (0.0, 0.0, None),
+    ],
+)
+def test_a_current_in_other_steps_than_the_baselines_is_another_log(usual, tonight, said):
+    def logged(step, seed):
+        noise = np.random.default_rng(seed).normal(0, 0.25, 4000) * (1 + 3 * seed)
+        return noise if step == 0 else np.round(noise / step) * step
+
+    # what a fault shakes has larger steps, and comes in none
+    (before, now) = ([logged(step, seed)] for seed, step in enumerate((usual, tonight)))
+    own = SimpleNamespace(axis=2, steps=_steps(now), changing=_changing(now))
+    baseline = SimpleNamespace(steps={2: _steps(before)}, changing={2: _changing(before)})
+    told = _other_steps(own, baseline)
+    assert (said is None) == (told is None)
+    assert said is None or said in told

@@ -48,6 +48,12 @@ FINE, COARSER = 0.5, 3.0
 then changes in less than a third as many is logged in coarser steps, or each value several times:
 no fault takes a joint's noise away. One that changes in more may knock."""
 
+ONE_STEP, OTHER_STEP, TIED = 1.5, 2.0, 0.85
+"""A current comes in steps where the smallest of its changes are within 1.5 of each other (five
+times apart without). They are others than the baseline's where they are twice as large or as small,
+and matter where the coarser ones leave less than 85 % as many samples that differ from the one
+before: a healthy joint in steps of half its noise was at fault at 80 %, and healthy at 90 %."""
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -74,6 +80,7 @@ class Reference:
     level: Mapping[int, float]
     returning: Mapping[int, float]
     changing: Mapping[int, float]
+    steps: Mapping[int, tuple[float, float]]
 
 
 def reference_of(baseline: Sequence[Measured]) -> Reference:
@@ -99,6 +106,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
+        {axis: sorted(own.steps for own in runs)[len(runs) // 2] for axis, runs in by_axis.items()},
     )
 
 
@@ -262,6 +270,20 @@ def _coarser(own: Measured, reference: Reference) -> str | None:
     )
 
 
+def _other_steps(own: Measured, reference: Reference) -> str | None:
+    mine = (own.steps, own.changing)
+    usual = (reference.steps[own.axis], reference.changing[own.axis])
+    (fine, fine_changing), (coarse, coarse_changing) = sorted((mine, usual))
+    in_steps = coarse[1] <= ONE_STEP * coarse[0] and coarse[0] >= OTHER_STEP * fine[0] > 0
+    if not in_steps or coarse_changing > TIED * fine_changing:
+        return None
+    steps = f"steps of {coarse[0]:.2g}, the baseline's in finer ones"
+    if coarse is not own.steps:
+        steps = f"finer steps than the baseline's of {coarse[0]:.2g}"
+    why = "log both alike, steps look like a fault"
+    return f"the current of axis {own.axis} comes in {steps}; {why}"
+
+
 RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_signal,
     _frozen,
@@ -271,6 +293,7 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _clipped,
     _incomplete,
     _coarser,
+    _other_steps,
 )
 """In the order in which they are asked."""
 

@@ -31,6 +31,9 @@ that counts as motion has two periods in it."""
 SWING = 0.5
 """Of the others' largest swing: less is standstill, where a coarse converter keeps its value."""
 
+SMALLEST = (0.01, 0.05)
+"""Parts of a current's changes whose largest ones are one and the same where it comes in steps."""
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -55,6 +58,9 @@ class Measured:
     """Share of samples that are no numbers, by column of a current."""
     changing: float
     """Share of a current's samples that differ from the one before; of the coarsest column."""
+    steps: tuple[float, float]
+    """Quantiles 0.01 and 0.05 of the sizes of a current's changes, those of nothing left out: both
+    are the converter's step where it is no finer than the noise; of the coarsest column."""
     frozen: tuple[str, float] | None
     """Column that keeps one value while another swings, and from when on in seconds, or None."""
     leaning: float | None = None
@@ -142,6 +148,9 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         },
         "changing": min(
             (_changing([look[name] for look in looks]) for name in currents), default=1.0
+        ),
+        "steps": max(
+            (_steps([look[name] for look in looks]) for name in currents), default=(0.0, 0.0)
         ),
         "frozen": _frozen(
             run, currents, motion, looks, [start for start, _ in stretches] if spans else []
@@ -252,8 +261,19 @@ def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, i
 
 
 def _changing(parts: Sequence[Floats]) -> float:
-    steps = np.concatenate([np.diff(part[np.isfinite(part)]) for part in parts])
-    return float(np.mean(steps != 0)) if steps.size else 1.0
+    changes = _changes(parts)
+    return float(np.mean(changes != 0)) if changes.size else 1.0
+
+
+def _steps(parts: Sequence[Floats]) -> tuple[float, float]:
+    sizes = np.abs(_changes(parts))
+    sizes = sizes[sizes > 0]
+    smallest, small = np.quantile(sizes, SMALLEST) if sizes.size else (0.0, 0.0)
+    return float(smallest), float(small)
+
+
+def _changes(parts: Sequence[Floats]) -> Floats:
+    return np.concatenate([np.diff(part[np.isfinite(part)]) for part in parts])
 
 
 def _swing(values: npt.NDArray[np.floating]) -> float:
