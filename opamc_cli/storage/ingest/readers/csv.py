@@ -36,7 +36,8 @@ class CsvSource:
     Raises
     ------
     InputError
-        If there are no data rows, or the text is not in the map's encoding.
+        If there are no data rows, or more columns than names, or the text is not in the map's
+        encoding.
     """
 
     def __init__(self, path: Path, channels: IngestMap) -> None:
@@ -49,6 +50,13 @@ class CsvSource:
         self._delimiter = FIELD_MARK if self._rewrites else separator
         header, self._units, self._first_row = self._read_top()
         self._names = [name.strip() for name in header]
+        beyond = [text for text in self._first_row[len(header) :] if text.strip()]
+        if header and beyond:  # else each column might pass for its neighbour
+            msg = (
+                f"{path}: its first row has {len(self._first_row)} columns, its header names "
+                f"{len(header)}; check separator and decimal, or name what is missing in the header"
+            )
+            raise InputError(msg)
 
     def __enter__(self) -> Self:
         """Return the source itself."""
