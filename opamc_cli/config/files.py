@@ -114,7 +114,8 @@ def validate(
         return model.model_validate(values)
     except ValidationError as error:
         first = min(error.errors(), key=_helps_little)
-        place = [_part(part) for part in _keys_of(first["loc"])]
+        missing = first["type"] == "missing"
+        place = [_part(part) for part in _keys_of(values, first["loc"], missing=missing)]
         key = ".".join(place)
         if key in {override.partition("=")[0] for override in overrides}:
             source = "--set"
@@ -129,7 +130,7 @@ def validate(
         elif first["type"] == "value_error":
             named = f"{key}: " if key else ""
             msg = f"{source}: {named}{first['ctx']['error']}"
-        elif first["type"] == "missing":
+        elif missing:
             msg = f"{source}: {key} is missing; add it"
         else:
             wanted = TAKES.get(first["type"]) or _lower_first(first["msg"])
@@ -153,24 +154,26 @@ TAKES = {
 """What is said of values of another kind, in place of pydantic's own words."""
 
 
-def _keys_of(place: tuple[int | str, ...]) -> Iterator[int | str]:
-    """Yield the keys of a value's place.
+def _keys_of(values: Any, place: Sequence[int | str], *, missing: bool) -> Iterator[int | str]:
+    """Yield the keys of a value's place, the last of which may be missing.
 
-    Pydantic names the choices of "a word or a section" as well, which are no part of it; those of
-    a list's entries by their kind.
+    Pydantic names the choices of "a word or a section" as well, which the values do not hold.
     """
-    entry = False
-    for part in place:
-        choice = entry and isinstance(part, str) and (part == "str" or part[:1].isupper())
-        if not choice and not str(part).startswith(("dict[", "literal[")):
+    for depth, part in enumerate(place, 1):
+        entry = isinstance(values, list) and isinstance(part, int)
+        if entry or (isinstance(values, Mapping) and part in values):
+            values = values[part]
             yield part
-        entry = isinstance(part, int)
+        elif missing and depth == len(place):
+            yield part
 
 
 def _helps_little(found: Mapping[str, Any]) -> tuple[bool, bool, int]:
-    """Sort key: a misspelt key is also a missing one, and a section is no word."""
+    """Sort key: a misspelt key is also a missing one, and a section is no word and no number."""
     wants_word = found["type"] in ("literal_error", "string_type")
+    wants_number = found["type"] in ("float_type", "int_type")
     no_word = wants_word and not isinstance(found["input"], str)
+    no_word |= wants_number and isinstance(found["input"], Mapping)
     return found["type"] != "extra_forbidden", no_word, -len(found["loc"]) if no_word else 0
 
 

@@ -608,6 +608,7 @@ def test_models_of_an_axis_that_is_not_there(opamc, tmp_path, model):
     ("text", "part"),
     [
         ("effects: [gravty]", "did you mean gravity"),
+        ("effects: [foo]", "Unknown effect 'foo' in the model; known are inertia, gravity"),
         ("effects: 5", "effects is 5"),
         ("joint: {gear_ration: 100}", "did you mean 'gear_ratio'"),
         ("joint: {gear_ratio: -1}", "joint.gear_ratio is -1"),

@@ -151,8 +151,9 @@ def declared_effects(
     ConfigError
         If one is unknown.
     """
-    # A closed model may hold functions without a name; the loop itself adds them only at its end.
-    known = {**unnamed_library(), **library}
+    # A closed model may hold functions without a name; nobody else is offered them.
+    closed = {d.effect for d in model.declared()} - library.keys()
+    known = library | {name: e for name, e in unnamed_library().items() if name in closed}
     return tuple((effect_named(known, d.effect), d) for d in model.declared())
 
 

@@ -163,6 +163,7 @@ def test_a_large_file_is_the_same_as_its_rows(tmp_path):
         (b"a,b\n1,x7\n", "column b holds 'x7' in line 2"),
         (b"a,b\n1,2\n3\n", "line 3 has 1 columns where the first has 2"),
         (b"a,b\n1,2\n3,4,5\n", "line 3 has 3 columns"),
+        (b"a,b\n1,2,3\n4,5,6\n", "its first row has 3 columns, its header names 2"),
         (b"b,b\n1,2\n", "2 columns are called 'b'; name one by its number: 0, 1"),
         (b"a,c\n1,2\n", "no channel 'b'; the file has a, c"),
         (b"a,b\n1,\n3,\n", "column axis1_a (source 'b') has no value in 2 rows"),
@@ -212,6 +213,7 @@ def test_two_files_of_one_stem_are_refused_before_anything_is_written(tmp_path):
 
 
 GOOD = "columns: {axis1_a: {source: 0, unit: A}}\n"
+NAMED = GOOD + "sampling_rate_hz: 1\nmetadata: "
 
 
 @pytest.mark.parametrize(
@@ -257,6 +259,12 @@ GOOD = "columns: {axis1_a: {source: 0, unit: A}}\n"
             "sampling_rate_hz: 1\nheader: false\ncolumns: {axis1_a: {source: x, unit: A}}",
             "columns are numbered from 0",
         ),
+        ("sampling_rate_hz: fast\n" + GOOD, ": sampling_rate_hz is 'fast'; it takes a number"),
+        ("sampling_rate_hz: {source: fs}\n" + GOOD, ": sampling_rate_hz.unit is missing"),
+        (NAMED + "{payload_kg: none}", ": metadata.payload_kg is 'none'; it takes a number"),
+        (NAMED + "{robot: 0123}", "metadata.robot: 83 is read as a number; put it in quotes"),
+        (NAMED + "{started_at: 20260301}", "20260301 is read as a number; put it in quotes"),
+        (NAMED + "{robot: {sorce: a}}", "unknown key 'metadata.robot.sorce'; did you mean"),
     ],
 )
 def test_unusable_maps_are_refused(tmp_path, text, expected):

@@ -5,7 +5,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
@@ -65,15 +65,26 @@ class ValueMap(_Strict):
     source: Name
 
 
+def _no_number(value: object) -> object:
+    # YAML takes 0123 for 83, and 20260301 for a day in 1970
+    if isinstance(value, bool | int | float):
+        msg = f"{value} is read as a number; put it in quotes"
+        raise ValueError(msg)
+    return value
+
+
+Text = Annotated[str | ValueMap | None, BeforeValidator(_no_number)]
+
+
 class MetadataMap(_Strict):
     """What a run says of itself."""
 
-    robot: str | ValueMap | None = None
-    program: str | ValueMap | None = None
+    robot: Text = None
+    program: Text = None
     speed_percent: float | ValueMap | None = None
     payload_kg: float | ValueMap | None = None
-    started_at: datetime | str | ValueMap | None = None
-    session: str | ValueMap | None = None
+    started_at: Annotated[datetime | str | ValueMap | None, BeforeValidator(_no_number)] = None
+    session: Text = None
 
 
 class IngestMap(_Strict):
