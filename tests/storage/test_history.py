@@ -56,3 +56,36 @@ def test_nights_are_read_once_until_somebody_writes(tmp_path, monkeypatch):
             assert known(history) == []
             raise LookupError
         assert known(history) == ["2026-03-01", "2026-03-02"]
+
+
+def test_what_another_program_says_of_the_same_axis_and_night_is_news(tmp_path):
+    first, second = (
+        Event("2026-03-01", "r1", 1, "not-judged", f"axis 1 in program {name}: not judged")
+        for name in ("lift", "place")
+    )
+    with History(tmp_path / "history.sqlite") as history:
+        history.settle("r1", [], [], [first])
+        history.tell(history.events(untold=True))
+        history.settle("r1", [], [], [first])
+        assert history.events(untold=True) == []
+        history.settle("r1", [], [], [first, second])
+        assert history.events(untold=True) == [first, second]
+        history.tell(history.events(untold=True))
+        history.settle("r1", [], [], [second])
+        assert history.events(untold=True) == []
+
+
+def test_verdicts_of_two_programs_that_are_others_are_both_kept(tmp_path):
+    night = NightRow("r1", "2026-03-01", KEY, "done")
+    both = [
+        Event("2026-03-01", "r1", 1, "judged-anew", f"axis 1 in program {name} healthy, was fault")
+        for name in ("lift", "place")
+    ]
+    with History(tmp_path / "history.sqlite") as history:
+        history.record_night(night, events=both)
+        assert history.events(untold=True) == both
+        history.tell(both)
+        history.record_night(night, events=both)
+        assert history.events(untold=True) == []
+        history.record_night(night, events=both[:1])
+        assert history.events() == both

@@ -8,6 +8,7 @@ the clock, but the times at which a user acknowledged or declared something.
 
 import os
 import sqlite3
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import astuple
@@ -282,25 +283,31 @@ class History:
             self._put("night", [night])
             self._put("verdict", verdicts)
             self._put("measure", measures)
+            # of an axis each of several programs may have some
+            news: dict[tuple[Any, ...], list[Event]] = {}
             for one in events:
-                self._put_news(one, replaces=one.time == night.night)
+                news.setdefault(_key(one), []).append(one)
+            for of_key in news.values():
+                self._put_news(of_key, replaces=of_key[0].time == night.night)
             self._db.execute("INSERT OR IGNORE INTO stale VALUES (?)", (night.robot,))
 
-    def _put_news(self, event: Event, *, replaces: bool) -> None:
-        where = "robot = ? AND ifnull(axis, 0) = ? AND kind = ? AND time = ?"
-        key = (event.robot, event.axis or 0, event.kind, event.time)
+    def _put_news(self, events: Sequence[Event], *, replaces: bool) -> None:
+        """Keep events of one key; it is news if one of them is."""
+        where = "(robot, ifnull(axis, 0), kind, time) = (?, ?, ?, ?)"
+        key = _key(events[0])
         said = self._db.execute(f"SELECT text FROM event WHERE {where}", key).fetchall()
-        if (event.text,) in said:
+        new = [one for one in events if (one.text,) not in said]
+        if not new:
             return
         if replaces:
             self._db.execute(f"DELETE FROM event WHERE {where}", key)
-        self._db.execute(f"DELETE FROM told WHERE {where}", key)
-        self._put("event", [event])
+        self._db.execute("DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", key)
+        self._put("event", events if replaces else new)
 
     def record_news(self, event: Event) -> None:
         """Keep what somebody is to be told, whichever start comes to it."""
         with self.transaction():
-            self._put_news(event, replaces=False)
+            self._put_news([event], replaces=False)
 
     def forget_nights(self, robot: str, nights: Iterable[str]) -> None:
         """Forget nights of which nothing could be judged: their files are mended, or gone."""
@@ -353,12 +360,12 @@ class History:
         events
             What is worth saying.
         """
+        found, values = list(events), (robot, *OF_ROBOT)
+        of = f"WHERE robot = ? AND kind IN ({_marks(OF_ROBOT)})"
+        said = [Event(**row) for row in self.rows(f"SELECT * FROM event {of}", values)]
         with self.transaction():
             self._db.execute("DELETE FROM alarm WHERE robot = ?", (robot,))
-            self._db.execute(
-                f"DELETE FROM event WHERE robot = ? AND kind IN ({_marks(OF_ROBOT)})",
-                (robot, *OF_ROBOT),
-            )
+            self._db.execute(f"DELETE FROM event {of}", values)
             self._db.execute("UPDATE verdict SET alarm = 0 WHERE robot = ? AND alarm", (robot,))
             self._db.executemany(
                 "UPDATE verdict SET alarm = 1 "
@@ -366,8 +373,14 @@ class History:
                 [(robot, *place) for place in standing],
             )
             self._put("alarm", alarms)
-            self._put("event", events)
+            self._put("event", found)
             self._forget_told(OF_ROBOT, robot)
+            # programs share their axis' key: what one of them says later is news
+            before, after = Counter(map(_key, said)), Counter(map(_key, found))
+            joined = [key for key, n in after.items() if n > before[key] > 0]
+            self._db.executemany(
+                "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", joined
+            )
             self._db.execute("DELETE FROM stale WHERE robot = ?", (robot,))
 
     def replace_missing(self, events: Iterable[Event]) -> None:
@@ -436,9 +449,7 @@ class History:
     def untold(self, events: Sequence[Event]) -> list[Event]:
         """Return those of some events that nobody was told of."""
         known = {tuple(row.values()) for row in self.rows("SELECT * FROM told")}
-        return [
-            one for one in events if (one.robot, one.axis or 0, one.kind, one.time) not in known
-        ]
+        return [one for one in events if _key(one) not in known]
 
     def told(self, kinds: Sequence[str]) -> list[Event]:
         """Return what somebody was told of some kinds, without its words."""
@@ -447,10 +458,7 @@ class History:
 
     def tell(self, events: Iterable[Event], no_more: Iterable[Event] = ()) -> None:
         """Remember that somebody was told, and that something is so `no_more`."""
-        told, over = (
-            [(one.robot, one.axis or 0, one.kind, one.time) for one in said]
-            for said in (events, no_more)
-        )
+        told, over = ([_key(one) for one in said] for said in (events, no_more))
         with self.transaction():
             self._db.executemany(
                 "DELETE FROM told WHERE (robot, axis, kind, time) = (?, ?, ?, ?)", over
@@ -475,7 +483,7 @@ class History:
                 [(robot, night) for night in nights],
             )
             for one in events:
-                self._put_news(one, replaces=False)
+                self._put_news([one], replaces=False)
 
     def _put(self, table: str, rows: Iterable[Any]) -> None:
         values = [astuple(row) for row in rows]
@@ -483,6 +491,11 @@ class History:
             self._db.executemany(
                 f"INSERT OR REPLACE INTO {table} VALUES ({_marks(values[0])})", values
             )
+
+
+def _key(event: Event) -> tuple[str, int, str, str]:
+    """Return what is remembered of an event that somebody was told."""
+    return event.robot, event.axis or 0, event.kind, event.time
 
 
 def _marks(values: Sequence[object]) -> str:

@@ -188,7 +188,8 @@ def _other_verdicts(
     for one in verdicts:
         was = known.get((one.program, one.axis), one.state)
         if was != one.state:
-            text = f"{one.night} axis {one.axis} {one.state}, was {was} ({night.why})"
+            of = f" in program {one.program}" if len({v.program for v in verdicts}) > 1 else ""
+            text = f"{one.night} axis {one.axis}{of} {one.state}, was {was} ({night.why})"
             yield Event(one.night, one.robot, one.axis, "judged-anew", text)
 
 
