@@ -5,7 +5,7 @@ import numpy as np
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.plausible.continuity import leaps
-from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, clipped_share, strided_speed
 from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.run import Run
@@ -18,6 +18,10 @@ UNITS = {180 / np.pi: "rad taken for degrees", np.pi / 180: "degrees taken for r
 NEARLY = 0.2
 """By which a scale may miss one of them: gravity does not tell it better over a short travel."""
 WRAPS, WRAPS_LIKE = {360.0: "degrees", 1.0: "turns"}, 0.05
+CLIPPED, MOVING = 0.01, 0.01
+"""Share of a current's samples in motion at its limit from which on it is said, and of the largest
+speed from which on a joint moves: one that rests may hold its largest load in a converter's step.
+"""
 MOST_LOOKED, STRETCHES = 1 << 20, 4
 """Samples of an angle whose steps are looked at, in four stretches: of eight hours enough."""
 
@@ -32,6 +36,7 @@ def mistaken(run: Run, axis: int, recording: Recording) -> list[str]:
     """
     notes = [
         *_sizes(run, axis, recording),
+        *_clipped(run, axis, recording),
         *missing(run, f"axis{axis}_position"),
     ]
     x, q = recording.current_a, recording.position_rad
@@ -63,6 +68,25 @@ def _sizes(run: Run, axis: int, recording: Recording) -> list[str]:
         name = f"axis{axis}_position (its speed)"
         found.append(limited(run.path, name, speed, LIMITS["position"]))
     return [note for note in found if note]
+
+
+def _clipped(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say which currents reach a limit: what lies beyond it would pass for an effect."""
+    if recording.phases_a is not None:
+        currents = dict(zip("abc", recording.phases_a.T, strict=True))
+    elif recording.current_a is not None and recording.position_rad is not None:
+        speed = np.abs(strided_speed(recording.position_rad, recording.rate_hz))
+        moving = np.flatnonzero(speed > MOVING * np.nanmax(speed, initial=0.0))
+        currents = {"current": recording.current_a[moving]}
+    else:
+        return []
+    shares = {name: clipped_share(values) for name, values in currents.items()}
+    return [
+        f"{run.path}: axis{axis}_{name} is clipped in {share:.0%} of its samples, and what lies "
+        "beyond looks like an effect; check the sensor's range or the drive's limit"
+        for name, share in shares.items()
+        if share > CLIPPED
+    ]
 
 
 def missing(run: Run, column: str) -> list[str]:

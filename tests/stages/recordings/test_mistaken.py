@@ -98,6 +98,13 @@ def test_numbers_that_few_joints_have_are_said(model, capsys):
 
 
 @pytest.mark.long
+def test_a_current_that_reaches_its_limit_is_said(model, capsys):
+    limit = 0.6 * np.abs(OWN.current).max()
+    clipped = np.clip(OWN.current, -limit, limit)
+    assert model(axis1_current=clipped, axis1_position=OWN.position) == 0
+    assert "axis1_current is clipped in" in capsys.readouterr().err
+
+
 def test_gravity_of_another_scale_is_said_where_no_effect_explains_it(model, tmp_path, capsys):
     code = model("close", "--quiet", axis1_current=OWN.current, axis1_position=OWN.position / 100)
     assert code == 0
