@@ -26,8 +26,9 @@ class RecordingConfig(Section):
 
     sampling_rate_hz: Positive = 2048.0
     columns: tuple[Column, ...] = Field(("phases",), min_length=1)
-    sessions: Annotated[int, Field(ge=1)] = 1
-    first_session: Annotated[int, Field(ge=0)] = 0
+    # one a day
+    sessions: Annotated[int, Field(ge=1, le=100_000)] = 1
+    first_session: Annotated[int, Field(ge=0, le=1_000_000)] = 0
 
 
 class FaultConfig(Section):
