@@ -265,6 +265,8 @@ def test_what_is_no_stage_table(opamc, tmp_path, command, make, part):
         (["--config", "{testbed}", "--set", "recordng.sessions=1"], "did you mean 'recording'"),
         (["--config", "{testbed}", "--fault", "third"], "write AXIS or AXIS:SEVERITY"),
         (["--config", "{testbed}", "--fault", "9"], "9"),
+        (["--config", "{testbed}", "--sessions", "99999999999"], "sessions is 99999999999"),
+        (["--config", "{testbed}", "--first-session", "9999999"], "first_session is 9999999"),
     ],
 )
 def test_testbeds(opamc, tmp_path, arguments, part):
@@ -473,19 +475,35 @@ def test_missing_positions_are_bridged(opamc, tmp_path):
     assert counts[0] == counts[1]
 
 
+def _chained(opamc, folder, run, *options, segment=(), reference=()):
+    assert opamc("segment", run, "--out", folder, *segment).code == 0
+    assert opamc("identify", "--out", folder, *reference).code == 0
+    assert opamc("patterns", "--out", folder, *options).code == 0
+    return folder / "patterns.parquet"
+
+
 def test_tables_of_unequal_options(opamc, tmp_path, pair):
-    sides = []
-    for side, run, option in zip(
-        ("b", "t"), pair, ("patterns.frames=16", "patterns.frames=8"), strict=True
+    baseline = _chained(opamc, tmp_path / "b", pair[0])
+    reference = ["--reference", tmp_path / "b" / "motions.parquet"]
+    for name, given, parts in (
+        ("f", {"options": ["--set", "patterns.frames=8"]}, ["patterns.frames 8 where", "has 16"]),
+        ("s", {"segment": ["--set", "segment.min_motion_s=0.3"]}, ["segment.min_motion_s 0.3"]),
     ):
-        out = tmp_path / side
-        reference = ["--reference", tmp_path / "b" / "motions.parquet"] if side == "t" else []
-        assert opamc("segment", run, "--out", out).code == 0
-        assert opamc("identify", "--out", out, *reference).code == 0
-        assert opamc("patterns", "--out", out, "--set", option).code == 0
-        sides += [f"--{'baseline' if side == 'b' else 'target'}", out / "patterns.parquet"]
-    ended = opamc("score", *sides, "--out", tmp_path / "out")
-    check_refusal(ended, ExitCode.BAD_INPUT, "patterns.frames 8 where", "has 16")
+        options = given.pop("options", [])
+        target = _chained(opamc, tmp_path / name, pair[1], *options, reference=reference, **given)
+        ended = opamc("score", "--baseline", baseline, "--target", target, "--out", tmp_path / "o")
+        check_refusal(ended, ExitCode.BAD_INPUT, *parts)
+
+
+def test_a_target_that_was_not_identified_by_the_baselines_reference(opamc, tmp_path, pair):
+    baseline, target = (
+        _chained(opamc, tmp_path / side, run, "--set", "patterns.tau=3")
+        for side, run in zip("bt", pair, strict=True)
+    )
+    sides = ["--baseline", baseline, "--target", target]
+    for command in ("score", "decide"):
+        ended = opamc(command, *sides, "--out", tmp_path / "out")
+        check_refusal(ended, ExitCode.BAD_INPUT, str(target), "by another cycle", "--reference")
 
 
 def test_a_table_of_one_stage_is_not_another(opamc, tmp_path, pair):

@@ -28,7 +28,7 @@ from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.channels import same_clock
 from opamc_cli.storage.schemas.tables import MOTIONS, SEGMENTS
 from opamc_cli.storage.sources import RunSource, read_sources, sources_record
-from opamc_cli.storage.tables import read_table, table_input, write_table
+from opamc_cli.storage.tables import read_table, record_at, table_input, write_table
 
 MIN_CORRELATION = 0.5
 """Below this the correlation peak says nothing of time, and the segment's own start is kept."""
@@ -191,6 +191,7 @@ def run(
             **config.canonical("identify"),
             "patterns": {"envelope": config.patterns.envelope},
             "reference_run": reference_run,
+            "segment": record_at(segments)["config"].get("segment", {}),
         },
         inputs=inputs,
         extra=sources_record(list(sources.values()), out) | {OTHER_SPEEDS: other_speeds},

@@ -24,7 +24,7 @@ from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_pa
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, PLACE
 from opamc_cli.storage.sources import read_sources, sources_record
-from opamc_cli.storage.tables import read_table, table_input, write_table
+from opamc_cli.storage.tables import read_table, record_at, table_input, write_table
 
 FILES = (files.PATTERNS, *(witness.FILE_NAME for witness in WITNESSES))
 
@@ -107,7 +107,11 @@ def run(
         ).combine_chunks()
         for witness in WITNESSES
     }
-    inputs, used = [table_input(motions)], config.canonical("patterns")
+    inputs = [table_input(motions)]
+    # segments of other options have other ends, and so have their patterns
+    used = config.canonical("patterns") | {
+        "segment": record_at(motions)["config"].get("segment", {})
+    }
     for name, rows in {files.PATTERNS: patterns, **beside}.items():
         write_table(
             out / name,

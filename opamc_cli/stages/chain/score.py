@@ -93,6 +93,7 @@ def compare_sides(
             "with the same configuration and identify the target by the baseline's reference"
         )
         raise InputError(msg)
+    _refuse_other_reference(sides, common)
     base = config.score.base
     scores = score_table(sides, base)
     features = feature_table(scores, other, base, models)
@@ -126,6 +127,22 @@ def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
                     f"{sides.baseline.path} has {values[0]!r}; make both with the same options"
                 )
                 raise InputError(msg)
+
+
+def _refuse_other_reference(sides: Sides, common: Sequence[Key]) -> None:
+    """Refuse motions that were told by another cycle: the first of one may be the other's second.
+
+    Each segment has the largest frequency of its motion in the reference cycle.
+    """
+    for key in common:
+        own, other = (rows[key].rows["f_max_hz"].astype(float)[0] for rows in sides.rows)
+        if own != other and np.isfinite([own, other]).all():
+            msg = (
+                f"{sides.target.path}: its motions were told by another cycle than those of "
+                f"{sides.baseline.path}; identify the target with --reference, naming the "
+                "baseline's motions.parquet, and make its patterns anew"
+            )
+            raise InputError(msg)
 
 
 def score_table(sides: Sides, base: float) -> pa.Table:
