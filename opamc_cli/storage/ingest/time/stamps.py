@@ -220,13 +220,18 @@ def _uneven_clock(
     n_duplicates = int(repeated.sum())
     n_unreadable = int((~readable).sum())
     n_dropped = int((~kept).sum())
+    n_backward = n_dropped - n_duplicates - n_unreadable
     if n_dropped > MAX_DROPPED * len(times_s) or n_dropped > len(times_s) - 3:
+        set_back = n_backward > n_dropped / 2
+        what = (
+            "split the recording where its clock was set back" if set_back else "correct its unit"
+        )
         msg = (
             f"{path}: time column {source!r} is unusable in {n_dropped} of {len(times_s)} rows "
-            f"({n_duplicates} repeated, {n_dropped - n_duplicates - n_unreadable} backward, "
+            f"({n_duplicates} repeated, {n_backward} backward, "
             f"{n_unreadable} unreadable; first: data row {int(np.argmin(kept)) + 1}), "
-            f"at most {MAX_DROPPED:.0%} may be; correct its unit in the map, or drop time and "
-            "give sampling_rate_hz"
+            f"at most {MAX_DROPPED:.0%} may be; {what}, or drop time from the map and give "
+            "sampling_rate_hz"
         )
         raise InputError(msg)
     step = np.diff(times_s[kept])
@@ -263,7 +268,7 @@ def _uneven_clock(
         n_gaps=len(gaps),
         longest_gap_s=float(gaps.max(initial=0.0)),
         n_duplicates=n_duplicates,
-        n_backward=n_dropped - n_duplicates - n_unreadable,
+        n_backward=n_backward,
         n_unreadable=n_unreadable,
     )
     return Clock(rate, n_samples, start_s, kept, max_gap_s, account)

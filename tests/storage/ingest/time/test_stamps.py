@@ -75,6 +75,11 @@ def test_gaps_repeats_and_backward_steps_are_counted():
             None,
             "500 of 1000 rows (1 repeated, 499",
         ),
+        (
+            (np.arange(1000.0) - 700 * (np.arange(1000) > 800)) / 100,
+            None,
+            "at most 5% may be; split the recording where its clock was set back",
+        ),
         (np.zeros(100), None, "99 of 100 rows"),
         (np.full(100, np.nan), None, "100 unreadable"),
         (np.arange(100.0) / 100, 200.0, "says 100 Hz, the map 200 Hz, more than 10% apart"),
