@@ -93,7 +93,6 @@ def compare_sides(
             "with the same configuration and identify the target by the baseline's reference"
         )
         raise InputError(msg)
-    _refuse_other_reference(sides, common)
     base = config.score.base
     scores = score_table(sides, base)
     features = feature_table(scores, other, base, models)
@@ -101,7 +100,12 @@ def compare_sides(
     used = config.canonical("score")
     for name, table in ((files.SCORES, scores), (files.FEATURES, features)):
         write_table(out / name, table, stage="score", config=used, inputs=inputs)
-    notes += (*sides.notes(), *_missing_notes(own, other), *_short_notes(own))
+    notes += (
+        *_other_reference(sides, common),
+        *sides.notes(),
+        *_missing_notes(own, other),
+        *_short_notes(own),
+    )
     return ScoreOutcome(
         out / files.SCORES,
         out / files.FEATURES,
@@ -129,20 +133,20 @@ def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
                 raise InputError(msg)
 
 
-def _refuse_other_reference(sides: Sides, common: Sequence[Key]) -> None:
-    """Refuse motions that were told by another cycle: the first of one may be the other's second.
+def _other_reference(sides: Sides, common: Sequence[Key]) -> list[str]:
+    """Say where motions were told by another cycle: the first of one may be the other's second.
 
     Each segment has the largest frequency of its motion in the reference cycle.
     """
     for key in common:
         own, other = (rows[key].rows["f_max_hz"].astype(float)[0] for rows in sides.rows)
         if own != other and np.isfinite([own, other]).all():
-            msg = (
+            return [
                 f"{sides.target.path}: its motions were told by another cycle than those of "
-                f"{sides.baseline.path}; identify the target with --reference, naming the "
-                "baseline's motions.parquet, and make its patterns anew"
-            )
-            raise InputError(msg)
+                f"{sides.baseline.path}, and may be others of the same number; identify it with "
+                "--reference, naming the baseline's motions.parquet, and make its patterns anew"
+            ]
+    return []
 
 
 def score_table(sides: Sides, base: float) -> pa.Table:
