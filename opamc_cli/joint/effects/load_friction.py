@@ -41,7 +41,8 @@ class LoadFriction(Effect):
         load = track.load_a[rows]
         beyond = 1 - parameters.get("inertia_share", 1.0)
         if beyond:
-            load = load - beyond * track.load_inertia * track.acceleration[rows]
+            places, weights = track.inertia_weights
+            load = load - beyond * (weights @ track.load_a[places]) * track.acceleration[rows]
         return stack(track.direction[rows] * np.abs(load) ** parameters.get("exponent", 1.0))
 
     def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:

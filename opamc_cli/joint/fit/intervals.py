@@ -41,7 +41,7 @@ def certainty(fit: Fit) -> Certainty:
     inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
     flat = np.concatenate(fit.coefficients) if fit.coefficients else np.zeros(0)
     units = sums.parts.units
-    scores = sums.parts.by_unit(sums.moment - sums.gram @ flat) / scale
+    scores = (1 - sums.parts.others) @ (sums.moment - sums.gram @ flat) / scale
     meat = scores.T @ scores * (units / max(units - 1, 1))
     covariance = inverse @ meat @ inverse
     errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale

@@ -96,10 +96,6 @@ class Parts:
             return halves
         return np.asarray(np.minimum(stretch, place - 1)[halves])
 
-    def by_unit(self, values: Floats) -> Floats:
-        """Sum parts' values, shape (p, ...), over each unit."""
-        return _summed(values, self.unit)
-
     def elsewhere(self, values: Floats) -> Floats:
         """Sum parts' values, shape (p, ...), over all units but each one."""
         sums = self.others @ values.reshape(len(values), -1)

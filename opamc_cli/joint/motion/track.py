@@ -129,12 +129,6 @@ class Track:
             return self.reference.temperature_c
         return 0.0 if self.temperature_c is None else float(self.temperature_c[self.moving].mean())
 
-    @property
-    def load_inertia(self) -> float:
-        """Current of the fitted load that follows the acceleration, in A by rad/s²."""
-        rows, weights = self.inertia_weights
-        return float(weights @ self.load_a[rows])
-
     @cached_property
     def inertia_weights(self) -> tuple[Ints, Floats]:
         """Samples of a load, and weights whose sum over them is what follows the acceleration."""
