@@ -15,6 +15,7 @@ from simulator import simulate
 from threadpoolctl import threadpool_limits
 
 from opamc_cli.__main__ import main
+from opamc_cli.joint.motion import kinematics
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
@@ -93,6 +94,25 @@ def test_what_the_sealed_data_do_not_show_is_said_also_if_quiet(tmp_path, capsys
     assert "searched show spring" in capsys.readouterr().err
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     assert (entry["verdict"], entry["unconfirmed"]) == ("nothing-missing", ["spring"])
+
+
+@pytest.mark.parametrize("hidden", ["ripple", "quadratic_friction"])
+def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, monkeypatch):
+    made = simulate(3, (hidden,), 15.0, rate=2000.0, cycles=4)
+    phases = {f"axis1_{name}": made.phases[:, k] for k, name in enumerate("abc")}
+    write_run(tmp_path / "run.parquet", 2000.0, **phases)
+    true = kinematics.without_slips
+    monkeypatch.setattr(
+        kinematics, "without_slips", lambda *a: replace(true(*a), guessed_s=(0.25, 0.5))
+    )
+    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    said = capsys.readouterr().err
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert hidden in {step["effect"] for step in entry["steps"]}
+    doubted = hidden == "ripple"
+    assert ("ripple may be wrong: the place" in said) == doubted
+    assert len(entry["doubts"]) == doubted
+    assert any("turned in 2 gaps without current (0.8 s in all)" in n for n in entry["notes"])
 
 
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):

@@ -267,8 +267,7 @@ def _one(
     elif phase_angle is not None:
         steady = uniform_filter1d(1.0 * phase_angle.strong, phase_angle.window) > STEADY
         period = cycle_length(phase_angle.velocity_rad_s, known=steady)
-        if period is not None:
-            phase_angle = without_slips(phase_angle, steady, period, rate)
+        phase_angle = without_slips(phase_angle, steady, period, rate)
         motion = _scaled(phase_angle, 1.0 if turns is None else 1.0 / turns)
         # Where there is too little current to tell an angle, the motion is a guess.
         usable &= ~widened(lost(phase_angle.strong, rate), phase_angle.window) & phase_angle.clear
@@ -359,6 +358,7 @@ def _one(
         blur=motion.blur,
         others=others,
         other_axes=beside,
+        guessed_s=() if logged or phase_angle is None else phase_angle.guessed_s,
     )
 
 

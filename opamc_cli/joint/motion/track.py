@@ -103,6 +103,8 @@ class Track:
     """`time_s` at which each recording begins, where recordings have no common clock."""
     reference: "Reference | None" = None
     """What regressors are measured by, where it is not to be that of these recordings."""
+    guessed_s: tuple[float, ...] = ()
+    """Lengths of gaps without current in which the motion, of phases alone, is a guess."""
 
     @property
     def size(self) -> int:
@@ -282,6 +284,7 @@ def joined(pieces: Sequence[Track]) -> Track:
         channels=frozenset.intersection(*(piece.channels for piece in pieces)),
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
+        guessed_s=sum((piece.guessed_s for piece in pieces), ()),
     )
 
 

@@ -32,6 +32,10 @@ OPPOSITE = (
     "axis {}: friction would drive the joint: its current has the opposite sign of its motion, and "
     "the negative of it is modelled"
 )
+GUESSED = (
+    "axis {}: what was turned in {} gaps without current ({:.1f} s in all) is a guess, and so is "
+    "the place: log the position to be certain"
+)
 
 
 @dataclass(frozen=True)
@@ -137,6 +141,9 @@ def lay(
     fit = ways.best_fit()
     if fit is None:
         raise _too_little_motion(recordings, joint, axis, named)
+    guessed_s = fit.dataset.fine.track.guessed_s
+    if guessed_s:
+        read.notes.append(GUESSED.format(axis, len(guessed_s), sum(guessed_s)))
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
     return AxisModel(axis, fit, ways.fit_anew, declared, allowed, read)
 

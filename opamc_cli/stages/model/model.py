@@ -43,6 +43,13 @@ ALONE = (
     "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
     "like {}; log it beside to tell"
 )
+OF_THE_PLACE = {
+    "gravity", "hysteresis", "load_friction", "payload_change", "position_drag", "ripple", "spring",
+}  # fmt: skip
+DOUBTED = (
+    "axis {}: {} may be wrong: the place, which is behind it, is a guess after {} gaps without "
+    "current ({:.1f} s in all); log the position to be certain"
+)
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
@@ -209,7 +216,13 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
             laid = negative
             loop = close_loop(laid.fit, laid.library, seed, anew=laid.anew)
             laid.notes.append(OPPOSITE.format(axis))
-    named = sorted({step.term.effect.name for step in loop.steps} & LIKE_ANOTHER_JOINT)
+    found = {step.term.effect.name for step in loop.steps}
+    placed, guessed_s = sorted(found & OF_THE_PLACE), loop.after.dataset.fine.track.guessed_s
+    if placed and guessed_s:
+        doubt = DOUBTED.format(axis, " and ".join(placed), len(guessed_s), sum(guessed_s))
+        laid.notes.append(doubt)
+        laid.read.doubts.append(doubt)
+    named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and "coupling" in loop.untestable:
         laid.notes.append(ALONE.format(axis, " and ".join(named)))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):

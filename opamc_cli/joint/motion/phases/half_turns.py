@@ -27,6 +27,8 @@ FEWEST_CYCLES = 3
 LARGEST_DRIFT = 0.1
 AGREED = 2 / 3
 """Share of cycles that agree where they tell what was turned in a gap."""
+GUESSED_S = 0.05
+"""Without cycles that could agree a longer gap in mid-move is a guess: half are miscounted."""
 
 
 def bridged(
@@ -75,8 +77,8 @@ def bridged(
     return angle - np.cumsum(turns), speed
 
 
-def without_slips(angle: PhaseAngle, sure: Bools, period: int, rate_hz: float) -> PhaseAngle:
-    """Let the angle of a motion that repeats repeat.
+def without_slips(angle: PhaseAngle, sure: Bools, period: int | None, rate_hz: float) -> PhaseAngle:
+    """Let the angle of a motion that repeats, if it does, repeat, and tell what is a guess.
 
     While the current is too small to be `sure`, (n,), the angle may slip by a multiple of pi. A
     stretch of current has the angle that it had one cycle earlier; in the first cycle, the one that
@@ -85,15 +87,15 @@ def without_slips(angle: PhaseAngle, sure: Bools, period: int, rate_hz: float) -
     travel, and all by as much: that is no slip.
     """
     path = angle.angle_rad
-    cycles = path.size // period
     pieces = stretches(angle.strong, rate_hz)
-    if cycles < FEWEST_CYCLES or not pieces:
-        return angle
-    course = _common_course(path, sure, period, rate_hz)
-    if course is None:
-        return angle
+    found = None
+    if period is not None and path.size >= FEWEST_CYCLES * period and pieces:
+        found = _common_course(path, sure, period, rate_hz)
+    if period is None or found is None:
+        return replace(angle, guessed_s=_unseen(angle, rate_hz))
+    course, guessed_s = found
     repeated = path.copy()
-    edges, slips = [0.0], [0.0]
+    slips: list[float] = []
     slip, anchor = 0.0, None
     for start, stop in pieces:
         rest = path[start:stop] - course[np.arange(start, stop) % period]
@@ -108,20 +110,30 @@ def without_slips(angle: PhaseAngle, sure: Bools, period: int, rate_hz: float) -
             anchor = middle if anchor is None else anchor
             slip = np.pi * np.round((middle - anchor) / np.pi)
         repeated[start:] = path[start:] - slip
-        edges += [float(start), float(stop)]
         slips += [slip, slip]
-    correction = np.interp(np.arange(path.size), edges, slips)
+    correction = np.interp(np.arange(path.size), np.ravel(pieces), slips)
     speed = angle.velocity_rad_s - rate_hz * np.gradient(correction) * lost(angle.strong, rate_hz)
-    return replace(angle, angle_rad=path - correction, velocity_rad_s=speed)
+    return replace(angle, angle_rad=path - correction, velocity_rad_s=speed, guessed_s=guessed_s)
 
 
-def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> Floats | None:
-    """One cycle of a path that repeats, NaN where few cycles have current.
+def _unseen(angle: PhaseAngle, rate_hz: float) -> tuple[float, ...]:
+    """Lengths of gaps in the middle of a move of which speeds on both sides tell too little."""
+    speed = np.abs(angle.velocity_rad_s)
+    slow = REST_SHARE * float(np.quantile(speed[angle.strong], 0.95)) if angle.strong.any() else 0.0
+    gaps = pairwise(stretches(angle.strong, rate_hz, GUESSED_S))
+    ends = [(stop, start) for (_, stop), (start, _) in gaps]
+    return tuple((b - a) / rate_hz for a, b in ends if max(speed[a - 1], speed[b]) >= slow)
+
+
+def _common_course(
+    path: Floats, strong: Bools, period: int, rate_hz: float
+) -> tuple[Floats, tuple[float, ...]] | None:
+    """One cycle of a path that repeats, NaN where few cycles have current, and all gaps guessed.
 
     From one stretch of current to the next the angle changes by what most cycles say; of a whole
     cycle nothing may be left: that was turned in the gap in which cycles differ most, if no two of
-    three agree there, else in the longest. None if more than a tenth of the travel is left and no
-    cycles differ by as much.
+    three agree there, else in the longest; where they do not in two gaps or more, these are all
+    guesses. None if more than a tenth of the travel is left and no cycles differ by as much.
     """
     cycles = path.size // period
     folded = path[: cycles * period].reshape(cycles, period)
@@ -144,13 +156,12 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
         doubts.append(float(np.ptp(whole)) if counts.max() < AGREED * counts.sum() else 0.0)
     left = float(np.sum(steps))
     heights = np.concatenate([[0.0], np.cumsum(steps)])
-    drifts = np.pi * max(doubts) < LARGEST_DRIFT * float(np.ptp(heights)) < abs(left)
-    if drifts:
+    if np.pi * max(doubts) < LARGEST_DRIFT * float(np.ptp(heights)) < abs(left):
         return None
+    starts, stops = np.array(anchors).T
+    gaps = (np.roll(starts, -1) - stops) % period
     turns = np.pi * np.round(left / np.pi)
     if turns:
-        starts, stops = np.array(anchors).T
-        gaps = (np.roll(starts, -1) - stops) % period
         heights[np.lexsort((gaps, doubts))[-1] + 1 :] -= turns
     course = np.full(period, np.nan)
     for (start, stop), place, height in zip(anchors, places, heights, strict=False):
@@ -158,7 +169,8 @@ def _common_course(path: Floats, strong: Bools, period: int, rate_hz: float) -> 
         about = np.where(current[:, [place]], folded - folded[:, [place]], np.nan)[:, rows]
         inside = np.where(current[:, rows], about, np.nan)
         course[rows] = height + np.nanmedian(inside, axis=0)
-    return course
+    guessed = [float(gap) / rate_hz for gap, doubt in zip(gaps, doubts, strict=True) if doubt]
+    return course, tuple(guessed) * cycles if len(guessed) > 1 else ()
 
 
 def lost(strong: Bools, rate_hz: float) -> Bools:

@@ -40,6 +40,8 @@ class PhaseAngle:
     """Moving average that the angle and its derivatives have gone through."""
     blur: Floats
     """What the acceleration would gain or lose by a shorter and a longer window; (n, 2)."""
+    guessed_s: tuple[float, ...] = ()
+    """Lengths of the gaps without current in which nothing tells how much was turned."""
 
     def aligned_with(
         self, position_rad: Floats, velocity_rad_s: Floats, ratio: float | None, rate_hz: float

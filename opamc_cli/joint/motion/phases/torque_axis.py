@@ -30,21 +30,16 @@ def torque_current(
     torque: Floats = (current_vector(phases_a) * np.exp(-1j * electrical_rad)).real
     speeds = np.abs(velocity)
     moving = speeds > SLOWEST_SHARE * float(np.quantile(speeds, 0.98))
-    columns = np.concatenate([_frictions(velocity), _powers(position_rad)], axis=1)[moving]
+    columns = _columns(velocity, position_rad)[moving]
     friction = columns[:, :2] @ solve(columns.T @ columns, columns.T @ torque[moving])[:2]
     return torque if float(np.dot(friction, velocity[moving])) >= 0 else -torque
 
 
-def _frictions(velocity: Floats) -> Floats:
-    """Dry and lubricant friction."""
-    return np.stack([np.sign(velocity), velocity], axis=1)
-
-
-def _powers(position: Floats) -> Floats:
-    """Lowest powers of the position, for whatever holds the joint in place."""
+def _columns(velocity: Floats, position: Floats, *others: Floats) -> Floats:
+    """Dry and lubricant friction, others, and powers of the place for whatever holds it there."""
     place = position / max(float(np.ptp(position)), 1e-9) * 2
     place = place - place.mean()
-    return np.stack([place**k for k in range(4)], axis=1)
+    return np.stack([np.sign(velocity), velocity, *others, *(place**k for k in range(4))], axis=1)
 
 
 def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
@@ -63,8 +58,7 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     speed = angle.velocity_rad_s
     slowest = SLOWEST_SHARE * float(np.quantile(np.abs(speed), 0.98))
     moving = angle.strong & (np.abs(speed) > slowest)
-    inertia = angle.acceleration_rad_s2[:, None]
-    columns = np.concatenate([_frictions(speed), inertia, _powers(angle.angle_rad)], axis=1)
+    columns = _columns(speed, angle.angle_rad, angle.acceleration_rad_s2)
     columns /= np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
 
     def sums(parts: list[tuple[int, int]]) -> tuple[Floats, Floats, Floats]:

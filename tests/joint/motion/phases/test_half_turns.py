@@ -40,7 +40,10 @@ def test_an_angle_that_repeats_is_freed_of_slips():
     left = (turned - freed.angle_rad)[strong]
     np.testing.assert_allclose(left, left[0], atol=0.5)
     drifting = replace(angle, angle_rad=path + 0.1 * np.arange(true.size))
-    assert without_slips(drifting, strong, period, rate) is drifting
+    same = without_slips(drifting, strong, period, rate)
+    assert same.angle_rad is drifting.angle_rad
+    # A cycle that does not close tells nothing of its gaps.
+    np.testing.assert_allclose(same.guessed_s, [40 / rate] * 10)
 
 
 @pytest.mark.parametrize("gap_s", [0.03, 0.09, 0.12])
@@ -88,12 +91,13 @@ def test_a_cycle_of_gaps_is_counted_as_most_cycles_say():
         path[start + 20 :] += np.pi * 3 * (cycle == 0)
     speed, blur = np.gradient(path) * rate, np.zeros((true.size, 2))
     angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
-    freed = without_slips(angle, strong, period, rate).angle_rad
-    assert np.ptp((freed - true)[strong]) < 1e-6
+    freed = without_slips(angle, strong, period, rate)
+    assert np.ptp((freed.angle_rad - true)[strong]) < 1e-6
+    assert freed.guessed_s == ()
 
 
-def slipping(rate=500.0, period=1000, cycles=5):
-    """Return a path that repeats, and an angle that slips by hundreds of turns in one gap."""
+def slipping(rate=500.0, period=1000, cycles=5, slips=(450,)):
+    """Return a path that repeats, and an angle that slips by hundreds of turns in some gaps."""
     rng = np.random.default_rng(5)
     true = 200 * np.sin(2 * np.pi * np.arange(period * cycles + 300) / period)
     strong = np.ones(true.size, dtype=bool)
@@ -102,7 +106,7 @@ def slipping(rate=500.0, period=1000, cycles=5):
         for gap in (100, 450, 800):
             start = cycle * period + gap
             strong[start : start + 100] = False
-            path[start + 50 :] += np.pi * rng.integers(20, 200) * (gap == 450)
+            path[start + 50 :] += np.pi * rng.integers(20, 200) * (gap in slips)
     speed, blur = np.gradient(path) * rate, np.zeros((true.size, 2))
     angle = PhaseAngle(path, speed, speed, strong, strong, 5, np.ones(1), blur)
     return true, strong, angle, without_slips(angle, strong, period, rate)
@@ -111,6 +115,23 @@ def slipping(rate=500.0, period=1000, cycles=5):
 def test_where_no_cycles_agree_what_is_left_of_a_cycle_was_turned():
     true, strong, _, freed = slipping()
     assert np.ptp((freed.angle_rad - true)[strong]) < 1e-6
+    assert freed.guessed_s == ()
+
+
+def test_where_no_cycles_agree_in_two_gaps_these_are_guesses():
+    *_, freed = slipping(slips=(100, 450))
+    np.testing.assert_allclose(freed.guessed_s, [0.2, 0.2] * 5, atol=0.01)
+
+
+def test_without_a_cycle_long_gaps_are_guesses_but_rests_are_none():
+    _, strong, angle, _ = slipping(slips=())
+    lengths = without_slips(angle, strong, None, 500.0).guessed_s
+    np.testing.assert_allclose(lengths, [100 / 500.0] * 15)
+    resting = np.where(np.arange(strong.size) % 1000 < 400, 0.0, angle.velocity_rad_s)
+    moving = without_slips(replace(angle, velocity_rad_s=resting), strong, None, 500.0)
+    assert len(moving.guessed_s) == 10
+    dark = replace(angle, strong=np.zeros(strong.size, dtype=bool))
+    assert without_slips(dark, strong, None, 500.0).guessed_s == ()
 
 
 def test_a_spark_of_current_within_a_gap_stays_on_the_axis():
