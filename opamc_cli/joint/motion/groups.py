@@ -9,7 +9,6 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints
 
 REPEAT_ERROR = 0.02
 LONGEST_SHARE = 0.7
-FEWEST_PAIRS = 0.5  # Of what is known at both times where the gaps lie alike.
 BLOCKS = 12
 FEWEST_CYCLES = 6
 """Two of six are sealed: nothing tells when a payload changed in a sealed one, and if it is all
@@ -67,15 +66,14 @@ def cycle_length(*paths: Floats, known: Bools | None = None) -> int | None:
 
 
 def _mismatch(path: Floats, counts: Bools) -> Floats:
-    """Mean square of ``path[t + lag] - path[t]`` where both count, by lag; infinite of too few."""
-    n, lags = path.size, np.arange(path.size)
+    """Mean square of ``path[t + lag] - path[t]`` where both count, by lag; infinite of none."""
+    n = path.size
     centred = np.where(counts, path - path[counts].mean(), 0.0)
     length = next_fast_len(2 * n, real=True)
     ones, values, squares = (rfft(one, length) for one in (1.0 * counts, centred, centred**2))
     both = irfft(np.abs(ones) ** 2, length)[:n]
     sums = 2 * irfft((np.conj(ones) * squares).real - np.abs(values) ** 2, length)[:n]
-    enough = both >= FEWEST_PAIRS * np.mean(counts) * (n - lags)
-    return np.where(enough, sums / np.maximum(both, 1.0), np.inf)
+    return np.where(both > 0.5, sums / np.maximum(both, 1.0), np.inf)
 
 
 def group_samples(
