@@ -132,11 +132,11 @@ def explain_change(
     ]
     if periodic is not None and periodic.effect in library:
         carries = held >= SMALLEST_LINE_SHARE * max(fast, held)
-        if periodic.known or carries:
+        if periodic.kind != "unknown" or carries:
             ratio, share = periodic.evidence["power_ratio"], held / whole
-            grown, doubled = ratio >= CLEAR_GROWTH, periodic.mesh and ratio >= GROWTH
+            grown, doubled = ratio >= CLEAR_GROWTH, periodic.kind == "mesh" and ratio >= GROWTH
             loaded = any(cause.origin == "load" for cause in causes)
-            clear = periodic.mesh and grown
+            clear = periodic.kind == "mesh" and grown
             enough = share >= FAULT_SHARE and (grown or not loaded)
             serious = clear or enough or (doubled and not loaded)
             causes.append(_weighed(periodic, share, library, serious, clear))

@@ -25,7 +25,7 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
     if hum is not None:
         return hum
     reading = read_lines(lines, compared.track, spectra.resolution)
-    if not reading.known:
+    if reading.kind == "unknown":
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)
         beats = grown_lines(clock, between)

@@ -90,16 +90,6 @@ class Reading(Cause):
     power: float = 0.0
     """Mean square that it holds more in the target than in the baseline, A^2."""
 
-    @property
-    def known(self) -> bool:
-        """Whether the order has a meaning in a strain wave gear."""
-        return self.kind != "unknown"
-
-    @property
-    def mesh(self) -> bool:
-        """Whether it is that of the wave generator's passage over the teeth."""
-        return self.kind == "mesh"
-
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""

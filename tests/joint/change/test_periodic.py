@@ -35,7 +35,7 @@ def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
     order = 2 * (RATIO + 1) / RATIO
     periodic = found(units, lambda track: np.cos(order * track.machine_angle_rad))
     assert periodic.effect == "ripple"
-    assert periodic.mesh
+    assert periodic.kind == "mesh"
     assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
     # With an allowance for what sessions differ by it is there, too, if it is large.
     assert found(units, lambda track: np.cos(order * track.machine_angle_rad), 0.09) is not None
@@ -43,7 +43,7 @@ def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
 
 def test_a_line_that_no_part_has_is_a_ripple_without_a_meaning(units):
     periodic = found(units, lambda track: np.cos(3.37 * track.machine_angle_rad))
-    assert (periodic.effect, periodic.known) == ("ripple", False)
+    assert (periodic.effect, periodic.kind) == ("ripple", "unknown")
     assert periodic.parameters["order"] == pytest.approx(3.37, abs=0.05)
     assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
 
