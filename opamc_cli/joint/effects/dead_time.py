@@ -20,18 +20,20 @@ class DeadTime(Effect):
     origin = "measurement"
     meaning = "dead time of the inverter is not compensated: check the drive's setting"
     needs = ("electrical",)
+    forms = ("whole",)
     fast = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Try the six-step wave itself, and its first harmonic as the current loop leaves it."""
-        return [{"six_step": 1.0}, {"six_step": 0.0}]
+        """Try the six-step wave, of logged phases also whole, and what a current loop leaves."""
+        whole = [{"six_step": 1.0, "whole": 1.0}] * ("phases" in track.channels)
+        return [{"six_step": 1.0}, *whole, {"six_step": 0.0}]
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Torque part of three square waves, or the sixth harmonic alone."""
+        """Torque part of three square waves, whole or less its mean, or its first harmonic."""
         assert track.electrical_rad is not None
-        angle = track.electrical_rad
-        side = np.sign(track.model_a)
+        angle, side = track.electrical_rad, np.sign(track.model_a)
         if parameters["six_step"]:
             waves = [np.cos(angle - 2 * np.pi * phase / 3) for phase in range(3)]
-            return stack(side * (2 / 3 * np.abs(waves).sum(axis=0) - 4 / np.pi))
+            mean = 0.0 if parameters.get("whole") else 4 / np.pi
+            return stack(side * (2 / 3 * np.abs(waves).sum(axis=0) - mean))
         return stack(side * np.cos(6 * angle), side * np.sin(6 * angle))

@@ -290,3 +290,21 @@ def test_a_tool_is_changed_between_recordings_if_nothing_open_tells(begins_s, si
     )
     found = built_in_library()["payload_change"].settled({"since_s": 3.3}, track)
     assert found["since_s"] == pytest.approx(since)
+
+
+def test_a_whole_dead_time_is_what_each_logged_phase_loses():
+    _, track = track_of()
+    effect = built_in_library()["dead_time"]
+    angle = np.linspace(0.0, 40.0, track.size)
+    side = np.where(np.arange(track.size) % 700 < 300, -1.0, 1.0)
+    track = replace(track, electrical_rad=angle, model_a=3.0 * side)
+    frames = np.exp(-2j * np.pi / 3 * np.arange(3))
+    phases = np.real(3.0 * side[:, None] * np.exp(1j * angle)[:, None] * frames)
+    lost = np.real(2 / 3 * np.sign(phases) @ np.conj(frames) * np.exp(-1j * angle))
+    whole = {"six_step": 1.0, "whole": 1.0}
+    np.testing.assert_allclose(effect.columns(track, whole)[:, 0], lost, atol=1e-12)
+    rest = effect.columns(track, {"six_step": 1.0})[:, 0]
+    np.testing.assert_allclose(lost - rest, side * 4 / np.pi, atol=1e-12)
+    logged = replace(track, channels=track.channels | {"phases"})
+    assert whole in effect.guesses(logged, angle)
+    assert whole not in effect.guesses(replace(track, channels=frozenset()), angle)

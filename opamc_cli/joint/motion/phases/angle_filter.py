@@ -61,8 +61,7 @@ def smoothing_kernel(rate_hz: float, bandwidth_hz: float) -> Floats:
     frequency = np.fft.rfftfreq(length, 1 / rate_hz)
     response = np.fft.irfft(1 / (1 + (frequency / bandwidth_hz) ** 6), length)
     kernel = np.concatenate([response[-half:], response[: half + 1]])
-    weights: Floats = kernel / kernel.sum()
-    return weights
+    return np.asarray(kernel / kernel.sum())
 
 
 def smoothed_angle(

@@ -60,7 +60,6 @@ class PhaseAngle:
         angle, position, speed = self.angle_rad[rows], position_rad[rows], velocity_rad_s[rows]
         # By the speeds, at which half turns do not count.
         fast = np.abs(speed) > FAST * float(np.quantile(np.abs(speed), 0.95))
-        fast &= speed != 0
         ratios = self.velocity_rad_s[rows][fast] / speed[fast]
         slope = float(np.median(ratios)) if fast.any() else 1.0
         if ratio is not None:

@@ -14,11 +14,8 @@ ROUNDS_TO_CIRCLE = 8
 
 def current_vector(phases_a: Floats) -> NDArray[np.complex128]:
     """Clarke vector, amplitude-invariant, of phase currents of shape (n, 3)."""
-    turn = np.exp(2j * np.pi / 3)
-    vector: NDArray[np.complex128] = (
-        2 / 3 * (phases_a[:, 0] + turn * phases_a[:, 1] + np.conj(turn) * phases_a[:, 2])
-    )
-    return vector
+    turn, (a, b, c) = np.exp(2j * np.pi / 3), phases_a.T
+    return np.asarray(2 / 3 * (a + turn * b + np.conj(turn) * c))
 
 
 def rounded(vector: NDArray[np.complex128]) -> NDArray[np.complex128]:
@@ -52,8 +49,7 @@ def without_sensor_errors(
     rotated = vector[fast] * np.exp(-1j * angle_rad[fast])
     torque, flux, angle = rotated.real, rotated.imag, angle_rad[fast]
     once, twice = np.exp(1j * angle), torque * np.exp(2j * angle)
-    parts = (-once.imag, once.real, -twice.imag, twice.real, np.ones(angle.size))
-    columns = np.stack(parts, axis=1)
+    columns = np.stack((-once.imag, once.real, -twice.imag, twice.real, angle**0), axis=1)
     found = solve(columns.T @ columns, columns.T @ flux)
     offset, imbalance = complex(found[0], found[1]), complex(found[2], found[3])
     return vector - offset - imbalance * np.conj(vector)
