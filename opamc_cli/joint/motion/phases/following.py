@@ -20,6 +20,7 @@ from opamc_cli.joint.motion.phases.angle_filter import (
 from opamc_cli.joint.motion.phases.half_turns import bridged
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.phases.sensor_errors import (
+    FEWEST_FAST_SAMPLES,
     current_vector,
     rounded,
     without_sensor_errors,
@@ -45,8 +46,9 @@ CLEANING_ROUNDS = 2
 """At most; five leave 71 simulated recordings (the panel's seeds 99000 to 99003) the same."""
 BRIDGE_ROUNDS = 2
 BANDWIDTH_ROUNDS = 2
-CARRIER_OVER_BANDWIDTH = 2.0
-"""Electrical frequency, in bandwidths, above which the follower does not sway with the carrier."""
+CARRIERS_OVER_BANDWIDTH = 2.0, 1.5
+"""Electrical frequency, in bandwidths, above which the follower does not sway with the carrier; or
+does little, where a joint hardly gets there: a zero error hid what is turned at small torques."""
 
 NOISIEST_SHARE = 0.1
 """Noise of the acceleration, relative to the acceleration, up to which a sample counts."""
@@ -90,7 +92,9 @@ def _followed(
         spread = np.maximum(float(np.median(local[strong])) / local, 1.0) ** 2
     measured = np.angle(vector)
     angle, speed = bridged(measured, strong, rough, sure, spread, rate_hz, bandwidth)
-    fast = strong & (np.abs(speed) > CARRIER_OVER_BANDWIDTH * 2 * np.pi * bandwidth)
+    carrier = strong * np.abs(speed) / (2 * np.pi * bandwidth)
+    fastest = (carrier > least for least in CARRIERS_OVER_BANDWIDTH)
+    fast = next((one for one in fastest if one.sum() >= FEWEST_FAST_SAMPLES), carrier > np.inf)
     roughness = float(np.sum(np.diff(speed) ** 2)) / max(float(np.sum(speed**2)), 1e-300)
     return _Followed(vector, noise, floor, angle, fast, rough, sure, spread, roughness)
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from simulator import simulate
 
-from opamc_cli.joint.motion.phases.following import averaged_angle, follow_phases
+from opamc_cli.joint.motion.phases.following import _followed, averaged_angle, follow_phases
+from opamc_cli.joint.motion.phases.sensor_errors import FEWEST_FAST_SAMPLES
 
 
 def test_speed_is_the_electrical_one():
@@ -31,6 +32,14 @@ def test_errors_of_the_sensors_do_not_turn_the_angle(share, gain):
     side = np.sign(np.dot(angle.velocity_rad_s, true))
     wrong = np.abs(side * angle.velocity_rad_s - true)[clear] > 0.05 * np.abs(true).max()
     assert np.mean(wrong) < 0.01
+
+
+@pytest.mark.parametrize(("carrier_hz", "tells"), [(80.0, True), (52.0, True), (40.0, False)])
+def test_errors_are_sought_where_the_carrier_is_fast_or_else_fast_enough(carrier_hz, tells):
+    """A joint of 50 Hz kept its zero error, and lost half turns at each zero of the torque."""
+    angle = 2 * np.pi * carrier_hz * np.arange(4000) / 2000.0
+    vector = np.exp(1j * angle) + 0.001 * np.random.default_rng(11).normal(size=4000)
+    assert (_followed(vector, vector, 2000.0, 30.0).fast.sum() >= FEWEST_FAST_SAMPLES) == tells
 
 
 def test_weak_currents_tell_their_angle_together():
