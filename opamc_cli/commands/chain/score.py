@@ -68,6 +68,8 @@ def score(
             output.note(trained.summary())
     for note in outcome.notes:
         output.note(note)
+    for doubt in outcome.doubts:
+        output.failure(doubt)
     pooled = [row for row in outcome.features.to_pylist() if row["motion"] == stage.ALL_MOTIONS]
     output.result(
         {

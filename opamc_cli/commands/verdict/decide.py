@@ -50,7 +50,8 @@ def decide(
     own, other = stage.default_tables(out)
     with output_lock(out), result(out, *stage.FILES) as staged:
         outcome = stage.run(baseline or own, target or other, effective, out, staged)
-    output.notes(outcome.verdict["notes"], verbose)
+    errors = list(map(str, outcome.errors))
+    output.notes([note for note in outcome.verdict["notes"] if note not in errors], verbose)
     path = out / stage.FILES[0]
     output.result(
         {**outcome.verdict, "verdict": str(path)},
@@ -58,7 +59,7 @@ def decide(
         f"verdict: {path}",
         urgent=outcome.exit_code is not ExitCode.DONE or bool(doubtful(outcome.verdict)),
     )
-    for error in outcome.errors:
-        output.failure(str(error))
+    for error in errors:
+        output.failure(error)
     excused = exit_zero and outcome.exit_code is ExitCode.UNHEALTHY
     raise typer.Exit(ExitCode.DONE if excused else outcome.exit_code)

@@ -45,6 +45,8 @@ class ScoreOutcome:
     notes: tuple[str, ...]
     """What is worth knowing: conditions that differ, motions that one side lacks, orders with more
     possible patterns than a segment holds."""
+    doubts: tuple[str, ...] = ()
+    """Why what is not found changed may have been compared with something else."""
 
 
 def run(
@@ -100,18 +102,14 @@ def compare_sides(
     used = config.canonical("score")
     for name, table in ((files.SCORES, scores), (files.FEATURES, features)):
         write_table(out / name, table, stage="score", config=used, inputs=inputs)
-    notes += (
-        *_other_reference(sides, common),
-        *sides.notes(),
-        *_missing_notes(own, other),
-        *_short_notes(own),
-    )
+    notes += (*sides.notes(), *_missing_notes(own, other), *_short_notes(own))
     return ScoreOutcome(
         out / files.SCORES,
         out / files.FEATURES,
         scores,
         features,
         notes,
+        _other_reference(sides, common),
     )
 
 
@@ -133,7 +131,7 @@ def _refuse_unequal_options(sides: Sides, may_differ: Sequence[str]) -> None:
                 raise InputError(msg)
 
 
-def _other_reference(sides: Sides, common: Sequence[Key]) -> list[str]:
+def _other_reference(sides: Sides, common: Sequence[Key]) -> tuple[str, ...]:
     """Say where motions were told by another cycle: the first of one may be the other's second.
 
     Each segment has the largest frequency of its motion in the reference cycle.
@@ -141,12 +139,13 @@ def _other_reference(sides: Sides, common: Sequence[Key]) -> list[str]:
     for key in common:
         own, other = (rows[key].rows["f_max_hz"].astype(float)[0] for rows in sides.rows)
         if own != other and np.isfinite([own, other]).all():
-            return [
+            doubt = (
                 f"{sides.target.path}: its motions were told by another cycle than those of "
                 f"{sides.baseline.path}, and may be others of the same number; identify it with "
                 "--reference, naming the baseline's motions.parquet, and make its patterns anew"
-            ]
-    return []
+            )
+            return (doubt,)
+    return ()
 
 
 def score_table(sides: Sides, base: float) -> pa.Table:

@@ -66,7 +66,7 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     found = read_findings(folder, (baseline, target))
     scored = score.compare_sides(sides, config, out)
     decided = verdict.decide(sides, config)
-    notes = [*scored.notes, *decided.notes(), *decided.blind(config.score)]
+    notes = [*scored.notes, *scored.doubts, *decided.notes(), *decided.blind(config.score)]
     if any(axis not in found.causes for axis in decided.differing(config.score)):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)
@@ -81,8 +81,9 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
 
     written = verdict.write(decided, scored, config, out, causes=found.causes, complete=complete)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
-    errors = (*decided.odd_ones(), *([InputError(stranger)] if stranger else []))
-    worst = ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.PARTIAL if errors else ExitCode.DONE
+    unsure = [InputError(why) for why in (stranger, *scored.doubts) if why]
+    errors = (*decided.odd_ones(), *unsure)
+    worst = ExitCode.NOT_ENOUGH_DATA if unsure else ExitCode.PARTIAL if errors else ExitCode.DONE
     return DecideOutcome(written.verdict, written.exit_code or worst, errors)
 
 
