@@ -12,6 +12,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_chan
 from opamc_cli.stages.verdict.reasons import (
     COMMON,
     CURRENT_LAG,
+    IN_THE_SUM,
     SENSOR_NOISE,
     SMALLER_PART,
     excuses_little,
@@ -132,6 +133,8 @@ def _called(unit: str) -> str:
 
 def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: bool) -> str:
     n = judgement.n_baseline_sessions
+    if cause is not None and IN_THE_SUM in cause.get("evidence", ()):
+        return "A gear's fault leaves what the three phases add up to as it was."
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
     others = () if cause is None else cause.get("others", ())

@@ -10,6 +10,7 @@ import pyarrow as pa
 from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.measurement.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
 from opamc_cli.decision.measurement.lag import Course, Lag, courses, lag_behind
+from opamc_cli.decision.measurement.phase_sum import PhaseSum, SumGrowth, growth_of_sum, phase_sum
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import SMALLEST_SHARE, Change, explain_change
 from opamc_cli.joint.change.reading import Cause
@@ -26,6 +27,7 @@ from opamc_cli.stages.recordings.axis_recording import interpolated, read_record
 from opamc_cli.stages.verdict.reasons import (
     AT_REST,
     CURRENT_LAG,
+    IN_THE_SUM,
     SENSOR_NOISE,
     excuses_little,
     lies_outside,
@@ -70,11 +72,21 @@ MUCH = 9.0
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
+MOST_TIMES = 100
+"""Of a sum that was hardly there more says nothing."""
+
 HUM = "mains_hum"
 NOISE = (
     "noise or hum of the current sensor, which has grown as much while the joint stands still: "
     "check the sensor, its cable and the amplifier"
 )
+OF_THE_SUM = {
+    "sensor_offset": "a zero error of a phase's current sensor: check the sensors' zero",
+    "sensor_gain": "the gain of a phase's current sensor, or a current that leaves the three "
+    "phases: check sensors, scaling, connectors and the motor's insulation",
+    "sensor_noise": "noise, hum or spikes of the phases' current sensors: check sensors, cables "
+    "and connectors",
+}
 
 
 def explain(
@@ -108,9 +120,9 @@ def explain(
     Returns
     -------
     dict
-        The `cause` of verdict.json: an effect of the library, noise of the sensor that is there at
-        standstill, too, or a current that comes later than it did; empty where none of them
-        explains the change.
+        The `cause` of verdict.json: an effect of the library, trouble of the sensors that is there
+        at standstill, or in what the phases add up to, or a current that comes later than it did;
+        empty where none of them explains the change.
 
     Raises
     ------
@@ -119,17 +131,18 @@ def explain(
     InputError, NotEnoughDataError
         If a side does not hold what a model of the joint needs.
     """
-    sides, noises, along = [], [], []
+    sides, noises, sums, along = [], [], [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
     for sources, moves in zip((baseline, target), strokes, strict=True):
-        recordings, noise, moved, errors = _recordings(
+        recordings, noise, summed, moved, errors = _recordings(
             axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
         )
         if not recordings:
             raise errors[0]
         sides.append(recordings)
         noises.append(noise)
+        sums.append(summed)
         along.append(moved)
     lag = lag_behind(*along)
     if lag is not None:  # what else has changed is sought without it
@@ -139,7 +152,10 @@ def explain(
     with users_effects_named():
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
         found = _entry(change)
-    found = _with_noise(growth_at_rest(*noises), found)
+    if (grown := growth_of_sum(*sums)) is not None:
+        found = _with_sensor(_of_sum(grown), found)
+    elif (at_rest := growth_at_rest(*noises)) is not None:
+        found = _with_sensor(_of_noise(at_rest), found)
     if lag is not None:
         return _of_lag(lag, found)
     if found is None and change.why_not is not None:
@@ -206,9 +222,12 @@ def _recordings(
     moving: Mapping[str, tuple[int, int]],
     strokes: Mapping[str, Spans],
     rate_hz: float,
-) -> tuple[list[Recording], list[Fluctuation], list[list[Course]], list[OpamcError]]:
+) -> tuple[
+    list[Recording], list[Fluctuation], list[PhaseSum], list[list[Course]], list[OpamcError]
+]:
     found: list[Recording] = []
     noises: list[Fluctuation] = []
+    sums: list[PhaseSum] = []
     along: list[list[Course]] = []
     errors: list[OpamcError] = []
     for source in sources:
@@ -226,11 +245,14 @@ def _recordings(
                 found.append(interpolated(recording, LEAST_HZ))
             noise = _fluctuation(recording, start, strokes.get(source.name, ()))
             noises += [] if noise is None else [noise]
+            phases = recording.phases_a
+            summed = None if phases is None else phase_sum(phases, recording.rate_hz)
+            sums += [] if summed is None else [summed]
             along.append(_courses(recording))
         except OpamcError as error:
             # the run served the chain but not a model, which needs motion beside current
             errors.append(error)
-    return found, noises, along, errors
+    return found, noises, sums, along, errors
 
 
 def _courses(recording: Recording) -> list[Course]:
@@ -308,13 +330,17 @@ def _entry(change: Change) -> dict[str, Any] | None:
     }
 
 
-def _with_noise(grown: Growth | None, found: dict[str, Any] | None) -> dict[str, Any] | None:
-    """Put a sensor's noise before what it may be, or beside what it is not."""
-    if grown is None:
-        return found
-    if found is None or _heard_at_rest(found):
-        return _of_sensor(grown, found)
-    sensor = _of_sensor(grown, None)
+def _with_sensor(sensor: dict[str, Any], found: dict[str, Any] | None) -> dict[str, Any]:
+    """Put a sensor's trouble before what it may be, or beside what it is not."""
+    if found is None:
+        return sensor
+    hum = found["effect"] == HUM and sensor["effect"] == SENSOR_NOISE and not excuses_little(found)
+    if hum or found["effect"] == sensor["effect"]:
+        evidence = {**found["evidence"], **sensor["evidence"]}
+        return {**found, "evidence": evidence, "why": [*found["why"], *sensor["why"]]}
+    if _heard_at_rest(found):
+        rest = [{key: found[key] for key in OF_OTHERS}, *found["others"]]
+        return {**sensor, "others": rest}
     others = [*found["others"], {key: sensor[key] for key in OF_OTHERS}]
     return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
 
@@ -324,35 +350,47 @@ def _heard_at_rest(cause: Mapping[str, Any]) -> bool:
     return cause["effect"] in ("ripple", HUM) or (lies_outside(cause) and excuses_little(cause))
 
 
-def _of_sensor(noise: Growth, found: Mapping[str, Any] | None) -> dict[str, Any]:
-    """Return a sensor's noise as the cause, or the hum that was found, with what is there at rest.
-
-    Noise makes a joint neither healthy nor faulty.
-    """
+def _of_noise(noise: Growth) -> dict[str, Any]:
+    """Return a sensor's noise, which is there at rest, as a cause."""
     why = (
         f"While the joint stands still the current fluctuates {noise.times:.2g} times as much as "
         f"in the baseline, which is {noise.share:.0%} of what it has grown by in motion; a fault "
         "of the gear shows in motion alone."
     )
-    if found is not None and found["effect"] == HUM and not excuses_little(found):
-        evidence = {**found["evidence"], AT_REST: noise.times}
-        return {**found, "evidence": evidence, "why": [*found["why"], why]}
-    others = [] if found is None else [{key: found[key] for key in OF_OTHERS}, *found["others"]]
+    return _sensor(SENSOR_NOISE, NOISE, noise.share, {AT_REST: noise.times}, why)
+
+
+def _of_sum(grown: SumGrowth) -> dict[str, Any]:
+    """Return trouble of the phases' sensors as a cause."""
+    part = {"sensor_offset": "what is constant of", "sensor_gain": "what follows the phases of"}
+    times = f"more than {MOST_TIMES:g}" if grown.times > MOST_TIMES else f"{grown.times:.2g}"
+    why = (
+        "The three phases of a motor without a neutral wire add up to nothing, whatever the gear "
+        f"does; {part.get(grown.kind, 'the rest of')} their sum is {times} times the baseline's, "
+        f"and {grown.share:.0%} of what the current's fluctuation has grown by."
+    )
+    return _sensor(grown.kind, OF_THE_SUM[grown.kind], grown.share, {IN_THE_SUM: grown.times}, why)
+
+
+def _sensor(
+    effect: str, meaning: str, share: float, evidence: Mapping[str, float], why: str
+) -> dict[str, Any]:
+    """Return a cause that makes a joint neither healthy nor faulty."""
     return {
-        "effect": SENSOR_NOISE,
+        "effect": effect,
         "domain": "time",
         "parameters": {},
-        "interpretation": NOISE,
-        "share": noise.share,
+        "interpretation": meaning,
+        "share": share,
         "p_value": None,
         "ties": [],
         "harmless": False,
         "origin": "measurement",
-        "explained": noise.share,
+        "explained": share,
         "clear": False,
-        "evidence": {AT_REST: noise.times},
+        "evidence": dict(evidence),
         "why": [why],
-        "others": others,
+        "others": [],
     }
 
 

@@ -51,11 +51,9 @@ SENSOR_NOISE = "sensor_noise"
 CURRENT_LAG = "current_lag"
 """And one that moves all of the current in time against the position."""
 
-BEFORE_THE_GEAR = frozenset({SENSOR_NOISE, CURRENT_LAG})
-"""Causes that excuse nothing, and are looked for first all the same."""
-
-AT_REST = "times_at_rest"
-"""In a cause's evidence: by how much the current's fluctuation at standstill has grown with it."""
+AT_REST, IN_THE_SUM = "times_at_rest", "times_in_the_sum"
+"""In a sensor's evidence: by how much what no gear moves has grown with it, the current's
+fluctuation at standstill, or what the three phases add up to."""
 
 SMALLER_PART = "A smaller part of the change is {}."
 CHECK_FIRST = (
@@ -131,7 +129,7 @@ def reasons(
         of_hall = cause.get("origin") == "environment" and not cause.get("parameters")
         if of_hall and siblings > 1 and math.exp(judgement.common_log_ratio) < COMMON:
             sentences += [ALONE]
-        if outside and judgement.state == "fault" and cause.get("effect") not in BEFORE_THE_GEAR:
+        if outside and judgement.state == "fault" and not before_the_gear(cause):
             sentences += [INSPECT]  # it does not explain enough
     elif unhealthy:
         sentences += [*[IN_VAIN] * in_vain, INSPECT, CANNOT_TELL]
@@ -149,13 +147,19 @@ def lies_outside(cause: Mapping[str, Any]) -> bool:
     return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"
 
 
+def before_the_gear(cause: Mapping[str, Any]) -> bool:
+    """Tell whether a cause excuses nothing, and is looked for first all the same."""
+    own = cause.get("effect") in (SENSOR_NOISE, CURRENT_LAG)
+    return own or IN_THE_SUM in cause.get("evidence", ())
+
+
 def excuses_little(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause outside the joint holds too little to look there before the gear.
 
     With a fault beside it, or less than half of the change by harmless causes, it is not harmless.
-    A sensor's noise, or a lag, excuses nothing, but is to be looked for before the gear.
+    What is `before_the_gear` excuses nothing, but is to be looked for first.
     """
-    if cause.get("effect") in BEFORE_THE_GEAR:
+    if before_the_gear(cause):
         return False
     return explains_little(cause) or not cause.get("harmless")
 

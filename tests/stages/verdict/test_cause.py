@@ -279,13 +279,37 @@ def test_noise_beside_friction_is_told_beside_it(tmp_path):
     assert "fluctuates 4" in found["why"][-1]
 
 
+def with_gain(found, folder, phase, gain):
+    """Write runs anew with another gain of one phase's sensor."""
+    folder.mkdir()
+    for source in found:
+        with Run(source.path) as run:
+            columns = run.read([f"axis2_{name}" for name in "abc"])
+        columns[phase] = columns[phase] * np.float32(gain)
+        path = folder / source.path.name
+        save_run(path, source.info, columns)
+        yield replace(source, path=path)
+
+
+def test_a_gain_of_one_phase_is_the_sensor_s(tmp_path):
+    """It was a worn gear: "do first: inspect the gear"."""
+    normal = sources("normal")
+    after = list(with_gain(normal[5:], tmp_path / "after", "axis2_a", 1.1))
+    found = cause.explain(2, normal[:5], after, KNOWN)
+    assert (found["effect"], found["origin"]) == ("sensor_gain", "measurement")
+    assert found["evidence"]["times_in_the_sum"] > 3
+    assert "add up to nothing" in found["why"][-1]
+    alike = list(with_gain(normal[5:], tmp_path / "alike", "axis2_a", 1.0))
+    assert "times_in_the_sum" not in cause.explain(2, normal[:5], alike, KNOWN).get("evidence", ())
+
+
 def test_hum_that_is_heard_at_standstill_stays_hum():
     """By that it is believed though no course has changed; see `believed`."""
     hum = Cause(effect="mains_hum", parameters={"frequency_hz": 50.0}, interpretation="hum",
                 p_value=0.0, ties=(), evidence={}, share=0.9, origin="measurement")  # fmt: skip
     for explained, effect in ((0.9, "mains_hum"), (0.3, "sensor_noise")):
         found = cause._entry(Change((hum,), explained, True))
-        told = cause._of_sensor(Growth(times=3.0, share=0.8), found)
+        told = cause._with_sensor(cause._of_noise(Growth(times=3.0, share=0.8)), found)
         assert (told["effect"], told["evidence"]) == (effect, {"times_at_rest": 3.0})
         assert "fluctuates 3 times" in told["why"][-1]
     assert [other["effect"] for other in told["others"]] == ["mains_hum"]
