@@ -3,6 +3,7 @@
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,12 @@ from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
 from opamc_cli.signal.cycles.reference import find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
-from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, odd_speeds
+from opamc_cli.stages.chain.compared.speeds import (
+    OTHER_SPEEDS,
+    TWO_SPEEDS,
+    odd_cycles,
+    odd_speeds,
+)
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
@@ -180,7 +186,11 @@ def run(
     motions = pa.concat_tables([MOTIONS.empty_table(), *outcome.results]).combine_chunks()
     known = motions if reference is None else read_table(reference, "identify", MOTIONS)
     other_speeds = odd_speeds(motions, known, config.identify.speed_tolerance)
-    motions = _without_cycles(motions, other_speeds)
+    slower = pa.array(sorted(other_speeds), pa.string())
+    motions = _without_cycles(motions, pc.is_in(motions["run"], slower))
+    midway = odd_cycles(motions)
+    motions = _without_cycles(motions, _of_cycles(motions, midway))
+    errors = (*outcome.errors, *_of_two_speeds(midway, sources))
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
     path = out / files.MOTIONS
     write_table(
@@ -194,15 +204,36 @@ def run(
             "segment": record_at(segments)["config"].get("segment", {}),
         },
         inputs=inputs,
-        extra=sources_record(list(sources.values()), out) | {OTHER_SPEEDS: other_speeds},
+        extra=sources_record(list(sources.values()), out)
+        | {OTHER_SPEEDS: other_speeds, TWO_SPEEDS: sorted({run for run, _ in midway})},
     )
     notes = tuple(_unlike(motions, rule))
-    return IdentifyOutcome(path, motions, outcome.errors, notes, other_speeds)
+    return IdentifyOutcome(path, motions, errors, notes, other_speeds)
 
 
-def _without_cycles(motions: pa.Table, runs: Collection[str]) -> pa.Table:
-    """Take cycles and motions off the segments of some runs."""
-    left = pc.is_in(motions["run"], pa.array(sorted(runs), pa.string()))
+def _of_cycles(motions: pa.Table, odd: Mapping[tuple[str, int], Mapping[int, float]]) -> pa.Array:
+    """Tell which rows are of some cycles, by run and axis."""
+    rows = motions.select(["run", "axis", "cycle"]).to_pylist()
+    return pa.array([r["cycle"] in odd.get((r["run"], r["axis"]), ()) for r in rows], pa.bool_())
+
+
+def _of_two_speeds(
+    odd: Mapping[tuple[str, int], Mapping[int, float]],
+    sources: Mapping[str, RunSource],
+) -> list[OpamcError]:
+    """Say of which recordings the speed was changed midway."""
+    return [
+        InputError(
+            f"{sources[run].path}: {len(cycles)} cycle{'s' * (len(cycles) > 1)} of axis {axis} "
+            f"last{'s' * (len(cycles) == 1)} {median(cycles.values()):.2f} times as long as the "
+            "others and are not compared: was the speed changed midway?"
+        )
+        for (run, axis), cycles in odd.items()
+    ]
+
+
+def _without_cycles(motions: pa.Table, left: pa.ChunkedArray | pa.Array) -> pa.Table:
+    """Take cycles and motions off some rows' segments."""
     for name in ("cycle", "motion"):
         kept = pc.if_else(left, pa.scalar(UNIDENTIFIED, MOTIONS.field(name).type), motions[name])
         motions = motions.set_column(motions.schema.get_field_index(name), name, kept)

@@ -2,7 +2,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from opamc_cli.stages.chain.compared.speeds import odd_speeds
+from opamc_cli.stages.chain.compared.speeds import odd_cycles, odd_speeds
 
 
 def table(speeds, *, references=(1.0, 1.0), samples=200, odd_axis=1.0, carrier=None):
@@ -105,3 +105,21 @@ def test_a_baseline_of_several_runs_tells_by_its_own_scatter_what_is_another_spe
     )  # fmt: skip
     assert odd_speeds(odd, fast, 0.01).keys() == {f"run{n}" for n in range(5)}
     assert not odd_speeds(odd, fast.slice(0, 3 * 8), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("speeds", "odd"),
+    [
+        ((1.0, 1.0, 0.8), {2: 1.25}),
+        ((0.8, 1.0, 0.8, 1.0), {0: 1.25, 2: 1.25}),
+        ((1.0, 0.95, 1.05), {}),
+        ((0.8, 0.8, 0.8), {}),
+    ],
+    ids=["the last", "half of them", "a fault's ringing", "a run of another speed"],
+)
+def test_cycles_of_another_speed_than_the_others(speeds, odd):
+    rows = []
+    for cycle, speed in enumerate(speeds):
+        rows += [{**row, "run": "run0", "cycle": cycle} for row in table([speed]).to_pylist()]
+    found = odd_cycles(pa.Table.from_pylist(rows))
+    assert found == ({("run0", axis): pytest.approx(odd, rel=1e-2) for axis in (1, 2) if odd})

@@ -13,6 +13,9 @@ Strings = npt.NDArray[np.str_]
 OTHER_SPEEDS = "other_speeds"
 """Where a motion table's record has what `odd_speeds` found."""
 
+TWO_SPEEDS = "two_speeds"
+"""And where the runs of which `odd_cycles` found some."""
+
 OPEN_SAMPLES = 2.0
 OPEN_S = 0.02
 """By which the lengths of one joint's motions are known, whichever is more, however many they are:
@@ -60,6 +63,30 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
             open_ = max(sample, min(open_, SCATTERS * scatter))
         if abs(middle - 1) > tolerance + open_:
             found[run] = middle
+    return found
+
+
+def odd_cycles(motions: pa.Table) -> dict[tuple[str, int], dict[int, float]]:
+    """Find cycles of another speed than most of their recording: it was changed midway.
+
+    Returns
+    -------
+    dict of (str, int) to dict of int to float
+        By run and axis, how many times as long as the others its odd cycles last, by number.
+    """
+    run, axis, ratio, *_ = _lasting(motions)
+    cycle = np.asarray(motions["cycle"])[_whole_motions(motions)]
+    found = {}
+    for name, number in sorted(set(zip(run.tolist(), axis.tolist(), strict=True))):
+        own = (run == name) & (axis == number)
+        lasting = {int(k): float(np.median(ratio[own & (cycle == k)])) for k in set(cycle[own])}
+        times = np.array(list(lasting.values()))
+        alike = (np.abs(times[:, None] / times - 1) <= 2 * MOVED).sum(axis=0)
+        # of as many the speed of the reference
+        most = times[np.lexsort((np.abs(times - 1), -alike))[0]]
+        odd = {k: float(v / most) for k, v in lasting.items() if abs(v / most - 1) > 2 * MOVED}
+        if odd:
+            found[name, number] = dict(sorted(odd.items()))
     return found
 
 
@@ -113,8 +140,7 @@ def _lasting(motions: pa.Table) -> tuple[Strings, Ints, Floats, Ints, Floats, Fl
 
     How long a window is, or a motion at the edge of a recording, is the logger's affair.
     """
-    identified = np.asarray(motions["cycle"]) >= 0
-    identified &= ~np.asarray(motions["edge"]) & (np.asarray(motions["kind"]) == "motion")
+    identified = _whole_motions(motions)
     run, axis, start, stop, reference, rate = (
         np.asarray(motions[name])[identified]
         for name in ("run", "axis", "start", "stop", "reference_samples", "sampling_rate_hz")
@@ -125,3 +151,8 @@ def _lasting(motions: pa.Table) -> tuple[Strings, Ints, Floats, Ints, Floats, Fl
     )
     period = np.where(phases == "phases", usual / own, np.nan)
     return run.astype(str), axis, (stop - start) / reference, stop - start, rate, period
+
+
+def _whole_motions(motions: pa.Table) -> npt.NDArray[np.bool_]:
+    cycle, edge, kind = (np.asarray(motions[name]) for name in ("cycle", "edge", "kind"))
+    return np.asarray((cycle >= 0) & ~edge & (kind == "motion"))

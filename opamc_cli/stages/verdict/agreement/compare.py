@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
-from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS
+from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, TWO_SPEEDS
 from opamc_cli.stages.chain.identify import match_rule
 from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.segment import SegmentOutcome
@@ -92,6 +92,7 @@ class Agreement:
                 read_table(path, "identify", MOTIONS),
                 record_at(path).get(OTHER_SPEEDS, {}),
                 match_rule(self.config),
+                record_at(path).get(TWO_SPEEDS, ()),
             )
             for role, path in (("baseline", baseline), ("target", target))
         ]

@@ -1,7 +1,7 @@
 """Which axes cannot be judged, and the true reason: what no verdict may be silent about."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -40,6 +40,8 @@ class Side:
     """By run of another speed, how many times as long as the baseline's its motions last."""
     rule: MatchRule = field(default_factory=MatchRule)
     """When segments are a cycle."""
+    two_speeds: Collection[str] = ()
+    """Runs of which some cycles are left out, as is said: they are of another speed."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""
