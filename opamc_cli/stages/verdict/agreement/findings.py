@@ -265,8 +265,9 @@ def _coarser(own: Measured, reference: Reference) -> str | None:
     if usual < FINE or own.changing > usual / COARSER:
         return None
     return (
-        f"the current of axis {own.axis} changes in {own.changing:.0%} of its samples, the "
-        f"baseline's in {usual:.0%}: is it logged in other steps, or each value several times?"
+        f"the current of axis {own.axis} changes from sample to sample in {own.changing:.0%} of "
+        f"them, the baseline's in {usual:.0%}: is it logged in other steps, or each value several "
+        "times?"
     )
 
 

@@ -57,7 +57,8 @@ class Measured:
     missing: Mapping[str, float]
     """Share of samples that are no numbers, by column of a current."""
     changing: float
-    """Share of a current's samples that differ from the one before; of the coarsest column."""
+    """Share of a current's samples that differ from the one before, as many as differ from that
+    and from the one after: of values that are each logged twice none; of the coarsest column."""
     steps: tuple[float, float]
     """Quantiles 0.01 and 0.05 of the sizes of a current's changes, those of nothing left out: both
     are the converter's step where it is no finer than the noise; of the coarsest column."""
@@ -261,8 +262,9 @@ def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, i
 
 
 def _changing(parts: Sequence[Floats]) -> float:
-    changes = _changes(parts)
-    return float(np.mean(changes != 0)) if changes.size else 1.0
+    changes = _changes(parts) != 0
+    both = changes[1:] & changes[:-1]
+    return float(np.sqrt(np.mean(both))) if both.size else 1.0
 
 
 def _steps(parts: Sequence[Floats]) -> tuple[float, float]:
