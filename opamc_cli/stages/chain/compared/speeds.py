@@ -74,17 +74,18 @@ def odd_cycles(motions: pa.Table) -> dict[tuple[str, int], dict[int, float]]:
     dict of (str, int) to dict of int to float
         By run and axis, how many times as long as the others its odd cycles last, by number.
     """
-    run, axis, ratio, *_ = _lasting(motions)
+    run, axis, ratio, samples, *_ = _lasting(motions)
     cycle = np.asarray(motions["cycle"])[_whole_motions(motions)]
     found = {}
     for name, number in sorted(set(zip(run.tolist(), axis.tolist(), strict=True))):
         own = (run == name) & (axis == number)
         lasting = {int(k): float(np.median(ratio[own & (cycle == k)])) for k in set(cycle[own])}
         times = np.array(list(lasting.values()))
-        alike = (np.abs(times[:, None] / times - 1) <= 2 * MOVED).sum(axis=0)
+        open_ = 2 * MOVED + OPEN_SAMPLES / float(np.median(samples[own]))
+        alike = (np.abs(times[:, None] / times - 1) <= open_).sum(axis=0)
         # of as many the speed of the reference
         most = times[np.lexsort((np.abs(times - 1), -alike))[0]]
-        odd = {k: float(v / most) for k, v in lasting.items() if abs(v / most - 1) > 2 * MOVED}
+        odd = {k: float(v / most) for k, v in lasting.items() if abs(v / most - 1) > open_}
         if odd:
             found[name, number] = dict(sorted(odd.items()))
     return found
