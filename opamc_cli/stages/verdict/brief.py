@@ -1,7 +1,7 @@
 """The verdict on a joint in a few words: what to do first, what speaks for it and what against."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.decision.judge import PATTERNS, Bundle, Judgement
@@ -133,16 +133,15 @@ def _called(unit: str) -> str:
 
 def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: bool) -> str:
     n = judgement.n_baseline_sessions
+    others = () if cause is None else cause.get("others", ())
     if cause is not None and IN_THE_SUM in cause.get("evidence", ()):
-        return "A gear's fault leaves what the three phases add up to as it was."
+        return "A gear's fault leaves what the three phases add up to as it was." + _besides(others)
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
-    others = () if cause is None else cause.get("others", ())
     if cause is not None and cause.get("effect") == CURRENT_LAG:
-        rest = f" Besides: {others[0]['interpretation']}." if others else ""
         return (
             "A gear's fault bends the current's course; this one is moved in time as a whole "
-            f"({cause['share']:.0%} of the change).{rest}"
+            f"({cause['share']:.0%} of the change)." + _besides(others)
         )
     if any(one["effect"] == SENSOR_NOISE for one in others):
         return "The current fluctuates more at standstill, too: check its sensor and cable as well."
@@ -166,3 +165,7 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
         "Another payload, program, gain or temperature looks alike: repeat under the same "
         "conditions."
     )
+
+
+def _besides(others: Sequence[Mapping[str, Any]]) -> str:
+    return f" Besides: {others[0]['interpretation']}." if others else ""

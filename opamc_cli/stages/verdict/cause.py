@@ -338,10 +338,11 @@ def _with_sensor(sensor: dict[str, Any], found: dict[str, Any] | None) -> dict[s
     if hum or found["effect"] == sensor["effect"]:
         evidence = {**found["evidence"], **sensor["evidence"]}
         return {**found, "evidence": evidence, "why": [*found["why"], *sensor["why"]]}
-    if _heard_at_rest(found):
-        rest = [{key: found[key] for key in OF_OTHERS}, *found["others"]]
-        return {**sensor, "others": rest}
-    others = [*found["others"], {key: sensor[key] for key in OF_OTHERS}]
+    rest = [one for one in found["others"] if one["effect"] != sensor["effect"]]
+    # a sum proves it: a gain of 1.3 looks like a payload besides
+    if _heard_at_rest(found) or (IN_THE_SUM in sensor["evidence"] and lies_outside(found)):
+        return {**sensor, "others": [{key: found[key] for key in OF_OTHERS}, *rest]}
+    others = [*rest, {key: sensor[key] for key in OF_OTHERS}]
     return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
 
 
