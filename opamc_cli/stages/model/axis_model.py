@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from hashlib import sha256
 
 import numpy as np
 
@@ -177,6 +178,14 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     recordings = [
         replace(read_recording(run, axis), others_rad=positions_beside(run, axis)) for run in runs
     ]
+    robots = sorted({run.info.robot for run in runs if run.info.robot is not None})
+    if len(robots) > 1:
+        msg = (
+            f"{runs[0].path}: the runs are of {len(robots)} robots ({', '.join(robots[:3])}"
+            f"{', ...' * (len(robots) > 3)}); a model is one joint's, give runs of one robot"
+        )
+        raise InputError(msg)
+    _refuse_copies(runs, recordings)
     units = {run.info.current_unit for run in runs}
     if len(units) > 1:
         msg = f"{runs[0].path}: some runs hold currents (A), others torques (Nm); give one kind"
@@ -215,6 +224,22 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
     return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes, doubts)
+
+
+def _refuse_copies(runs: Sequence[Run], recordings: Sequence[Recording]) -> None:
+    """Refuse a recording that holds the same as another: what is sealed would be searched."""
+    known: dict[bytes, Run] = {}
+    for run, one in zip(runs, recordings, strict=True):
+        current = one.current_a if one.phases_a is None else one.phases_a
+        if current is None:
+            continue
+        first = known.setdefault(sha256(current.tobytes()).digest(), run)
+        if first is not run:
+            msg = (
+                f"{run.path}: holds the same current as {first.path}; what is sealed off in one "
+                "would be searched in the other, give each recording once"
+            )
+            raise InputError(msg)
 
 
 def _too_little_motion(

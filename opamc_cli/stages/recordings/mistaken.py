@@ -7,6 +7,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.plausible.continuity import leaps
 from opamc_cli.signal.plausible.quality import LIMITS, clipped_share, strided_speed
 from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
+from opamc_cli.signal.plausible.spikes import spikes
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.run import Run
 
@@ -37,6 +38,7 @@ def mistaken(run: Run, axis: int, recording: Recording) -> list[str]:
     notes = [
         *_sizes(run, axis, recording),
         *_clipped(run, axis, recording),
+        *_spiked(run, axis, recording),
         *missing(run, f"axis{axis}_position"),
     ]
     x, q = recording.current_a, recording.position_rad
@@ -86,6 +88,21 @@ def _clipped(run: Run, axis: int, recording: Recording) -> list[str]:
         "beyond looks like an effect; check the sensor's range or the drive's limit"
         for name, share in shares.items()
         if share > CLIPPED
+    ]
+
+
+def _spiked(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say which channels hold single samples far from their neighbours."""
+    phases = () if recording.phases_a is None else zip("abc", recording.phases_a.T, strict=True)
+    channels = dict(phases) or {"current": recording.current_a}
+    channels["position"] = recording.position_rad
+    found = {name: spikes(values) for name, values in channels.items() if values is not None}
+    return [
+        f"{run.path}: axis{axis}_{name} leaps in {places.size} single samples, the first at "
+        f"{places[0] / recording.rate_hz:.4g} s: a loose contact, or garbled by the logger? They "
+        "count in every error; take them out"
+        for name, places in found.items()
+        if places.size
     ]
 
 

@@ -15,10 +15,10 @@ RATE = 250.0
 OWN, OTHER = (simulate(seed, rate=RATE, kind="trapezoid", cycles=6) for seed in (5, 4))
 
 
-def write(path, **columns):
+def write(path, robot=None, **columns):
     size = min(len(values) for values in columns.values())
     table = pa.table({name: pa.array(values[:size]) for name, values in columns.items()})
-    record = json.dumps({"sampling_rate_hz": RATE}).encode()
+    record = json.dumps({"sampling_rate_hz": RATE, "robot": robot}).encode()
     pq.write_table(table.replace_schema_metadata({b"opamc": record}), path)
     return path
 
@@ -41,6 +41,47 @@ def model(tmp_path):
 def test_a_right_recording_has_no_note(model, capsys):
     assert model(axis1_current=OWN.current, axis1_position=OWN.position) == 0
     assert "run.parquet" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("channel", "by"), [("current", 20.0), ("position", 0.1)])
+def test_single_samples_that_leap_are_said(model, capsys, channel, by):
+    """They were most of the error, and nobody heard of them."""
+    columns = {"current": OWN.current, "position": OWN.position.copy()}
+    values = columns[channel].astype(float)
+    values[[400, 1300, 2100, 2500]] += by * np.std(values)
+    columns[channel] = values
+    code = model("fit", "--quiet", **{f"axis1_{name}": own for name, own in columns.items()})
+    said = capsys.readouterr().err
+    assert code == 0
+    assert f"axis1_{channel} leaps in 4 single samples, the first at 1.6 s" in said
+
+
+@pytest.mark.parametrize(
+    ("robots", "other", "refused"),
+    [
+        (("a", "b"), 1.01, "the runs are of 2 robots (a, b)"),
+        (("a", "a"), 1.0, "holds the same current as"),
+        ((None, "a"), 1.01, None),
+    ],
+    ids=["robots", "copies", "one robot"],
+)
+def test_runs_that_are_not_of_one_joint_or_copies_are_refused(
+    tmp_path, capsys, robots, other, refused
+):
+    """A copy had what is sealed in the other searched."""
+    files = [
+        write(
+            tmp_path / f"{number}.parquet",
+            robot=robot,
+            axis1_current=OWN.current * (other if number else 1.0),
+            axis1_position=OWN.position,
+        )
+        for number, robot in enumerate(robots)
+    ]
+    code = opamc("model", "fit", *files, "--axis", "1", "--out", tmp_path / "out", "--quiet")
+    said = " ".join(capsys.readouterr().err.split())
+    assert code == (0 if refused is None else 3)
+    assert refused is None or refused in said
 
 
 def test_another_joints_position_is_named(model, capsys):
