@@ -12,6 +12,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_chan
 from opamc_cli.stages.verdict.reasons import (
     COMMON,
     CURRENT_LAG,
+    IN_SPIKES,
     IN_THE_SUM,
     SENSOR_NOISE,
     SMALLER_PART,
@@ -136,6 +137,8 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
     others = () if cause is None else cause.get("others", ())
     if cause is not None and IN_THE_SUM in cause.get("evidence", ()):
         return "A gear's fault leaves what the three phases add up to as it was." + _besides(others)
+    if cause is not None and IN_SPIKES in cause.get("evidence", ()):
+        return "A gear's fault lasts for more than one sample." + _besides(others)
     if cause is not None and cause.get("effect") == SENSOR_NOISE:
         return "A gear's fault shows in motion alone: the noise is there at standstill, too."
     if cause is not None and cause.get("effect") == CURRENT_LAG:

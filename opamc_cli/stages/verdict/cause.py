@@ -10,7 +10,12 @@ import pyarrow as pa
 from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.measurement.at_rest import Fluctuation, Growth, fluctuation, growth_at_rest
 from opamc_cli.decision.measurement.lag import Course, Lag, courses, lag_behind
-from opamc_cli.decision.measurement.phase_sum import PhaseSum, SumGrowth, growth_of_sum, phase_sum
+from opamc_cli.decision.measurement.sensors import (
+    ErrorGrowth,
+    SensorErrors,
+    growth_of_errors,
+    sensor_errors,
+)
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import SMALLEST_SHARE, Change, explain_change
 from opamc_cli.joint.change.reading import Cause
@@ -27,6 +32,7 @@ from opamc_cli.stages.recordings.axis_recording import interpolated, read_record
 from opamc_cli.stages.verdict.reasons import (
     AT_REST,
     CURRENT_LAG,
+    IN_SPIKES,
     IN_THE_SUM,
     SENSOR_NOISE,
     excuses_little,
@@ -72,13 +78,17 @@ MUCH = 9.0
 WELL_EXPLAINED = 0.8
 """Below this share the reasons say how much of the change is unexplained."""
 
-MOST_TIMES = 100
-"""Of a sum that was hardly there more says nothing."""
+MOST_TIMES = 100.0
+"""Of what was hardly there more says nothing."""
 
 HUM = "mains_hum"
 NOISE = (
     "noise or hum of the current sensor, which has grown as much while the joint stands still: "
     "check the sensor, its cable and the amplifier"
+)
+OF_SPIKES = (
+    "single samples that the current's sensor or the logger garbles: check cables, connectors and "
+    "the log"
 )
 OF_THE_SUM = {
     "sensor_offset": "a zero error of a phase's current sensor: check the sensors' zero",
@@ -121,8 +131,8 @@ def explain(
     -------
     dict
         The `cause` of verdict.json: an effect of the library, trouble of the sensors that is there
-        at standstill, or in what the phases add up to, or a current that comes later than it did;
-        empty where none of them explains the change.
+        at standstill, in what the phases add up to or in single samples, or a current that comes
+        later than it did; empty where none of them explains the change.
 
     Raises
     ------
@@ -131,18 +141,18 @@ def explain(
     InputError, NotEnoughDataError
         If a side does not hold what a model of the joint needs.
     """
-    sides, noises, sums, along = [], [], [], []
+    sides, noises, wrong, along = [], [], [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
     for sources, moves in zip((baseline, target), strokes, strict=True):
-        recordings, noise, summed, moved, errors = _recordings(
+        recordings, noise, wrongs, moved, errors = _recordings(
             axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
         )
         if not recordings:
             raise errors[0]
         sides.append(recordings)
         noises.append(noise)
-        sums.append(summed)
+        wrong.append(wrongs)
         along.append(moved)
     lag = lag_behind(*along)
     if lag is not None:  # what else has changed is sought without it
@@ -152,8 +162,9 @@ def explain(
     with users_effects_named():
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
         found = _entry(change)
-    if (grown := growth_of_sum(*sums)) is not None:
-        found = _with_sensor(_of_sum(grown), found)
+    if (grown := growth_of_errors(*wrong)) is not None:
+        phases = all(recording.phases_a is not None for recording in sides[1])
+        found = _with_sensor(_of_sum(grown) if phases else _of_spikes(grown), found)
     elif (at_rest := growth_at_rest(*noises)) is not None:
         found = _with_sensor(_of_noise(at_rest), found)
     if lag is not None:
@@ -223,11 +234,11 @@ def _recordings(
     strokes: Mapping[str, Spans],
     rate_hz: float,
 ) -> tuple[
-    list[Recording], list[Fluctuation], list[PhaseSum], list[list[Course]], list[OpamcError]
+    list[Recording], list[Fluctuation], list[SensorErrors], list[list[Course]], list[OpamcError]
 ]:
     found: list[Recording] = []
     noises: list[Fluctuation] = []
-    sums: list[PhaseSum] = []
+    wrong: list[SensorErrors] = []
     along: list[list[Course]] = []
     errors: list[OpamcError] = []
     for source in sources:
@@ -245,14 +256,14 @@ def _recordings(
                 found.append(interpolated(recording, LEAST_HZ))
             noise = _fluctuation(recording, start, strokes.get(source.name, ()))
             noises += [] if noise is None else [noise]
-            phases = recording.phases_a
-            summed = None if phases is None else phase_sum(phases, recording.rate_hz)
-            sums += [] if summed is None else [summed]
+            current = recording.current_a if recording.phases_a is None else recording.phases_a
+            added = None if current is None else sensor_errors(current, recording.rate_hz)
+            wrong += [] if added is None else [added]
             along.append(_courses(recording))
         except OpamcError as error:
             # the run served the chain but not a model, which needs motion beside current
             errors.append(error)
-    return found, noises, sums, along, errors
+    return found, noises, wrong, along, errors
 
 
 def _courses(recording: Recording) -> list[Course]:
@@ -339,8 +350,9 @@ def _with_sensor(sensor: dict[str, Any], found: dict[str, Any] | None) -> dict[s
         evidence = {**found["evidence"], **sensor["evidence"]}
         return {**found, "evidence": evidence, "why": [*found["why"], *sensor["why"]]}
     rest = [one for one in found["others"] if one["effect"] != sensor["effect"]]
-    # a sum proves it: a gain of 1.3 looks like a payload besides
-    if _heard_at_rest(found) or (IN_THE_SUM in sensor["evidence"] and lies_outside(found)):
+    # a sum, or spikes, prove it: a gain of 1.3 looks like a payload besides
+    proven = AT_REST not in sensor["evidence"] and lies_outside(found)
+    if proven or _heard_at_rest(found):
         return {**sensor, "others": [{key: found[key] for key in OF_OTHERS}, *rest]}
     others = [*rest, {key: sensor[key] for key in OF_OTHERS}]
     return {**found, "others": others, "why": [*found["why"], *sensor["why"]]}
@@ -361,16 +373,29 @@ def _of_noise(noise: Growth) -> dict[str, Any]:
     return _sensor(SENSOR_NOISE, NOISE, noise.share, {AT_REST: noise.times}, why)
 
 
-def _of_sum(grown: SumGrowth) -> dict[str, Any]:
+def _of_sum(grown: ErrorGrowth) -> dict[str, Any]:
     """Return trouble of the phases' sensors as a cause."""
     part = {"sensor_offset": "what is constant of", "sensor_gain": "what follows the phases of"}
-    times = f"more than {MOST_TIMES:g}" if grown.times > MOST_TIMES else f"{grown.times:.2g}"
+    times = (
+        f"{MOST_TIMES:g} times and more" if grown.times > MOST_TIMES else f"{grown.times:.2g} times"
+    )
     why = (
         "The three phases of a motor without a neutral wire add up to nothing, whatever the gear "
-        f"does; {part.get(grown.kind, 'the rest of')} their sum is {times} times the baseline's, "
+        f"does; {part.get(grown.kind, 'the rest of')} their sum is {times} the baseline's, "
         f"and {grown.share:.0%} of what the current's fluctuation has grown by."
     )
-    return _sensor(grown.kind, OF_THE_SUM[grown.kind], grown.share, {IN_THE_SUM: grown.times}, why)
+    evidence = {IN_THE_SUM: min(grown.times, MOST_TIMES)}
+    return _sensor(grown.kind, OF_THE_SUM[grown.kind], grown.share, evidence, why)
+
+
+def _of_spikes(grown: ErrorGrowth) -> dict[str, Any]:
+    """Return single samples that leap as a cause."""
+    why = (
+        f"Single samples that leap and are back with the next are {grown.share:.0%} of what the "
+        "current's fluctuation has grown by; a fault of the gear lasts longer."
+    )
+    evidence = {IN_SPIKES: min(grown.times, MOST_TIMES)}
+    return _sensor(grown.kind, OF_SPIKES, grown.share, evidence, why)
 
 
 def _sensor(

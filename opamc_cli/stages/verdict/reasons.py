@@ -51,9 +51,10 @@ SENSOR_NOISE = "sensor_noise"
 CURRENT_LAG = "current_lag"
 """And one that moves all of the current in time against the position."""
 
-AT_REST, IN_THE_SUM = "times_at_rest", "times_in_the_sum"
+AT_REST, IN_THE_SUM, IN_SPIKES = "times_at_rest", "times_in_the_sum", "times_in_spikes"
+OF_SENSORS = {AT_REST, IN_THE_SUM, IN_SPIKES}
 """In a sensor's evidence: by how much what no gear moves has grown with it, the current's
-fluctuation at standstill, or what the three phases add up to."""
+fluctuation at standstill, what the three phases add up to, or single samples that leap."""
 
 SMALLER_PART = "A smaller part of the change is {}."
 CHECK_FIRST = (

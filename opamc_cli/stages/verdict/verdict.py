@@ -22,7 +22,7 @@ from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import AT_REST, IN_THE_SUM, is_excused, reasons
+from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit
@@ -426,7 +426,7 @@ def believed(
     payload and offsets act slowly: they do not excuse what the spectrum alone has found. Nor does
     grease, where it did move the course, what the spectrum shows far more clearly.
     """
-    noise = cause is not None and not {AT_REST, IN_THE_SUM}.isdisjoint(cause.get("evidence", ()))
+    noise = cause is not None and not OF_SENSORS.isdisjoint(cause.get("evidence", ()))
     if cause is None or not (noise or cause.get("harmless")):
         return cause
     heard = judgement.witnesses

@@ -161,10 +161,10 @@ def pushed(folder, extra_a, rest=0):
     return found
 
 
-def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True, lag=0):
+def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True, lag=0, spikes_a=0.0):
     """Write four sessions of strokes with pauses: with a sensor's noise and a ripple.
 
-    The current comes `lag` samples late.
+    The current comes `lag` samples late, and leaps in five single ones.
     """
     rng = np.random.default_rng(2)
     still, way = np.zeros(100), 0.6 * (1 - np.cos(np.linspace(0, np.pi, 150)))
@@ -177,6 +177,7 @@ def paused(folder, noise_a, ripple_a=0.0, friction=1.0, logged=True, lag=0):
         torque += ripple_a * np.sin(150 * q) * (speed != 0)
         torque = np.concatenate([torque[:1].repeat(lag), torque[: q.size - lag]])
         sizes = noise_a * rng.normal(size=(q.size, 3))
+        sizes[[60, 333, 700, 1111, 1400], 0] += spikes_a
         columns = {"axis1_current": (torque + sizes[:, 0]).astype(np.float32)}
         columns["axis1_position" if logged else "axis1_velocity"] = q if logged else speed
         path = folder / f"{k}.parquet"
@@ -201,6 +202,15 @@ def test_noise_that_is_there_at_standstill_is_the_sensor_s(tmp_path, logged):
         assert (cause.explain(1, before, after, JointConfig()) or {}).get("effect") != (
             "sensor_noise"
         )
+
+
+def test_single_samples_that_leap_are_the_logger_s(tmp_path):
+    before, _ = paused(tmp_path / "before", 0.03)
+    after, _ = paused(tmp_path / "after", 0.03, spikes_a=3.0)
+    found = cause.explain(1, before, after, JointConfig())
+    assert (found["effect"], found["origin"]) == ("sensor_noise", "measurement")
+    assert found["evidence"] == {"times_in_spikes": 100.0}
+    assert "Single samples that leap" in found["why"][0]
 
 
 def test_a_late_current_is_the_logger_s(tmp_path):

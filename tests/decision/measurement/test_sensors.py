@@ -1,9 +1,14 @@
-"""What three phases add up to, which no gear moves."""
+"""What three phases add up to, which no gear moves, and single samples of a current."""
 
 import numpy as np
 import pytest
 
-from opamc_cli.decision.measurement.phase_sum import KINDS, PhaseSum, growth_of_sum, phase_sum
+from opamc_cli.decision.measurement.sensors import (
+    KINDS,
+    SensorErrors,
+    growth_of_errors,
+    sensor_errors,
+)
 
 RATE_HZ = 2000.0
 NOISE_A = 0.02
@@ -21,14 +26,14 @@ def phases(seed: int, gear: float = 0.0, gain: float = 0.0, zero_a: float = 0.0)
     return values
 
 
-def measured(values: np.ndarray) -> PhaseSum:
-    found = phase_sum(values, RATE_HZ)
+def measured(values: np.ndarray) -> SensorErrors:
+    found = sensor_errors(values, RATE_HZ)
     assert found is not None
     return found
 
 
 @pytest.fixture(scope="module")
-def baseline() -> list[PhaseSum]:
+def baseline() -> list[SensorErrors]:
     return [measured(phases(seed)) for seed in range(5)]
 
 
@@ -60,7 +65,7 @@ def test_parts_are_what_an_error_does_to_the_vectors_length():
     ids=["zero", "gain", "spikes", "spikes far above the current", "noise"],
 )
 def test_what_sensors_add_is_in_the_sum(baseline, values, kind):
-    grown = growth_of_sum(baseline, [measured(values)])
+    grown = growth_of_errors(baseline, [measured(values)])
     assert grown is not None
     assert grown.kind == kind
     assert grown.share > 1 / 3
@@ -70,15 +75,34 @@ def test_a_gear_leaves_the_sum_alone(baseline):
     worn = measured(phases(9, gear=0.3))
     assert worn.fluctuation > 10 * max(one.fluctuation for one in baseline)
     assert worn.parts[2] == pytest.approx(baseline[0].parts[2], rel=0.1)
-    assert growth_of_sum(baseline, [worn]) is None
-    assert growth_of_sum(baseline, [measured(phases(9, gear=0.3, gain=0.03))]) is None
-    assert growth_of_sum(baseline[:2], [measured(phases(9, gain=0.1))]) is None
-    assert growth_of_sum(baseline, []) is None
+    assert growth_of_errors(baseline, [worn]) is None
+    assert growth_of_errors(baseline, [measured(phases(9, gear=0.3, gain=0.03))]) is None
+    assert growth_of_errors(baseline[:2], [measured(phases(9, gain=0.1))]) is None
+    assert growth_of_errors(baseline, []) is None
 
 
 def test_unknown_samples_are_left_out():
     values = phases(3)
     values[100:300, 2] = np.nan
     assert measured(values).parts == pytest.approx(measured(phases(3)).parts, abs=1e-5)
-    assert phase_sum(np.full((400, 3), np.nan), RATE_HZ) is None
+    assert sensor_errors(np.full((400, 3), np.nan), RATE_HZ) is None
     assert len(KINDS) == len(measured(values).parts)
+
+
+@pytest.mark.parametrize(("by", "shown"), [(2.0, True), (0.2, False)])
+def test_single_samples_of_a_reported_current_are_the_loggers(by, shown):
+    """Those of no more than noise are no spikes; a ringing gear has none."""
+
+    def current(seed, ringing=0.0):
+        t = np.arange(8000) / RATE_HZ
+        noise = NOISE_A * np.random.default_rng(seed).normal(size=t.size)
+        ring = ringing * np.exp(-5 * (t % 1)) * np.sin(2 * np.pi * 80 * t)
+        return np.sin(2 * np.pi * 0.7 * t) + ring + noise
+
+    before = [measured(current(seed)) for seed in range(4)]
+    garbled = current(9)
+    garbled[[100, 900, 1700, 2500, 6000]] += by
+    grown = growth_of_errors(before, [measured(garbled)])
+    assert (grown is not None) == shown
+    assert grown is None or (grown.kind, grown.share > 0.9) == ("sensor_noise", True)
+    assert growth_of_errors(before, [measured(current(9, ringing=0.5))]) is None

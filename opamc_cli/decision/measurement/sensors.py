@@ -1,6 +1,7 @@
-"""Whether what the three phases add up to has grown as much as the current's fluctuation.
+"""Whether what sensors alone do has grown as much as the current's fluctuation.
 
-Without a neutral wire the phases of a motor add up to nothing, whatever gear, load and drive do.
+Without a neutral wire the phases of a motor add up to nothing, whatever gear, load and drive do; of
+a reported current single samples that leap are the logger's.
 """
 
 from collections.abc import Sequence
@@ -16,6 +17,7 @@ from opamc_cli.decision.measurement.at_rest import (
     Floats,
     about_course,
 )
+from opamc_cli.signal.plausible.spikes import spikes
 
 OF_LENGTH = 2 / 9
 """Mean square by which an error of the phases changes their vector's length, over that of their
@@ -38,19 +40,19 @@ KINDS = ("sensor_offset", "sensor_gain", "sensor_noise")
 
 
 @dataclass(frozen=True)
-class PhaseSum:
-    """What a recording's phases add up to, and how much their vector's length fluctuates."""
+class SensorErrors:
+    """What of a recording is the sensors', and how much its current fluctuates."""
 
     parts: tuple[float, float, float]
-    """By `KINDS`, what is constant, what follows the phases, and the rest: as mean squares of the
-    vector's length that they change, in A^2."""
+    """By `KINDS`: of the phases' sum what is constant, what follows the phases, and the rest; as
+    mean squares by which they change the vector's length, in A^2. Of a current its spikes."""
     fluctuation: float
-    """Mean square of that length about its slow course, in A^2."""
+    """Mean square of the current, or of that length, about its slow course, in A^2."""
 
 
 @dataclass(frozen=True)
-class SumGrowth:
-    """What most of a sum that has grown is of."""
+class ErrorGrowth:
+    """What most of the sensors' errors that have grown is."""
 
     kind: str
     """Of `KINDS`."""
@@ -60,28 +62,36 @@ class SumGrowth:
     """Of the growth of the fluctuation, 1 at most."""
 
 
-def phase_sum(phases: Floats, rate_hz: float) -> PhaseSum | None:
-    """Measure what three phases add up to.
+def sensor_errors(current: Floats, rate_hz: float) -> SensorErrors | None:
+    """Measure what the sensors of a current add.
 
     Parameters
     ----------
-    phases : ndarray, shape (n, 3)
-        In A; NaN where unknown.
+    current : ndarray, shape (n,) or (n, 3)
+        Reported current, or three phases, in A; NaN where unknown.
     rate_hz : float
         Sampling rate.
 
     Returns
     -------
-    PhaseSum or None
+    SensorErrors or None
         None where no stretch of samples is known.
     """
     size = max(round(BLOCK_S * rate_hz), FEWEST_SAMPLES)
-    n = len(phases) // size
-    vector = phases[: n * size] - phases[: n * size].mean(axis=1, keepdims=True)
-    length = np.sqrt(2 / 3 * (vector**2).sum(axis=1)).reshape(n, size, 1)
-    length = length[np.isfinite(length).all(axis=(1, 2))]
-    if not len(length):
+    n = len(current) // size
+    length = current[: n * size]
+    if current.ndim > 1:
+        vector = length - length.mean(axis=1, keepdims=True)
+        length = np.sqrt(2 / 3 * (vector**2).sum(axis=1))
+    stretches = length.reshape(n, size, 1)
+    stretches = stretches[np.isfinite(stretches).all(axis=(1, 2))]
+    if not len(stretches):
         return None
+    parts = _of_phases(current) if current.ndim > 1 else (0.0, 0.0, _of_spikes(current))
+    return SensorErrors(parts, float(about_course(stretches).mean()))
+
+
+def _of_phases(phases: Floats) -> tuple[float, float, float]:
     known = phases[np.isfinite(phases).all(axis=1)]
     total = known.sum(axis=1)
     # a gain that all three share leaves no sum
@@ -92,20 +102,28 @@ def phase_sum(phases: Floats, rate_hz: float) -> PhaseSum | None:
     followed = beside @ np.linalg.lstsq(beside[usual], (total - total.mean())[usual])[0]
     own = (total.mean(), followed, total - total.mean() - followed)
     offset, gain, noise = (OF_LENGTH * float(np.mean(np.square(part))) for part in own)
-    return PhaseSum((offset, gain, noise), float(about_course(length).mean()))
+    return offset, gain, noise
 
 
-def growth_of_sum(baseline: Sequence[PhaseSum], target: Sequence[PhaseSum]) -> SumGrowth | None:
-    """Tell whether the phases' sum has grown as the fluctuation of their vector's length has.
+def _of_spikes(current: Floats) -> float:
+    found = spikes(current)
+    away = current[found] - (current[found - 1] + current[found + 1]) / 2
+    return float(away @ away) / current.size
+
+
+def growth_of_errors(
+    baseline: Sequence[SensorErrors], target: Sequence[SensorErrors]
+) -> ErrorGrowth | None:
+    """Tell whether what the sensors add has grown as the current's fluctuation has.
 
     Parameters
     ----------
-    baseline, target : sequence of PhaseSum
+    baseline, target : sequence of SensorErrors
         One for each recording.
 
     Returns
     -------
-    SumGrowth or None
+    ErrorGrowth or None
         None where no part of it has grown beyond the baseline's recordings, or by less than a third
         of what the fluctuation has grown by, or less than that differs among the baseline's.
     """
@@ -121,4 +139,4 @@ def growth_of_sum(baseline: Sequence[PhaseSum], target: Sequence[PhaseSum]) -> S
         return None
     share = min(total / risen, 1.0) if risen > 0 else 1.0
     times = float(np.sqrt(after[most] / max(before[most], 1e-300)))
-    return SumGrowth(KINDS[most], times, float(share))
+    return ErrorGrowth(KINDS[most], times, float(share))
