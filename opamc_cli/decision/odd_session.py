@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from opamc_cli.decision.judge import HEARD_FROM, Bundle, Judgement, Policy, judge, one_of_many
+from opamc_cli.decision.judge import FAR, HEARD_FROM, Bundle, Judgement, Policy, judge, one_of_many
 
 WORTH_ASKING = 4.0
 """Expected spreads from which on a session is held against the others, which takes as long as to
@@ -109,8 +109,9 @@ def _odd_one(
             if name in bundle.baseline_sessions
         }
         for axis, judged in judge(held_out, _stricter(policy, bundles), sized=False).items():
-            differs = (name, axis) in asked and judged.state in UNHEALTHY
-            if differs and (judged.health_index, name) > found.get(axis, (0.0, "")):
+            # what moves all joints so far excuses none of them
+            differs = judged.state in UNHEALTHY or judged.health_index > FAR
+            if (name, axis) in asked and differs and (judged.health_index, name) > found.get(axis, (0.0, "")):
                 found[axis] = judged.health_index, name
     return {axis: (name,) for axis, (_, name) in found.items()}
 

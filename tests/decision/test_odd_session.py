@@ -42,6 +42,17 @@ def test_a_worn_night_of_the_baseline_is_found_and_hides_no_fault_any_more(worn)
     assert after[3].n_baseline_sessions == 5
 
 
+@pytest.mark.parametrize(("by", "found"), [(3.0, True), (0.3, False)], ids=["filter", "hall"])
+def test_what_moves_all_joints_of_a_night_as_no_hall_does_is_found(by, found):
+    """Each excused the others, and a fault had to lie beyond what a changed filter does."""
+    bundles = robot(1)
+    for bundle in bundles.values():
+        for spectrum in bundle.witnesses["spectrum"].cells:
+            spectrum.sessions[2] += by
+    odd = odd_sessions(bundles, judge(bundles))
+    assert odd == (dict.fromkeys(bundles, ("2026-03-03",)) if found else {})
+
+
 def test_beside_a_baseline_that_was_chosen_a_target_differs_by_more():
     """The session left out was the farthest of six: chance alone brings the rest nearer."""
     bundles = robot(1, 3)
