@@ -111,7 +111,8 @@ def _odd_one(
         for axis, judged in judge(held_out, _stricter(policy, bundles), sized=False).items():
             # what moves all joints so far excuses none of them
             differs = judged.state in UNHEALTHY or judged.health_index > FAR
-            if (name, axis) in asked and differs and (judged.health_index, name) > found.get(axis, (0.0, "")):
+            farther = (judged.health_index, name) > found.get(axis, (0.0, ""))
+            if (name, axis) in asked and differs and farther:
                 found[axis] = judged.health_index, name
     return {axis: (name,) for axis, (_, name) in found.items()}
 
