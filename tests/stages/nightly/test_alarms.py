@@ -365,6 +365,23 @@ def test_a_joint_that_conditions_alone_excuse_is_told_and_again_after_some_night
     assert settled(nights_excused()).events == ()
 
 
+def test_a_joint_that_something_outside_it_changed_is_told_by_cause_and_again_after_some_nights():
+    """A sensor whose gain was off by a third was silence, night after night."""
+    rows = nights_of(["healthy"] * 12)
+    for row in rows[2:]:
+        row.update(state="changed", harmless=True, cause="sensor_gain", p_value=1e-9)
+    rows[4]["cause"] = "payload_change"
+    rows[5].update(state="fault", harmless=False, cause="ripple")
+    found = settled(rows).events
+    assert [(one.time[-2:], one.kind) for one in found] == [
+        (day, "outside") for day in ("03", "05", "12")
+    ]
+    assert found[0].text.startswith(
+        "axis 2: changed in 9 nights from 2026-03-03 to 2026-03-12 by what lies outside the joint "
+        "(sensor_gain and payload_change): put it right, or rebaseline"
+    )
+
+
 def test_a_robot_whose_last_night_conditions_alone_excuse_is_not_counted_as_healthy():
     def robot(night):
         joint = JointSummary(2, "", "healthy", night, "", 4.2, None, excused=True)

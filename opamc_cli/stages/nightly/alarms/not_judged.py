@@ -47,6 +47,27 @@ def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
         yield Event(nights[index], last["robot"], last["axis"], "excused", text)
 
 
+def outside(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+    """Say of a joint in which nights it changed by what is no fault of it: payload, sensor, grease.
+
+    No alarm comes of them, and a fault beside it might not be told.
+    """
+    found = [row for row in rows if row["state"] == "changed" and row["harmless"]]
+    nights, causes = ([row[of] for row in found] for of in ("night", "cause"))
+    for index in said_in(nights, causes, remind_after):
+        span = (
+            nights[-1]
+            if len(nights) == 1
+            else f"{len(nights)} nights from {nights[0]} to {nights[-1]}"
+        )
+        named = " and ".join(dict.fromkeys(causes))
+        text = (
+            f"{name}: changed in {span} by what lies outside the joint ({named}): put it right, or "
+            "rebaseline if it is meant to stay; a fault that looks alike would not be told"
+        )
+        yield Event(nights[index], found[-1]["robot"], found[-1]["axis"], "outside", text)
+
+
 def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterator[Event]:
     """Say of a robot which of its nights failed, in whole or in part, and why."""
     for row in nights:

@@ -10,7 +10,7 @@ from opamc_cli.decision.trend.alarm import Night, episodes
 from opamc_cli.decision.trend.chart import CALM, LIMIT
 from opamc_cli.stages.nightly.alarms.alarm import Watched, alarm_of
 from opamc_cli.stages.nightly.alarms.course import JUDGED, chart_of, courses
-from opamc_cli.stages.nightly.alarms.not_judged import excused, failed, not_judged
+from opamc_cli.stages.nightly.alarms.not_judged import excused, failed, not_judged, outside
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, NightRow, begun_anew
 
 DIFFERS = 0.01
@@ -86,6 +86,7 @@ def settle_robot(
         under = {night for of, at, night in standing if (of, at) == (program, axis)}
         free = [row for row in joint if row["night"] not in under]
         events += excused(free, name, rule.remind_after)
+        events += outside(free, name, rule.remind_after)
     events += failed(robot, nights, rule.remind_after)
     return Settled(tuple(alarms), tuple(dict.fromkeys(standing)), tuple(events))
 
