@@ -89,6 +89,8 @@ class Ways:
             same = {way: _left(fit_terms(one.dataset, found.terms)) for way, one in fits.items()}
             for way in sorted(same, key=lambda way: same[way])[:OTHERS]:
                 left[way] = min(left[way], _left(_with_functions(fits[way], functions)))
+        for dataset in self._short.values():
+            dataset.cache.clear()  # 100 MB of two minutes; the declared terms are soon laid again
         best = min(left, key=lambda way: left[way])
         return best if left[best] < (HALF if functions else BETTER) * left[first] else first
 
