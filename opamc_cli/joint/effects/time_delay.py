@@ -48,13 +48,13 @@ class TimeDelay(Effect):
         The coefficients of the unshifted fit would not do: they have already bent to the delay.
         """
         rows = track.open_samples
-        columns = track.static_columns
-        if not columns.shape[1] or rows is None:
+        if not track.static_terms or rows is None:
             return np.zeros((track.size, 1))
         full = track.full or track
         samples = parameters["delay_s"] * full.rate_hz
         if parameters.get("filtered"):
             pole = np.exp(-1.0 / max(samples, 1e-3))
+            columns = np.concatenate(track.full_blocks, axis=1)
             late = [lagging(columns[start:stop], pole) for start, stop in full.bounds]
             shifted = track.own_means(np.concatenate(late))
         else:
@@ -62,7 +62,7 @@ class TimeDelay(Effect):
             shifted = late_means(track.static_sums, full.bounds, samples, factor)
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        return stack((shifted - track.static_means) @ coefficients)
+        return stack(shifted @ coefficients - track.static_current(coefficients))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.

@@ -120,11 +120,11 @@ class Shift(Effect):
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """First and second rate of change, by time, of the static terms' current."""
         rows = track.open_samples
-        if rows is None:
+        if rows is None or not track.static_terms:
             return np.zeros((track.size, 2))
-        columns = track.static_means
-        part, known = columns[rows], track.current_a[rows]
-        first = track.rate_hz * np.gradient(columns @ solve(part.T @ part, part.T @ known))
+        part = np.concatenate([block.T[:, rows] for block in track.static_blocks])
+        fitted = track.static_current(solve(part @ part.T, part @ track.current_a[rows]))
+        first = track.rate_hz * np.gradient(fitted)
         return stack(first, track.rate_hz * np.gradient(first))
 
 

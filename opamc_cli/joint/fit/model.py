@@ -171,10 +171,11 @@ class Dataset:
 
     def with_model(self, load: Floats, model: Floats, static: tuple[Term, ...]) -> "Dataset":
         """Put the fitted load and model currents, given at the full rate, on both grids."""
-        fine = replace(self.fine, track=self.fine.track.with_model(load, model, static))
+        given = load, model, static, self.cache.laid
+        fine = replace(self.fine, track=self.fine.track.with_model(*given))
         if self.coarse is self.fine:
             return replace(self, fine=fine, coarse=fine)
-        coarse = replace(self.coarse, track=self.coarse.track.with_model(load, model, static))
+        coarse = replace(self.coarse, track=self.coarse.track.with_model(*given))
         return replace(self, fine=fine, coarse=coarse)
 
 

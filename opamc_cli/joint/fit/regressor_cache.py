@@ -15,11 +15,12 @@ class RegressorCache:
     """Regressors by term, and sums of products by pair of regressor arrays: most are met again."""
 
     def __init__(self) -> None:
+        self.laid: dict[Hashable, Floats] = {}
         self.clear()
 
     def clear(self) -> None:
         """Forget everything; it is computed again where it is asked for."""
-        self._columns: dict[Hashable, Floats] = {}
+        self.laid.clear()  # which tracks share
         # The load and the model, (n,) each, that sets of terms which follow them were fitted with.
         self.settled: dict[Hashable, tuple[Floats, Floats]] = {}
         self._taken: dict[tuple[int, bool, int], tuple[Floats, Floats]] = {}
@@ -29,9 +30,9 @@ class RegressorCache:
 
     def columns(self, key: Hashable, compute: Callable[[], Floats]) -> Floats:
         """Regressors of a term, computed where they are not at hand."""
-        if key not in self._columns:
-            self._columns[key] = compute()
-        return self._columns[key]
+        if key not in self.laid:
+            self.laid[key] = compute()
+        return self.laid[key]
 
     def sums(self, blocks: Sequence[Floats], current: Floats, parts: Parts, fine: bool) -> Sums:
         """Sum products of regressors, term by term (n, k), over parts.
@@ -78,7 +79,7 @@ class RegressorCache:
         if not self._grown:
             return  # half of a search asks for what is there: to look again took a tenth of it
         self._grown = False
-        kept = {id(block) for block in (*self._columns.values(), *self._currents.values())}
+        kept = {id(block) for block in (*self.laid.values(), *self._currents.values())}
         # Products are known by their blocks. To look through all of them took a sixth of a cause.
         if not kept.issuperset(key[0] for key in self._taken):
             self._taken = {key: pair for key, pair in self._taken.items() if key[0] in kept}
@@ -86,7 +87,7 @@ class RegressorCache:
             self._products = {key: self._products[key] for key in pairs}
         fitted = (one for pair in (*self._taken.values(), *self.settled.values()) for one in pair)
         # Rows may be a view of the block, and both of what was computed.
-        every = (*self._columns.values(), *fitted)
+        every = (*self.laid.values(), *fitted)
         owners = (block if block.base is None else block.base for block in every)
         if sum({id(one): one.nbytes for one in owners}.values()) > MOST_BYTES:
             self.clear()

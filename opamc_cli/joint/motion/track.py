@@ -1,6 +1,6 @@
 """A joint's recording as the loop sees it: one uniform grid, motion, current and groups."""
 
-from collections.abc import Callable, Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
@@ -22,8 +22,6 @@ NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
 
 SHORTEST_PATH = 2.9
 """Travels of a path that passes its places again the same way; ways end a little apart."""
-MOST_LAID = 24
-"""Terms whose regressors are kept for all models: twice what a joint's model holds, or 50 MB."""
 ENOUGH_ROWS = 4000
 """By which the load's shapes are told apart: built-in effects' loads are sums of them."""
 
@@ -153,44 +151,47 @@ class Track:
 
     @cached_property
     def laid(self) -> dict[Hashable, Floats]:
-        """Regressors of static terms that stay the same, and their means, for every model."""
+        """Regressors of terms that stay the same, by term and grid, for every model."""
         return {}
 
     @cached_property
-    def static_columns(self) -> Floats:
-        """Regressors of the static terms, shape (m, k), on the full rate's samples."""
-        source = self.full or self
-        return self._static(source.size, "all", lambda term: term.columns(source))
+    def full_blocks(self) -> list[Floats]:
+        """Regressors of each static term on the full rate's samples, shape (m, k)."""
+        return self._static("full" if self.full else True)
+
+    @cached_property
+    def static_blocks(self) -> list[Floats]:
+        """Regressors of each static term on this track's own samples, shape (n, k)."""
+        return self._static("means") if self.full else self.full_blocks
+
+    def _static(self, kind: Hashable) -> list[Floats]:
+        blocks = []
+        for term in self.static_terms:
+            block = self.laid.get((term.key, kind))
+            if block is None:
+                block = term.columns(self.full or self)
+                block = self.own_means(block) if kind == "means" else block
+            if term.is_constant:
+                self.laid[term.key, kind] = block
+            blocks.append(block)
+        return blocks
+
+    def static_current(self, coefficients: Floats) -> Floats:
+        """Add up the static terms on this track's own samples with coefficients, (k,); (n,)."""
+        blocks = self.static_blocks
+        each = np.split(coefficients, np.cumsum([block.shape[1] for block in blocks])[:-1])
+        return sum(map(np.matmul, blocks, each), np.zeros(self.size))
 
     @cached_property
     def static_sums(self) -> Floats:
-        """Running sums of the static regressors, from zero in each recording."""
+        """Running sums of the static regressors, (m + recordings, k), from zero in each."""
+        columns = np.concatenate(self.full_blocks, axis=1)
         parts = []
         for start, stop in (self.full or self).bounds:
-            sums = np.zeros((stop - start + 1, self.static_columns.shape[1]))
-            np.cumsum(self.static_columns[start:stop], axis=0, out=sums[1:])
+            sums = np.zeros((stop - start + 1, columns.shape[1]))
+            np.cumsum(columns[start:stop], axis=0, out=sums[1:])
             parts.append(sums)
         return np.concatenate(parts)
-
-    @cached_property
-    def static_means(self) -> Floats:
-        """Regressors of the static terms on this track's own samples, shape (n, k)."""
-        if self.full is None:
-            return self.static_columns
-        full = self.full
-        return self._static(self.size, "means", lambda term: self.own_means(term.columns(full)))
-
-    def _static(self, size: int, kind: str, compute: "Callable[[Regressors], Floats]") -> Floats:
-        if len(self.laid) > MOST_LAID:
-            self.laid.clear()
-        blocks = [np.zeros((0, size))]
-        for term in self.static_terms:
-            key = kind, term.key
-            block = self.laid[key] if key in self.laid else compute(term)
-            if term.is_constant:
-                self.laid[key] = block
-            blocks.append(block.T)
-        return np.concatenate(blocks).T
 
     def own_means(self, values: Floats) -> Floats:
         """Average what is given at the full rate, (n,) or (n, k), over this track's own samples."""
@@ -202,19 +203,24 @@ class Track:
 
         A search keeps hundreds of fits, each with its own.
         """
-        for name in ("static_columns", "static_sums", "static_means"):
+        for name in ("full_blocks", "static_blocks", "static_sums"):
             self.__dict__.pop(name, None)
 
     def with_model(
-        self, load_a: Floats, model_a: Floats, static_terms: "tuple[Regressors, ...]"
+        self,
+        load_a: Floats,
+        model_a: Floats,
+        static_terms: "tuple[Regressors, ...]",
+        laid: dict[Hashable, Floats] | None = None,
     ) -> "Track":
-        """Return the same track with the fitted load and model currents, given at its full rate."""
+        """Return the same track with load and model currents given at its full rate."""
         full = self.full and self.full.with_model(load_a, model_a, ())
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
         new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
         # What follows from the motion alone stays, and is asked for at every step of a fit.
-        for name in ("speed_scale", "inertia_weights", "laid"):
+        for name in ("speed_scale", "inertia_weights"):
             new.__dict__[name] = getattr(self, name)
+        new.__dict__["laid"] = self.laid if laid is None else laid
         return new
 
 
