@@ -1,7 +1,8 @@
 """Fit a declared model, parameters that are not given included."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -54,14 +55,17 @@ class Ways:
         track, grouping = grouped_track(*self._laid)
         if grouping is None or not is_moving(track):
             return None
+        self._first = judged_of(track), grouping
         dataset = dataset_of(track, grouping)
         model = self._declared(dataset)
         self._short = {}
         if "windows" not in without_rules and smoothings(self._laid[0]):
             part = excerpts(self._laid[0], track), self._laid[1]
-            laid = *part, *grouped_track(*part)
-            ways = (None, *smoothings(part[0])) if laid[-1] is not None else ()
-            self._short = {way: _differentiated(*laid, way, short=True) for way in ways}
+            track, grouping = grouped_track(*part)
+            if grouping is not None:
+                laid = *part, judged_of(track), grouping
+                ways = (None, *smoothings(part[0]))
+                self._short = {way: _differentiated(*laid, way, short=True) for way in ways}
         best = self._best_of(None, model)
         return declared_fit(dataset if best is None else self._whole(best), model)
 
@@ -77,7 +81,7 @@ class Ways:
         return None if best == present else declared_fit(self._whole(best), model)
 
     def _whole(self, way: Way) -> Dataset:
-        return _differentiated(*self._laid, *grouped_track(*self._laid), way)
+        return _differentiated(*self._laid, *self._first, way)
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
         """Return the way that leaves least beside so many functions, or the first: see HALF."""
@@ -98,15 +102,13 @@ class Ways:
 def _differentiated(
     recordings: list[Recording],
     joint: Joint,
-    track: Track,
-    grouping: Grouping | None,
+    judged: Mapping[str, Any],
+    grouping: Grouping,
     smoothing: Way,
     short: bool = False,
 ) -> Dataset:
     """Differentiate recordings, judged by a first track's samples; by ENOUGH of them if `short`."""
-    assert grouping is not None
-    if smoothing is not None:
-        track = judged_alike(build_track(recordings, joint, smoothing), track)
+    track = replace(build_track(recordings, joint, smoothing), **judged)
     laid = dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
     return replace(laid, smoothing=smoothing)
 
@@ -120,9 +122,9 @@ def _left(fit: Fit) -> float:
     return fit.rmse(sealed=False) ** 2
 
 
-def judged_alike(other: Track, track: Track) -> Track:
-    """Judge both by the same samples: where the first takes nothing from the acceleration."""
-    return replace(other, **{name: getattr(track, name) for name in JUDGED})
+def judged_of(track: Track) -> dict[str, Any]:
+    """Which samples count: where a track's smoothing takes nothing from the acceleration."""
+    return {name: getattr(track, name) for name in JUDGED}
 
 
 def declared_fit(dataset: Dataset, declared: Declared) -> Fit:

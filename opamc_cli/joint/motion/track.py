@@ -282,7 +282,8 @@ def joined(pieces: Sequence[Track]) -> Track:
     parts = [sampled(piece) for piece in pieces]
     whole: dict[str, Any] = dict.fromkeys(parts[0])
     for name in set.intersection(*map(set, parts)):
-        whole[name] = np.concatenate([part[name] for part in parts])
+        each = [part[name] for part in parts]
+        whole[name] = np.concatenate(each) if len(each) > 1 else each[0]
     return replace(
         pieces[0],
         **whole,

@@ -10,7 +10,7 @@ import numpy as np
 from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
 from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
 from opamc_cli.joint.effects.base import Effect
-from opamc_cli.joint.explain.declared import BETTER, judged_alike
+from opamc_cli.joint.explain.declared import BETTER, judged_of
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, may_extrapolate, why_not_applied
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
@@ -91,7 +91,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
         smoothings(recordings), excerpts(recordings, track), track, effects, closed
     )
     if smoothing is not None:
-        track = judged_alike(build_track(recordings, joint, smoothing), track)
+        track = replace(build_track(recordings, joint, smoothing), **judged_of(track))
     applied, left_out = _apply(track, effects, closed)
     known = _familiar(applied, effects, closed, {entry["effect"] for entry in left_out})
     return {
@@ -138,7 +138,7 @@ def _best_of(
     first = replace(first, channels=whole.channels)
     best, least = None, _apply(first, effects, closed)[0].rmse()
     for smoothing in ways:
-        other = judged_alike(build_track(recordings, whole.joint, smoothing), first)
+        other = replace(build_track(recordings, whole.joint, smoothing), **judged_of(first))
         found = _apply(other, effects, closed)[0].rmse()
         if found**2 < BETTER * least**2:
             best, least = smoothing, found
