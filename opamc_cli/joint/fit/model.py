@@ -374,6 +374,8 @@ def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUN
     load_a, model_a = kept.get(names, (track.load_a, track.model_a))
     dataset = dataset.with_model(load_a, model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3
+    if all(t.is_constant or t.effect.from_terms or t.effect.follows_load for t in terms):
+        rounds = min(rounds, fewest)  # a load that Newton steps have found needs no more
     best, least = dataset, np.inf
     for number in range(1, rounds + 1):
         fitted = _fit_once(dataset, terms)
@@ -429,8 +431,12 @@ def _with_newton_load(fitted: Fit) -> Dataset:
         rest = track.current_a[rows] - columns @ own - sum(map(np.matmul, others, held))
         error = float(rest @ rest)
         settled = abs(least - error) <= SETTLED * least < np.inf
-        if error < least:
+        better = error < least
+        if better:
             best, least, start = load, error, values
+        if settled:
+            break
+        if better:
             jacobian = columns.copy()
             tiny = TINY * np.abs(load).max() / largest
             for place, size, carrier in zip(np.flatnonzero(carries), tiny, carriers.T, strict=True):
@@ -440,8 +446,6 @@ def _with_newton_load(fitted: Fit) -> Dataset:
             found = np.concatenate([block.T @ asked for block in (jacobian, *others)])
             beside = np.concatenate([found[own.size :, :-1].T, kept])
             step = 2 * solve(np.block([found[:, :-1], beside]), found[:, -1])
-        if settled:
-            break
         # A step that was too long is halved.
         step = step / 2
         values = start + step
