@@ -1,6 +1,6 @@
 """Fit a declared model, parameters that are not given included."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -26,11 +26,12 @@ FUNCTIONS = 4
 """Without a name, beside a model that may lack something: 16 leave the least with the same way."""
 OTHERS = 2
 """Ways beside the first in which they are searched, those in which what it found leaves least: by
-one more a payload of 15 times the noise would be missed (0.08 of what the first way leaves). None
-that leaves twice as much: of 168 none with more than 1.1 times as much came to be the best."""
+one more a payload of 15 times the noise would be missed (0.08 of what the first way leaves)."""
 JUDGED = ("moving", "clear", "channels", "period_s")
 """What tells which samples count: by its own, none near a reversal, a long window is the best."""
 Way = Smoothing | None
+Laid = tuple[list[Recording], Joint, dict[str, Any], Grouping]
+"""Recordings, and which of their samples count, as a first track and its groups tell."""
 Declared = tuple[tuple[Effect, Term | None], ...]
 """Effects, with their terms where parameters are given."""
 
@@ -56,7 +57,7 @@ class Ways:
         track, grouping = grouped_track(*self._laid)
         if grouping is None or not is_moving(track):
             return None
-        self._first = judged_of(track), grouping
+        self._whole = *self._laid, judged_of(track), grouping
         dataset = dataset_of(track, grouping)
         model = self._declared(dataset)
         self._short = {}
@@ -64,11 +65,10 @@ class Ways:
             part = excerpts(self._laid[0], track), self._laid[1]
             track, grouping = grouped_track(*part)
             if grouping is not None:
-                laid = *part, judged_of(track), grouping
-                ways = (None, *smoothings(part[0]))
-                self._short = {way: _differentiated(*laid, way, short=True) for way in ways}
+                laid, ways = (*part, judged_of(track), grouping), (None, *smoothings(part[0]))
+                self._short = {way: _differentiated(laid, way, short=True) for way in ways}
         best = self._best_of(None, model)
-        return declared_fit(dataset if best is None else self._whole(best), model)
+        return declared_fit(dataset if best is None else _differentiated(self._whole, best), model)
 
     def fit_anew(self, before: Fit, found: Sequence[Term] = ()) -> Fit | None:
         """Fit the model anew, to the motion that predicts best beside terms that were found.
@@ -79,10 +79,7 @@ class Ways:
         present, model = before.dataset.smoothing, self._declared(before.dataset)
         beside = (*model, *((term.effect, term) for term in found))
         best = self._best_of(present, beside, 0 if found else FUNCTIONS)
-        return None if best == present else declared_fit(self._whole(best), model)
-
-    def _whole(self, way: Way) -> Dataset:
-        return _differentiated(*self._laid, *self._first, way)
+        return None if best == present else declared_fit(_differentiated(self._whole, best), model)
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
         """Return the way that leaves least beside so many functions, or the first: see HALF."""
@@ -92,8 +89,7 @@ class Ways:
             found = _with_functions(fits.pop(first), functions)
             left[first] = min(left[first], _left(found))
             same = {way: _left(fit_terms(one.dataset, found.terms)) for way, one in fits.items()}
-            near = [way for way in same if HALF * same[way] < left[first]]
-            for way in sorted(near, key=lambda way: same[way])[:OTHERS]:
+            for way in sorted(same, key=lambda way: same[way])[:OTHERS]:
                 left[way] = min(left[way], _left(_with_functions(fits[way], functions)))
         for dataset in self._short.values():
             dataset.cache.clear()  # 100 MB of two minutes; the declared terms are soon laid again
@@ -101,18 +97,14 @@ class Ways:
         return best if left[best] < (HALF if functions else BETTER) * left[first] else first
 
 
-def _differentiated(
-    recordings: list[Recording],
-    joint: Joint,
-    judged: Mapping[str, Any],
-    grouping: Grouping,
-    smoothing: Way,
-    short: bool = False,
-) -> Dataset:
-    """Differentiate recordings, judged by a first track's samples; by ENOUGH of them if `short`."""
-    track = replace(build_track(recordings, joint, smoothing), **judged)
-    laid = dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
-    return replace(laid, smoothing=smoothing)
+def _differentiated(laid: Laid, way: Way, short: bool = False) -> Dataset:
+    """Differentiate recordings in one way; by ENOUGH of their samples if `short`."""
+    recordings, joint, judged, grouping = laid
+    track = replace(build_track(recordings, joint, way), **judged)
+    found = (
+        dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
+    )
+    return replace(found, smoothing=way)
 
 
 def _with_functions(fit: Fit, functions: int) -> Fit:

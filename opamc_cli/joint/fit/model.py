@@ -25,6 +25,8 @@ every round costs as many. Twice as many take a tenth more time and name the sam
 MOST_ROUNDS = 12
 SETTLED = 1e-4
 """Share of the error by which a fit of terms that follow the fitted load may still change."""
+NEARLY = 0.01
+"""Likewise where Newton steps find the load: by less they were near, and moved nothing again."""
 LOAD_SAMPLES = 10_000
 """Samples by which a load is found that friction follows; all are fitted beside it."""
 TINY = 1e-6
@@ -40,13 +42,7 @@ class Term:
     keep: tuple[int, ...] | None = None
 
     def columns(self, track: Track, rows: Ints | None = None) -> Floats:
-        """Regressors on the track's grid, shape (n, m), or at some of its samples, (rows, m).
-
-        Raises
-        ------
-        ConfigError
-            If it is to keep a column that the effect has not.
-        """
+        """Regressors at all samples, or some; (n, m). ConfigError if it lacks one that it keeps."""
         effect, given = self.effect, self.parameters
         found = (
             effect.columns(track, given) if rows is None else effect.columns_at(track, given, rows)
@@ -199,8 +195,7 @@ def dataset_of(
 
 def _dataset(track: Track, grouping: Grouping) -> Dataset:
     inside = int(np.count_nonzero(track.moving & (track.group >= 0)))
-    by_rate = int(track.rate_hz // COARSE_RATE_HZ)
-    factor = max(min(by_rate, inside // COARSE_SAMPLES), 1)
+    factor = max(min(int(track.rate_hz // COARSE_RATE_HZ), inside // COARSE_SAMPLES), 1)
     coarse_track = coarsen(track, factor)
     fine = coarse = grid_of(track, grouping.sealed)
     if coarse_track is not track:
@@ -367,26 +362,25 @@ def r2_of(current: Floats, residual: Floats) -> float:
 
 def fit_terms(dataset: Dataset, terms: tuple[Term, ...], rounds: int = MOST_ROUNDS) -> Fit:
     """Fit all terms jointly; what follows the load or the model, until no error falls."""
-    circular = not all(term.is_constant or term.effect.from_terms for term in terms)
+    following = [t for t in terms if not (t.is_constant or t.effect.from_terms)]
     names, kept, track = frozenset(t.key for t in terms), dataset.cache.settled, dataset.fine.track
     # A set of terms that was met before, in another order, begins where it ended.
-    rounds = 1 if names in kept else rounds
+    rounds = 1 if names in kept or not following else rounds
     load_a, model_a = kept.get(names, (track.load_a, track.model_a))
     dataset = dataset.with_model(load_a, model_a, static_terms(terms))
     fewest = 2 if np.any(dataset.fine.track.model_a) else 3
-    if all(t.is_constant or t.effect.from_terms or t.effect.follows_load for t in terms):
-        rounds = min(rounds, fewest)  # a load that Newton steps have found needs no more
+    settled = NEARLY if all(term.effect.follows_load for term in following) else SETTLED
     best, least = dataset, np.inf
     for number in range(1, rounds + 1):
         fitted = _fit_once(dataset, terms)
-        error = rmse_of(fitted.residual_a[fitted.dataset.sharp.fit])
-        falls = error < (1 - SETTLED) * least
+        error = rmse_of(fitted.residual_a[fitted.dataset.sharp.fit]) if following else 0.0
+        falls = error < (1 - settled) * least
         if falls or number <= fewest:
             best, least, found = dataset, error, fitted
-        if not circular or number == rounds or (number >= fewest and not falls):
+        if number == rounds or (number >= fewest and not falls):
             break
         dataset = _with_newton_load(fitted)
-    if circular and rounds > 1:
+    if rounds > 1:
         kept[names] = best.fine.track.load_a, best.fine.track.model_a
     return found
 
@@ -431,12 +425,11 @@ def _with_newton_load(fitted: Fit) -> Dataset:
         rest = track.current_a[rows] - columns @ own - sum(map(np.matmul, others, held))
         error = float(rest @ rest)
         settled = abs(least - error) <= SETTLED * least < np.inf
-        better = error < least
-        if better:
+        if error < least:
             best, least, start = load, error, values
         if settled:
             break
-        if better:
+        if best is load:
             jacobian = columns.copy()
             tiny = TINY * np.abs(load).max() / largest
             for place, size, carrier in zip(np.flatnonzero(carries), tiny, carriers.T, strict=True):

@@ -80,7 +80,5 @@ def excerpts(recordings: list[Recording], track: Track) -> list[Recording]:
 
 def is_moving(track: Track) -> bool:
     """Tell whether the joint moves at all."""
-    return (
-        int(np.count_nonzero(track.moving)) >= FEWEST_MOVING_SAMPLES
-        and float(np.ptp(track.position_rad)) >= SHORTEST_TRAVEL_RAD
-    )
+    moves = np.count_nonzero(track.moving) >= FEWEST_MOVING_SAMPLES
+    return bool(moves and np.ptp(track.position_rad) >= SHORTEST_TRAVEL_RAD)

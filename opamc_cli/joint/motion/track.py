@@ -15,6 +15,8 @@ from opamc_cli.signal.transform.least_squares import inverse
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+Laid = dict[Hashable, Floats]
+Terms = tuple["Regressors", ...]
 
 
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
@@ -76,7 +78,7 @@ class Track:
     temperature_c: Floats | None = None
     electrical_rad: Floats | None = None
     """With `temperature_c`: where known; (n,) or None."""
-    static_terms: "tuple[Regressors, ...]" = ()
+    static_terms: "Terms" = ()
     """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
@@ -150,8 +152,8 @@ class Track:
         return any(comes_back(self.position_rad[began == start]) for start in self.starts_s)
 
     @cached_property
-    def laid(self) -> dict[Hashable, Floats]:
-        """Regressors of terms that stay the same, by term and grid, for every model."""
+    def laid(self) -> Laid:
+        """Regressors that stay the same, by term and grid, for every model."""
         return {}
 
     @cached_property
@@ -186,12 +188,11 @@ class Track:
     def static_sums(self) -> Floats:
         """Running sums of the static regressors, (m + recordings, k), from zero in each."""
         columns = np.concatenate(self.full_blocks, axis=1)
-        parts = []
-        for start, stop in (self.full or self).bounds:
-            sums = np.zeros((stop - start + 1, columns.shape[1]))
-            np.cumsum(columns[start:stop], axis=0, out=sums[1:])
-            parts.append(sums)
-        return np.concatenate(parts)
+        zero = np.zeros((1, columns.shape[1]))
+        each = [
+            np.cumsum(columns[start:stop], axis=0) for start, stop in (self.full or self).bounds
+        ]
+        return np.concatenate([part for sums in each for part in (zero, sums)])
 
     def own_means(self, values: Floats) -> Floats:
         """Average what is given at the full rate, (n,) or (n, k), over this track's own samples."""
@@ -199,21 +200,14 @@ class Track:
         return block_mean(values, full.bounds, round(full.rate_hz / self.rate_hz))
 
     def forget(self) -> None:
-        """Drop what follows from the static terms; it is computed again where it is asked for.
-
-        A search keeps hundreds of fits, each with its own.
-        """
+        """Drop what follows from the static terms: a search keeps hundreds of fits."""
         for name in ("full_blocks", "static_blocks", "static_sums"):
             self.__dict__.pop(name, None)
 
     def with_model(
-        self,
-        load_a: Floats,
-        model_a: Floats,
-        static_terms: "tuple[Regressors, ...]",
-        laid: dict[Hashable, Floats] | None = None,
+        self, load_a: Floats, model_a: Floats, static_terms: "Terms", laid: Laid | None = None
     ) -> "Track":
-        """Return the same track with load and model currents given at its full rate."""
+        """Return the same track with the fitted load and model currents, given at its full rate."""
         full = self.full and self.full.with_model(load_a, model_a, ())
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
         new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
