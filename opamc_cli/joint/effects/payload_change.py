@@ -29,6 +29,11 @@ class PayloadChange(Effect):
     needs = ("scale", "revisits")
     from_motion = True
 
+    def untestable(self, track: Track) -> str | None:
+        """Nor where half turns may have been lost at some time: the place steps, too."""
+        why = "what was turned without current is a guess, and a place that steps looks the same"
+        return super().untestable(track) or (why if track.guessed_s else None)
+
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Try steps all over the session: a stroke too early or too late, little is explained."""
         first, last = _judgeable(track)
@@ -38,7 +43,8 @@ class PayloadChange(Effect):
             times = np.linspace(first, last, GUESSES)
         steps = [{"since_s": float(time)} for time in times if first <= time <= last]
         # Where phases follow the joint, half turns that are lost from rest to rest look the same.
-        pairs = combinations(_rests(track) if "logged" in track.channels else (), 2)
+        held = "logged" in track.channels and np.isfinite(track.period_s)
+        pairs = combinations(_rests(track) if held else (), 2)
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
@@ -87,8 +93,6 @@ class PayloadChange(Effect):
 
 def _rests(track: Track) -> list[float]:
     """Beginning of the cycle, and the middles of its longest rests in order, in seconds."""
-    if np.isinf(track.period_s):
-        return []
     places = np.sort(track.run_time_s[track.moving & (track.group >= 0)] % track.period_s)
     gaps = np.diff(places)
     longest = [k for k in np.argsort(-gaps)[:RESTS] if gaps[k] > 2 / track.rate_hz]

@@ -11,7 +11,7 @@ from opamc_cli.joint.fit.model import Dataset, Term
 from opamc_cli.joint.name.candidates import Batch, Beside, Candidate, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
 from opamc_cli.joint.name.refine import refined
-from opamc_cli.joint.name.significance import p_value
+from opamc_cli.joint.name.significance import LEAST_T, p_value
 
 CHAINS = 2
 """Followed side by side: a bump that imitates a spring shows itself only beside the spring. Four
@@ -232,7 +232,10 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     share, t_value = child.gain_over(parent)
     effect = child.terms[-1].effect
     error = 0.0 if effect.unnamed else share / max(t_value, 1.0)  # Those claim nothing.
-    if share - error < (least := pool.least_share):
+    # What one effect leaves, beside a motion that the same phases tell, is no other one.
+    followed = "logged" not in child.fit.dataset.fine.track.channels
+    beside = followed and any(not term.effect.unnamed for term in parent.terms)
+    if share - (LEAST_T if beside else 1.0) * error < (least := pool.least_share):
         return f"takes {share:.1%} ± {error:.1%} off the held-out error, {least:.0%} is asked"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"

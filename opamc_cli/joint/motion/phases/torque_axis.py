@@ -10,9 +10,8 @@ from opamc_cli.signal.transform.least_squares import solve
 
 SIDE_ROUNDS = 8
 CLEARLY = 0.1
-"""Share of its squared error that a stroke may keep when it is turned: where it keeps more, it is
-followed rightly and the model lacks something. At 0.3 short strokes of five of seven joints with a
-large hysteresis were turned wrongly (seeds 340000 to 400000); 0.05 turns the same as 0.1."""
+"""Share of its squared error that a stroke may keep when it is turned: where it keeps more, the
+model lacks something. At 0.3 five of seven joints' hysteresis turned strokes; 0.05 does as 0.1."""
 
 SLOWEST_SHARE = 0.05
 """Of the top speed: slower, friction has no certain direction."""
@@ -45,12 +44,10 @@ def _columns(velocity: Floats, position: Floats, *others: Floats) -> Floats:
 def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Floats:
     """Find on which side of the torque axis every stretch of current lies: +1 or -1, (n,).
 
-    Between stretches, where the current is too small to be followed, the angle may slip by pi. The
-    sides are those that fit best to dry and lubricant friction, inertia and a smooth function of
-    the position: starting from the sides on which the current does work, and from those as
-    followed, one stretch after the other is turned where that lowers the squared error. At rest
-    zero errors of the sensors can turn the angle of a small current: then one stroke after the
-    other is turned where that lowers it further.
+    Between stretches, with too little current to be followed, the angle may slip by pi. Of what is
+    reached from the sides on which the current does work, and from those as followed, the one that
+    fits best to friction, inertia and a smooth function of the position is taken. At rest zero
+    errors of the sensors turn a small current: then strokes are turned where that is clear.
     """
     pieces = stretches(angle.strong, rate_hz)
     if not pieces:
@@ -74,13 +71,10 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     for (start, _), sign in zip(pieces, signs, strict=True):
         side[start:] = sign
     strokes = [
-        (start + first, start + last)
-        for start, stop in pieces
-        for first, last in stretches(moving[start:stop], rate_hz)
+        (a + first, a + last) for a, b in pieces for first, last in stretches(moving[a:b], rate_hz)
     ]
     if strokes:
-        started = side[[start for start, _ in strokes]]
-        _, signs, resists = _turned(started, *sums(strokes), share=CLEARLY)
+        _, signs, resists = _turned(side[[a for a, _ in strokes]], *sums(strokes), share=CLEARLY)
         for (start, stop), sign in zip(strokes, signs, strict=True):
             side[start:stop] = sign
     return side if resists else -side
@@ -97,15 +91,14 @@ def _turned(
     signs = signs.copy()
     total = gram.sum(axis=0)
     for _ in range(SIDE_ROUNDS):
-        turned = False
+        before = signs.copy()
         for k in np.argsort(-power, kind="stable"):
             coefficients = solve(total - gram[k], signs @ moment - signs[k] * moment[k])
             model = power[k] + float(coefficients @ gram[k] @ coefficients)
             product = 2.0 * signs[k] * float(coefficients @ moment[k])
             if model + product < share * (model - product):
                 signs[k] = -signs[k]
-                turned = True
-        if not turned:
+        if np.array_equal(signs, before):
             break
     joint = signs @ moment
     coefficients = solve(total, joint)
