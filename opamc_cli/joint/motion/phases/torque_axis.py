@@ -45,9 +45,10 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
     """Find on which side of the torque axis every stretch of current lies: +1 or -1, (n,).
 
     Between stretches, with too little current to be followed, the angle may slip by pi. Of what is
-    reached from the sides on which the current does work, and from those as followed, the one that
-    fits best to friction, inertia and a smooth function of the position is taken. At rest zero
-    errors of the sensors turn a small current: then strokes are turned where that is clear.
+    reached from the sides on which the current does work, and from those as followed, in two
+    orders, the one that fits best to friction, inertia and a smooth function of the position is
+    taken. At rest zero errors of the sensors turn a small current: then strokes are turned where
+    that is clear.
     """
     pieces = stretches(angle.strong, rate_hz)
     if not pieces:
@@ -66,7 +67,8 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
 
     found = sums(pieces)
     starts = (np.where(found[1][:, 0] >= 0, 1.0, -1.0), np.ones(len(pieces)))
-    _, signs, resists = max((_turned(start, *found) for start in starts), key=lambda one: one[0])
+    tried = [_turned(start, *found, order=order) for start in starts for order in (-1, 0)]
+    _, signs, resists = max(tried, key=lambda one: one[0])
     side = np.ones(torque_a.size)
     for (start, _), sign in zip(pieces, signs, strict=True):
         side[start:] = sign
@@ -81,18 +83,19 @@ def side_of_torque(torque_a: Floats, angle: PhaseAngle, rate_hz: float) -> Float
 
 
 def _turned(
-    signs: Floats, gram: Floats, moment: Floats, power: Floats, share: float = 1.0
+    signs: Floats, gram: Floats, moment: Floats, power: Floats, share: float = 1.0, order: int = -1
 ) -> tuple[float, Floats, bool]:
     """Turn one stretch after the other while its squared error falls below a share of what it was.
 
-    The strongest first: what they ask of the weak is surer than the reverse. Also says how much is
-    explained, and whether friction resists: of two mirror images it does in one.
+    In order of their power, the strongest first by -1: what they ask of the weak is surer; by 0 in
+    time. Also says how much is explained, and whether friction resists: of two mirror images it
+    does in one.
     """
     signs = signs.copy()
     total = gram.sum(axis=0)
     for _ in range(SIDE_ROUNDS):
         before = signs.copy()
-        for k in np.argsort(-power, kind="stable"):
+        for k in np.argsort(order * power, kind="stable"):
             coefficients = solve(total - gram[k], signs @ moment - signs[k] * moment[k])
             model = power[k] + float(coefficients @ gram[k] @ coefficients)
             product = 2.0 * signs[k] * float(coefficients @ moment[k])
