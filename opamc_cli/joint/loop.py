@@ -143,7 +143,7 @@ def _closed(
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
-    final = lowering(final)
+    final = _named_as_well(lowering(final), start, pool, named, shares)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
     steps = _steps(start, final, named, shares, seed)
@@ -155,6 +155,29 @@ def _closed(
     fits = before, only_named.fit, final.fit, best_before
     loop = _opened(fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
+
+
+def _named_as_well(
+    final: Chain, start: Chain, pool: Pool, named: list[Named], shares: dict[int, float]
+) -> Chain:
+    """Put a name in the place of each function that does no better on the open data with more.
+
+    What one stretch alone shows (an inertia on a single stroke) no standard error over parts names.
+    """
+    for term in [one for one in final.terms if one.effect.unnamed]:
+        parent = without(final, [one is term for one in final.terms].index(True))
+        for chain in (trial.chain for trial in trials(parent, pool)):
+            own = chain.terms[-1].effect
+            steady = not (own.changes_in_time or own.as_smoothing) and chain.plausible_beside(
+                parent
+            )
+            less = chain.price < final.price
+            if steady and less and chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False):
+                named.append(Named(Trial.of(parent, chain), (), ()))
+                shares[id(chain.terms[-1])] = 1.0
+                final = extended(start, *sorted(chain.terms, key=lambda one: one.effect.unnamed))
+                break
+    return final
 
 
 def _with_true_names(
