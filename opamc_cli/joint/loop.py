@@ -143,7 +143,7 @@ def _closed(
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
-    final = _named_as_well(lowering(final), start, pool, named, shares)
+    final = _named_as_well(lowering(final), pool, named)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
     steps = _steps(start, final, named, shares, seed)
@@ -157,25 +157,20 @@ def _closed(
     return replace(loop, asked=tuple(one.term for one in named))
 
 
-def _named_as_well(
-    final: Chain, start: Chain, pool: Pool, named: list[Named], shares: dict[int, float]
-) -> Chain:
-    """Put a name in the place of each function that does no better on the open data with more.
+def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
+    """Put a name in the place of a function that does no better on the open data with more.
 
-    What one stretch alone shows (an inertia on a single stroke) no standard error over parts names.
+    What one stretch alone shows, an inertia on a single stroke, is certain by no parts' error.
     """
-    for term in [one for one in final.terms if one.effect.unnamed]:
-        parent = without(final, [one is term for one in final.terms].index(True))
-        for chain in (trial.chain for trial in trials(parent, pool)):
-            own = chain.terms[-1].effect
-            steady = not (own.changes_in_time or own.as_smoothing) and chain.plausible_beside(
-                parent
-            )
-            less = chain.price < final.price
-            if steady and less and chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False):
-                named.append(Named(Trial.of(parent, chain), (), ()))
-                shares[id(chain.terms[-1])] = 1.0
-                final = extended(start, *sorted(chain.terms, key=lambda one: one.effect.unnamed))
+    for place in reversed([k for k, term in enumerate(final.terms) if term.effect.unnamed]):
+        parent = without(final, place)
+        for trial in trials(parent, pool):
+            chain, own = trial.chain, trial.term.effect
+            as_well = chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False)
+            slow = own.changes_in_time or own.as_smoothing or not chain.plausible_beside(parent)
+            if as_well and chain.price < final.price and not slow:
+                named.append(Named(trial, (), ()))
+                final = chain
                 break
     return final
 
@@ -202,8 +197,7 @@ def _steps(
 ) -> list[Step]:
     by_term = {id(one.term): one for one in named}
     steps: list[Step] = []
-    chain = start
-    track = final.fit.dataset.fine.track
+    chain, track = start, final.fit.dataset.fine.track
     first = len(final.fit.terms) - final.added
     for place, term in enumerate(final.terms):
         following = extended(chain, term)
@@ -302,13 +296,11 @@ def _opened(
 
 
 def _rejected(tried: list[tuple[int, Tried]], added: set[str]) -> list[Tried]:
-    found: dict[str, Tried] = {}
-    for _, trial in tried:
-        name = trial.term.effect.name
-        if name not in added and (name not in found or trial.gain > found[name].gain):
-            why = trial.why_not or "another effect explains the residual better"
-            found[name] = replace(trial, why_not=why)
-    return sorted(found.values(), key=lambda one: -one.gain)
+    rest = sorted((t for _, t in tried if t.term.effect.name not in added), key=lambda t: t.gain)
+    best = {trial.term.effect.name: trial for trial in rest}
+    better = "another effect explains the residual better"
+    found = [replace(trial, why_not=trial.why_not or better) for trial in best.values()]
+    return sorted(found, key=lambda one: -one.gain)
 
 
 def untestable(before: Fit, library: Library) -> dict[str, str]:

@@ -9,6 +9,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
+from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
@@ -101,10 +102,8 @@ def _differentiated(laid: Laid, way: Way, short: bool = False) -> Dataset:
     """Differentiate recordings in one way; by ENOUGH of their samples if `short`."""
     recordings, joint, judged, grouping = laid
     track = replace(build_track(recordings, joint, way), **judged)
-    found = (
-        dataset_of(track, grouping, ENOUGH, ends=False) if short else dataset_of(track, grouping)
-    )
-    return replace(found, smoothing=way)
+    most = ENOUGH if short else MOST_SAMPLES
+    return replace(dataset_of(track, grouping, most, ends=not short), smoothing=way)
 
 
 def _with_functions(fit: Fit, functions: int) -> Fit:

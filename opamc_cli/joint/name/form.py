@@ -17,7 +17,13 @@ APPROXIMATE = 0.5
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 
-TURN = 2 * np.pi
+WITHIN = "angle within the period"
+
+
+def _turns(angle_rad: Floats | None) -> Floats | None:
+    return None if angle_rad is None else (angle_rad / (2 * np.pi)) % 1
+
+
 COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | None]]] = {
     "velocity": ("speed", "rad/s", True, lambda t, _: np.abs(t.velocity)),
     "acceleration": ("acceleration", "rad/s²", False, lambda t, _: t.acceleration),
@@ -25,18 +31,8 @@ COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | No
     "load": ("load", "A", True, lambda t, _: np.abs(t.load_a)),
     "temperature": ("temperature", "°C", True, lambda t, _: t.temperature_c),
     "time": ("time", "s", True, lambda t, _: t.time_s),
-    "motor-angle": (
-        "angle within the period",
-        "turns",
-        False,
-        lambda t, k: (k * t.machine_angle_rad / TURN) % 1,
-    ),
-    "electrical": (
-        "electrical angle",
-        "turns",
-        False,
-        lambda t, _: None if t.electrical_rad is None else (t.electrical_rad / TURN) % 1,
-    ),
+    "motor-angle": (WITHIN, "turns", False, lambda t, k: _turns(k * t.machine_angle_rad)),
+    "electrical": ("electrical angle", "turns", False, lambda t, _: _turns(t.electrical_rad)),
     "frequency": ("time within the period", "periods", False, lambda t, hz: (hz * t.time_s) % 1),
 }
 """Of each domain: name, unit, whether friction resists there, and its values, (n,) or None."""

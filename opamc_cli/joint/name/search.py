@@ -168,9 +168,9 @@ def _best_of_each(found: list[Candidate], kind: Callable[[Term], Hashable]) -> l
 
 
 def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> list[Trial]:
-    """Fit the most promising candidates of a chain, and say of each whether it may be added.
+    """Fit a chain's most promising candidates, and say of each whether it may be added.
 
-    The chains that are `known` were tried; they are not tried again, and new ones are added.
+    Chains that are `known` are not tried again; new ones are added.
     """
     tried = set() if known is None else known
     ordered = [[candidate.term] for candidate in candidates(chain, pool)]
@@ -197,11 +197,7 @@ def _best_with(chain: Chain, forms: Sequence[Term], *others: Chain) -> Chain:
 
 
 def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
-    """Return the trials that may be added.
-
-    What takes most off is no measure of what is promising where it is not physical: the others are
-    looked at again without it.
-    """
+    """Return the trials that may be added; if none, those beside what is not physical."""
     while found := trials(chain, pool, known):
         possible = [trial for trial in found if trial.why_not is None]
         refused = {one.term.effect.name for one in found if one.gain >= pool.least_share}
@@ -212,11 +208,7 @@ def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
 
 
 def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
-    """Guesses of each effect that follows the load: always tried, fitted together with the load.
-
-    Beside the load that was fitted without it, a friction that has moved the load's zero shows
-    as little.
-    """
+    """Guesses of each effect that follows the load and moves its zero: all are fitted."""
     dataset = chain.fit.dataset
     present = {term.effect.name for term in chain.fit.terms}
     track = dataset.coarse.track
