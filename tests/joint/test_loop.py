@@ -424,3 +424,13 @@ def test_a_wind_up_that_fails_at_the_corners_of_the_motion_is_dropped():
     for sealed in (False, True):
         assert beside.fit.rmse(sealed) > 1.1 * loop.after.rmse(sealed)
     assert beside.mean_square < 0.9 * chain_of(loop.after, 0).mean_square
+
+
+@pytest.mark.parametrize("seed", [45000019, 46000019])
+def test_an_inertia_that_one_stretch_of_a_single_stroke_shows_has_its_name(seed):
+    """A function of the acceleration stood in its place: one of twelve stretches is no error's."""
+    made = servo_joint.record(seed, "inertia", 15.0, "single", 250.0)
+    recording = Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
+    loop = close(recording, made.declared)
+    assert [step.term.effect.name for step in loop.steps if step.named] == ["inertia"]
+    assert loop.rmse_after_a < 0.5 * loop.rmse_before_a
