@@ -158,17 +158,17 @@ def _closed(
 
 
 def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
-    """Put a name in the place of a function that does no better on the open data with more.
+    """Put a name in the place of a function of its domain that leaves no less for more.
 
     What one stretch alone shows, an inertia on a single stroke, is certain by no parts' error.
     """
     for place in reversed([k for k, term in enumerate(final.terms) if term.effect.unnamed]):
-        parent = without(final, place)
+        parent, domain = without(final, place), final.terms[place].effect.domain
         for trial in trials(parent, pool):
             chain, own = trial.chain, trial.term.effect
             as_well = chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False)
-            slow = own.changes_in_time or own.as_smoothing or not chain.plausible_beside(parent)
-            if as_well and chain.price < final.price and not slow:
+            same = own.domain == domain and not (own.changes_in_time or own.as_smoothing)
+            if same and as_well and chain.price < final.price and chain.plausible_beside(parent):
                 named.append(Named(trial, (), ()))
                 final = chain
                 break
