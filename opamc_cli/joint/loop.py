@@ -169,7 +169,7 @@ def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
             as_well = chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False)
             same = own.domain == domain and not (own.changes_in_time or own.as_smoothing)
             if same and as_well and chain.price < final.price and chain.plausible_beside(parent):
-                named.append(Named(trial, (), ()))
+                named.append(Named(replace(trial, why_not=None), (), ()))
                 final = chain
                 break
     return final

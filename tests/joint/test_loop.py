@@ -433,4 +433,5 @@ def test_an_inertia_that_one_stretch_of_a_single_stroke_shows_has_its_name(seed)
     recording = Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
     loop = close(recording, made.declared)
     assert [step.term.effect.name for step in loop.steps if step.named] == ["inertia"]
+    assert [step.trial.why_not for step in loop.steps if step.named] == [None]
     assert loop.rmse_after_a < 0.5 * loop.rmse_before_a

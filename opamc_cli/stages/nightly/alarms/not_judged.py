@@ -36,15 +36,17 @@ def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
     nights = [row["night"] for row in found]
     for index in said_in(nights, [""] * len(nights), remind_after):
         last = found[-1]
-        span = last["night"]
-        if len(nights) > 1:
-            span = f"{len(nights)} nights from {nights[0]} to {span}"
-        text = f"{name}: not told from unusual conditions in {span}"
+        text = f"{name}: not told from unusual conditions in {_span(nights)}"
         if last["p_value"] is not None and last["distance"] is not None:
             far = f"{math.exp(last['distance']):.2g} times as far as a healthy session"
             text += f" (p {last['p_value']:.2g}, {far})"
         text += ": a fault that looks alike would not be told"
         yield Event(nights[index], last["robot"], last["axis"], "excused", text)
+
+
+def _span(nights: Sequence[str]) -> str:
+    several = f"{len(nights)} nights from {nights[0]} to {nights[-1]}"
+    return several if len(nights) > 1 else nights[0]
 
 
 def outside(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
@@ -55,15 +57,10 @@ def outside(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
     found = [row for row in rows if row["state"] == "changed" and row["harmless"]]
     nights, causes = ([row[of] for row in found] for of in ("night", "cause"))
     for index in said_in(nights, causes, remind_after):
-        span = (
-            nights[-1]
-            if len(nights) == 1
-            else f"{len(nights)} nights from {nights[0]} to {nights[-1]}"
-        )
         named = " and ".join(dict.fromkeys(causes))
         text = (
-            f"{name}: changed in {span} by what lies outside the joint ({named}): put it right, or "
-            "rebaseline if it is meant to stay; a fault that looks alike would not be told"
+            f"{name}: changed in {_span(nights)} by what lies outside the joint ({named}): check "
+            "it, or rebaseline if it is meant to stay; a fault that looks alike would not be told"
         )
         yield Event(nights[index], found[-1]["robot"], found[-1]["axis"], "outside", text)
 
