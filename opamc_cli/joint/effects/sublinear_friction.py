@@ -16,7 +16,6 @@ class SublinearFriction(Effect):
     meaning = "shear-thinning or starved lubricant: check the grease grade"
     resists = True
     from_motion = True
-    least_exponent = 0.1  # below, and there, it is dry friction
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Exponents between a constant and a straight line."""
@@ -24,11 +23,7 @@ class SublinearFriction(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Neither a constant nor a straight line."""
-        return {"exponent": (self.least_exponent, 0.85)}
-
-    def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Friction resists, and is no constant."""
-        return bool(coefficients[0] > 0 and parameters["exponent"] > self.least_exponent)
+        return {"exponent": (0.1, 0.85)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Signed power of the speed, relative to the top speed."""

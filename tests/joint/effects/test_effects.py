@@ -249,13 +249,6 @@ def test_a_delay_shorter_than_the_coarse_samples_has_its_own_length_and_a_coeffi
     assert np.std((wanted - column)[moving]) < 0.1 * np.std(wanted[moving])
 
 
-def test_sublinear_friction_that_a_limit_cuts_off_is_dry():
-    effect, resists = built_in_library()["sublinear_friction"], np.array([0.2])
-    assert effect.plausible(resists, {"exponent": 0.11})
-    assert not effect.plausible(resists, {"exponent": 0.1})
-    assert not effect.plausible(-resists, {"exponent": 0.11})
-
-
 @pytest.mark.parametrize(("waves", "clocks", "steps"), [(0.5, {0.0}, 1), (2.0, {0.0, 1.0}, 32)])
 def test_time_within_a_recording_is_told_only_where_one_comes_back(waves, clocks, steps):
     """Of strokes one way it is a function of the place: friction was a warm-up or a payload."""
