@@ -8,7 +8,7 @@ import numpy as np
 from opamc_cli.joint.change.lines import Line
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.mains_hum import MAINS_HZ, MainsHum
-from opamc_cli.joint.effects.ripple import read_order
+from opamc_cli.joint.effects.ripple import OF_A_SENSOR, read_order
 from opamc_cli.joint.motion.track import Track
 
 HARMONICS = 12
@@ -29,9 +29,6 @@ CIRCULAR_BELOW = 0.5
 SIDE_RESOLUTIONS = 4.0
 """A damaged mesh has play that the load closes: as the load changes along a stroke, the line of
 its passage is spread over its neighbourhood."""
-
-OF_A_SENSOR = {"1p": "sensor_offset", "2p": "sensor_gain", "6p": "dead_time"}
-"""Kinds of orders that errors of the current measurement have, with the effects."""
 
 FLEXSPLINE = "flexspline tooth damage (2(N+1)/N): inspect the flexspline"
 EITHER = (
@@ -190,7 +187,6 @@ def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:
 
 def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:
     ratio = track.joint.gear_ratio
-    ties: tuple[str, ...]
     place, doubt = _frame(lines, track, resolution, poles)
     near = [line for line in lines if abs(_corrected(line, poles) - 2.0) < 0.25] or lines
     first = near[0]

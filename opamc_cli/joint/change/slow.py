@@ -1,9 +1,8 @@
 """Slow effects: what the target's coefficients say that the baseline's own spread does not.
 
 Each unit's slow current is seen through generalised least squares whose covariance holds, beside
-noise, what healthy units differ by: every unit has its own coefficients of the declared effects,
-drawn from a common distribution. An effect of the library acts in the target alone if the mean of
-its coefficients there lies outside what the baseline's units show for the same regressors.
+noise, what healthy units differ by: coefficients of the declared effects, of each unit its own. An
+effect acts in the target alone if its mean coefficients there lie outside what the baseline shows.
 """
 
 from dataclasses import dataclass, replace

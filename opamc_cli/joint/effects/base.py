@@ -135,6 +135,10 @@ class Effect:
         """Parameters moved to a value with a meaning where the data cannot tell the difference."""
         return parameters
 
+    def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
+        """Effects that look the same on any such recording, whatever fits best."""
+        return ()
+
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say what the effect with these parameters means to a maintainer."""
         return self.meaning

@@ -29,6 +29,8 @@ MOST_EXPANDED = 2
 """Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
+OF_A_SENSOR = {"1p": "sensor_offset", "2p": "sensor_gain", "6p": "dead_time"}
+"""Kinds of orders that errors of the current measurement have, with the effects."""
 
 
 class Ripple(Effect):
@@ -153,6 +155,11 @@ class Ripple(Effect):
         nearest = min(named, key=lambda one: abs(one - order))
         close = abs(nearest - order) < 0.25 * order_resolution(track)
         return parameters | {"order": nearest} if close else parameters
+
+    def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
+        """Tell what the current sensors, where nothing else is logged, may do at such an order."""
+        found = OF_A_SENSOR.get(read_order(parameters["order"], track).kind)
+        return () if found is None or "logged" in track.channels else (found,)
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""

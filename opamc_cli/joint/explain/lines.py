@@ -26,8 +26,7 @@ class AngleLine(Ripple):
         return [{"order": order, **follows} for order, _ in order_lines(track, residual, count=2)]
 
     # All that a line may follow is explained, at any order, and nothing claimed.
-    variants, settled = Effect.variants, Effect.settled
-    interpretation = Effect.interpretation
+    variants, settled, interpretation = Effect.variants, Effect.settled, Effect.interpretation
 
 
 class Tone(MainsHum):

@@ -46,7 +46,8 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
             parent = without(best, place)
             # What an effect ties with is of interest once nothing changes any more.
             others = trials(parent, pool, {best.signature}) if changed is None else []
-            ties = ties_of(best, term.effect.name, others)
+            alike = term.effect.ties(term.parameters, best.fit.dataset.fine.track)
+            ties = tuple(dict.fromkeys((*ties_of(best, term.effect.name, others), *alike)))
             told = tuple(one.told for one in others)
             named.append(Named(_trial(parent, best, term, pool), told, ties))
     return best, named

@@ -90,6 +90,17 @@ def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
     assert reading in read_order(order, track).text
 
 
+@pytest.mark.parametrize(
+    ("order", "effects"),
+    [(5.0, ("sensor_offset",)), (10.0, ("sensor_gain",)), (30.0, ("dead_time",)), (17.3, ())],
+)
+def test_a_line_of_the_current_sensors_is_tied_with_them_where_they_tell_the_motion(order, effects):
+    _, track = track_of(Joint(100.0, 5))
+    assert Ripple().ties({"order": order}, track) == ()
+    alone = replace(track, channels=track.channels - {"logged"})
+    assert Ripple().ties({"order": order}, alone) == effects
+
+
 @pytest.mark.parametrize("order", [1.0, 1.98, 2.0, 2.01, 2.02, 4.0])
 def test_lines_of_healthy_gears_are_called_so_without_a_comparison(order):
     _, track = track_of(Joint(100.0, 5))

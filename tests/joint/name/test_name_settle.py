@@ -54,6 +54,12 @@ def test_two_imitators_give_way_to_the_effect_that_is_there():
     assert [one.effect.name for one in chain.terms] == ["stribeck"]
 
 
+def test_what_looks_the_same_whatever_fits_best_is_a_tie(monkeypatch):
+    monkeypatch.setattr(LIBRARY["stribeck"], "ties", lambda parameters, track: ("dead_time",))
+    _, (named,) = settle(stribeck, term("stribeck", **SPEED), names=("stribeck",))
+    assert named.ties == ("dead_time",)
+
+
 @pytest.mark.parametrize("name", ["offset", "spring"])
 def test_a_name_that_holds_a_part_of_what_a_smooth_function_does_goes(name):
     def stop(q, v, a, t):
