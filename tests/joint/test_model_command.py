@@ -112,7 +112,7 @@ def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, 
     doubted = hidden == "ripple"
     assert ("ripple may be wrong: the place" in said) == doubted
     assert len(entry["doubts"]) == doubted
-    assert any("turned in 2 gaps without current (0.8 s in all)" in n for n in entry["notes"])
+    assert any("turned without current (gaps: 2, 0.8 s in all)" in n for n in entry["notes"])
 
 
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):

@@ -34,7 +34,7 @@ OPPOSITE = (
     "the negative of it is modelled"
 )
 GUESSED = (
-    "axis {}: what was turned in {} gaps without current ({:.1f} s in all) is a guess, and so is "
+    "axis {}: what was turned without current (gaps: {}, {:.1f} s in all) is a guess, and so is "
     "the place: log the position to be certain"
 )
 

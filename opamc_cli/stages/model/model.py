@@ -47,8 +47,8 @@ OF_THE_PLACE = {
     "gravity", "hysteresis", "load_friction", "payload_change", "position_drag", "ripple", "spring",
 }  # fmt: skip
 DOUBTED = (
-    "axis {}: {} may be wrong: the place, which is behind it, is a guess after {} gaps without "
-    "current ({:.1f} s in all); log the position to be certain"
+    "axis {}: {} may be wrong: the place, which is behind it, is a guess where no current was seen "
+    "(gaps: {}, {:.1f} s in all); log the position to be certain"
 )
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
