@@ -54,7 +54,7 @@ class TimeDelay(Effect):
         samples = parameters["delay_s"] * full.rate_hz
         if parameters.get("filtered"):
             pole = np.exp(-1.0 / max(samples, 1e-3))
-            columns = np.concatenate(track.full_blocks, axis=1)
+            columns = track.full_columns
             late = [lagging(columns[start:stop], pole) for start, stop in full.bounds]
             shifted = track.own_means(np.concatenate(late))
         else:
@@ -62,7 +62,7 @@ class TimeDelay(Effect):
             shifted = late_means(track.static_sums, full.bounds, samples, factor)
         part = shifted[rows]
         coefficients = solve(part.T @ part, part.T @ track.current_a[rows])
-        return stack(shifted @ coefficients - track.static_current(coefficients))
+        return stack((shifted - track.static_columns) @ coefficients)
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Only a whole shift counts: the model's current is moved, not multiplied.
@@ -100,16 +100,19 @@ def _late_means(sums: Floats, bounds: Ints, samples: float, factor: int, means: 
     for number in range(len(bounds)):
         start, stop = bounds[number]
         own = sums[start + number : stop + number + 1]
-        for block in range((stop - start) // factor):
-            for side, sign in ((0, -1.0), (1, 1.0)):
-                edge = factor * (block + side) - samples
-                # Beyond the ends the nearest step goes on.
-                whole = min(max(int(edge), 0), stop - start - 1)
-                for k in range(sums.shape[1]):
-                    step = own[whole + 1, k] - own[whole, k]
-                    at = sign * (own[whole, k] + (edge - whole) * step) / factor
-                    means[place, k] = at + (means[place, k] if side else 0.0)
-            place += 1
+        blocks = (stop - start) // factor
+        for block in range(blocks + 1):
+            edge = factor * block - samples
+            # Beyond the ends the nearest step goes on.
+            whole = min(max(int(edge), 0), stop - start - 1)
+            for k in range(sums.shape[1]):
+                step = own[whole + 1, k] - own[whole, k]
+                at = (own[whole, k] + (edge - whole) * step) / factor
+                if block:
+                    means[place + block - 1, k] += at
+                if block < blocks:
+                    means[place + block, k] = -at
+        place += blocks
 
 
 @njit(cache=True)

@@ -122,8 +122,9 @@ class Shift(Effect):
         rows = track.open_samples
         if rows is None or not track.static_terms:
             return np.zeros((track.size, 2))
-        part = np.concatenate([block.T[:, rows] for block in track.static_blocks])
-        fitted = track.static_current(solve(part @ part.T, part @ track.current_a[rows]))
+        columns = track.static_columns
+        part = columns.T[:, rows]
+        fitted = columns @ solve(part @ part.T, part @ track.current_a[rows])
         first = track.rate_hz * np.gradient(fitted)
         return stack(first, track.rate_hz * np.gradient(first))
 

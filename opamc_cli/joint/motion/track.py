@@ -157,17 +157,17 @@ class Track:
         return {}
 
     @cached_property
-    def full_blocks(self) -> list[Floats]:
-        """Regressors of each static term on the full rate's samples, shape (m, k)."""
+    def full_columns(self) -> Floats:
+        """Regressors of the static terms on the full rate's samples, shape (m, k)."""
         return self._static("full" if self.full else True)
 
     @cached_property
-    def static_blocks(self) -> list[Floats]:
-        """Regressors of each static term on this track's own samples, shape (n, k)."""
-        return self._static("means") if self.full else self.full_blocks
+    def static_columns(self) -> Floats:
+        """Regressors of the static terms on this track's own samples, shape (n, k)."""
+        return self._static("means") if self.full else self.full_columns
 
-    def _static(self, kind: Hashable) -> list[Floats]:
-        blocks = []
+    def _static(self, kind: Hashable) -> Floats:
+        blocks = [np.zeros((self.size if kind == "means" else (self.full or self).size, 0))]
         for term in self.static_terms:
             block = self.laid.get((term.key, kind))
             if block is None:
@@ -176,22 +176,14 @@ class Track:
             if term.is_constant:
                 self.laid[term.key, kind] = block
             blocks.append(block)
-        return blocks
-
-    def static_current(self, coefficients: Floats) -> Floats:
-        """Add up the static terms on this track's own samples with coefficients, (k,); (n,)."""
-        blocks = self.static_blocks
-        each = np.split(coefficients, np.cumsum([block.shape[1] for block in blocks])[:-1])
-        return sum(map(np.matmul, blocks, each), np.zeros(self.size))
+        return np.concatenate(blocks, axis=1)
 
     @cached_property
     def static_sums(self) -> Floats:
         """Running sums of the static regressors, (m + recordings, k), from zero in each."""
-        columns = np.concatenate(self.full_blocks, axis=1)
-        zero = np.zeros((1, columns.shape[1]))
-        each = [
-            np.cumsum(columns[start:stop], axis=0) for start, stop in (self.full or self).bounds
-        ]
+        zero = np.zeros((1, self.full_columns.shape[1]))
+        bounds = (self.full or self).bounds
+        each = [np.cumsum(self.full_columns[start:stop], axis=0) for start, stop in bounds]
         return np.concatenate([part for sums in each for part in (zero, sums)])
 
     def own_means(self, values: Floats) -> Floats:
@@ -201,7 +193,7 @@ class Track:
 
     def forget(self) -> None:
         """Drop what follows from the static terms: a search keeps hundreds of fits."""
-        for name in ("full_blocks", "static_blocks", "static_sums"):
+        for name in ("full_columns", "static_columns", "static_sums"):
             self.__dict__.pop(name, None)
 
     def with_model(

@@ -119,7 +119,7 @@ def test_a_shift_is_the_rates_of_change_of_the_open_samples_fit(track):
     np.testing.assert_array_equal(
         Shift().columns(replace(empty, open_samples=None), {}), np.zeros((empty.size, 2))
     )
-    columns = np.concatenate(track.static_blocks, axis=1)
+    columns = track.static_columns
     rows = track.open_samples
     model = columns @ np.linalg.lstsq(columns[rows], track.current_a[rows])[0]
     rate = track.rate_hz

@@ -101,8 +101,7 @@ def test_spans_become_recordings_of_their_own():
 
 def test_the_static_terms_are_summed_from_zero_in_each_recording():
     track = track_of()
-    assert track.static_blocks == []
-    assert (track.static_current(np.zeros(0)) == 0).all()
+    assert track.static_columns.shape == (track.size, 0)
     term = SimpleNamespace(
         columns=lambda on: np.stack([on.velocity, on.position_rad], axis=1),
         key="motion",
@@ -111,17 +110,15 @@ def test_the_static_terms_are_summed_from_zero_in_each_recording():
     track = replace(track, static_terms=(term,))
     assert track.static_sums.shape == (2002, 2)
     assert (track.static_sums[[0, 1001]] == 0).all()
-    (columns,) = track.static_blocks
+    columns = track.static_columns
     np.testing.assert_allclose(track.static_sums[2001], columns[1000:].sum(axis=0), rtol=1e-9)
     coarse = coarsen(track, 5).with_model(track.velocity, 2 * track.velocity, (term,))
-    (means,) = coarse.static_blocks
-    np.testing.assert_allclose(means, block_mean(coarse.full_blocks[0], track.bounds, 5))
-    sizes = np.array([2.0, -3.0])
-    np.testing.assert_allclose(coarse.static_current(sizes), means @ sizes)
+    means = block_mean(coarse.full_columns, track.bounds, 5)
+    np.testing.assert_allclose(coarse.static_columns, means)
     np.testing.assert_allclose(coarse.load_a, block_mean(track.velocity, track.bounds, 5))
     np.testing.assert_array_equal(coarse.full.model_a, 2 * track.velocity)
     coarse.forget()
-    assert not {"full_blocks", "static_blocks", "static_sums"} & set(vars(coarse))
+    assert not {"full_columns", "static_columns", "static_sums"} & set(vars(coarse))
 
 
 def test_static_regressors_are_laid_once_unless_they_follow_the_model():
@@ -141,7 +138,7 @@ def test_static_regressors_are_laid_once_unless_they_follow_the_model():
         means = np.column_stack(
             [block_mean(track.full.velocity, track.full.bounds, 5), size * np.ones(400)]
         )
-        np.testing.assert_allclose(np.concatenate(track.static_blocks, axis=1), means)
+        np.testing.assert_allclose(track.static_columns, means)
     assert asked == ["motion", "load", "load"]
 
 
