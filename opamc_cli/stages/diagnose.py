@@ -222,7 +222,7 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = decided.with_files(far_together(judged)) | exchanged_joints(
+        odd = decided.with_files(far_together(judged, config.score)) | exchanged_joints(
             sides, decided.target_runs(), judged
         )
         named = with_reasons(judged, {**odd, **unjudged.axes})

@@ -72,7 +72,7 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     sources = (*sides.baseline.sources, *sides.target.sources)
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = decided.with_files(far_together(judged)) | exchanged_joints(
+        odd = decided.with_files(far_together(judged, config.score)) | exchanged_joints(
             sides, decided.target_runs(), judged
         )
         named = with_reasons(judged, {**odd, **found.unjudged})

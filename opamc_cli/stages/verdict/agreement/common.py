@@ -3,16 +3,20 @@
 from collections.abc import Mapping
 from typing import Any
 
+from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
 
 
-def far_together(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
-    """Return the axes that are called healthy though far from the baseline, with the reason."""
+def far_together(verdict: Mapping[str, Any], limits: ScoreConfig) -> dict[int, tuple[str, ...]]:
+    """Return the axes that are called healthy though far from the baseline, with the reason.
+
+    `limits` are those by which they were judged.
+    """
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
     return {
         entry["axis"]: (
             f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
-            "the baseline, " + (_COMMON if len(far) > 1 else _ALONE),
+            "the baseline, " + (_COMMON if len(far) > 1 else _alone(entry, limits)),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
@@ -23,6 +27,15 @@ def _where(entry: Mapping[str, Any]) -> str:
     return f"In {entry['session']} alone it" if "session" in entry else "It"
 
 
+def _alone(entry: Mapping[str, Any], limits: ScoreConfig) -> str:
+    """Say why a joint that is far out by itself was not called changed."""
+    effect = (entry.get("distance") or {}).get("effect")
+    certain = (entry.get("p_adjusted") or 0.0) <= limits.false_alarm_rate
+    if certain and effect is not None and effect < limits.minimum_effect:
+        return _SMALL.format(effect, limits.minimum_effect)
+    return _ALONE
+
+
 _COMMON = (
     "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
     "check unit, sensors, clock, program, payload and speed, and record again, or a new baseline."
@@ -30,4 +43,9 @@ _COMMON = (
 _ALONE = (
     "too far to be called healthy, though what was compared does not suffice to call it changed; "
     "check its sensor, and record again, or more for the baseline."
+)
+_SMALL = (
+    "too far to be called healthy, but what changed for certain is {:.1%}, less than "
+    "score.minimum_effect ({:.1%}); check its sensor's gain and its payload, and lower that limit "
+    "to have it called changed, or record a new baseline if it is meant to stay."
 )
