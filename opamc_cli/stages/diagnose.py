@@ -43,7 +43,8 @@ FILES = (
 """What a diagnosis leaves in its folder; the verdict vouches for the others."""
 
 LEAST_SHARE = 0.05
-"""Of the change: a cause that explains less is not named, it would lead to the wrong part."""
+"""Of the change: causes that explain less together are not named, they would lead to the wrong
+part. A fault that explains less beside cold grease is: it is named first, however little it is."""
 
 
 @dataclass(frozen=True)
@@ -204,7 +205,7 @@ def _diagnose(
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
             # empty: sought in vain
-            causes[axis] = found if found.get("share", 0.0) >= LEAST_SHARE else {}
+            causes[axis] = found if found.get("explained", 0.0) >= LEAST_SHARE else {}
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,

@@ -366,7 +366,10 @@ def test_what_all_joints_have_in_common_is_not_therefore_healthy(opamc, tmp_path
 
 @pytest.mark.long
 def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, monkeypatch):
-    """Whatever the search names: below a twentieth of the change it is not the cause."""
+    """Whatever the search names: below a twentieth of the change it is not the cause.
+
+    But a fault is told beside what explains the rest, or that would be lost with it.
+    """
     from opamc_cli.stages.verdict import cause
 
     def louder(columns):
@@ -379,16 +382,24 @@ def test_a_cause_that_explains_nothing_never_leads(opamc, baseline, tmp_path, mo
         **{"ties": [], "harmless": False, "origin": "joint", "clear": True, "evidence": {}},
         **{"why": ["It explains next to nothing."], "others": []},
     }
+    colder = {
+        **{"effect": "thermal_viscous", "parameters": {}, "share": 0.94},
+        **{"interpretation": "colder grease", "origin": "environment"},
+    }
     target = record(tmp_path / "tonight.parquet", 9, louder)
-    for share in (0.0, 0.04, 0.9):
-        found = {**named, "share": share, "explained": share}
+    for share, others, told in (
+        *((0.0, [], False), (0.04, [], False), (0.9, [], True)),
+        (0.04, [colder], True),
+    ):
+        explained = share + sum(one["share"] for one in others)
+        found = {**named, "share": share, "explained": explained, "others": others}
         monkeypatch.setattr(cause, "explain", lambda *_, found=found: found)
         arguments = ("--baseline", baseline, "--target", target, "--out", tmp_path / "out")
         ended = opamc("diagnose", *arguments)
         assert ended.code == ExitCode.UNHEALTHY
         _, axis = json.loads((tmp_path / "out" / "verdict.json").read_text())["axes"]
-        assert (axis["cause"] is not None) == (share == 0.9)
-        assert ("flexspline" in ended.out) == (share == 0.9)
+        assert (axis["cause"] is not None) == told
+        assert ("flexspline" in ended.out) == told
 
 
 def test_healthy_joints_are_judged_without_a_word(opamc, baseline, tonight, tmp_path):
