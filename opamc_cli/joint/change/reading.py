@@ -168,8 +168,7 @@ def _family(line: Line, poles: float, track: Track, resolution: float) -> bool:
     """Whether a line may come from the mesh: near twice per turn, or a sharp multiple of it."""
     wide = min(SIDE_RESOLUTIONS * resolution * poles, 0.25)
     sharp = min(0.75 * resolution * poles, 0.25)
-    near = _near(line, poles, track, wide) == 2
-    return near or (_near(line, poles, track, sharp) or 0) >= 2
+    return _near(line, poles, track, wide) == 2 or (_near(line, poles, track, sharp) or 0) >= 2
 
 
 def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:

@@ -148,8 +148,7 @@ class Effect:
         if self.per is None:
             return [f"{unit} per regressor"] * count
         each = [*self.per, *self.per[-1:] * count][:count]
-        known = {"": unit, "current": ""}
-        return [known.get(per, f"{unit} per {per}") for per in each]
+        return [{"": unit, "current": ""}.get(per, f"{unit} per {per}") for per in each]
 
 
 def stack(*columns: Floats) -> Floats:

@@ -181,8 +181,7 @@ def _answering(track: Track, parameters: Parameters) -> list[float]:
 
 def _filters(top_hz: float, density: float) -> int:
     """Count the filters from a highest frequency down, so many per octave; one at least."""
-    octaves = min(math.log2(top_hz / LOWEST_HZ), OCTAVES)
-    return 1 + max(int(density * octaves), 0)
+    return 1 + max(int(density * min(math.log2(top_hz / LOWEST_HZ), OCTAVES)), 0)
 
 
 def _kept(parameters: Parameters, form: Parameters) -> tuple[int, ...]:

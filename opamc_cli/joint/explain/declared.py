@@ -75,12 +75,20 @@ class Ways:
         """Fit the model anew, to the motion that predicts best beside terms that were found.
 
         Before any is, beside functions without a name: what fits best as declared may have smoothed
-        away what something missing answers to. None if it is the motion of the fit `before`.
+        away what something missing answers to. Parameters that are not given are searched beside
+        the terms: alone they make up for what these hold. None where neither is any better.
         """
         present, model = before.dataset.smoothing, self._declared(before.dataset)
         beside = (*model, *((term.effect, term) for term in found))
         best = self._best_of(present, beside, 0 if found else FUNCTIONS)
-        return None if best == present else declared_fit(_differentiated(self._whole, best), model)
+        if best == present and not found:
+            return None
+        dataset = before.dataset if best == present else _differentiated(self._whole, best)
+        searched = declared_fit(dataset, beside)
+        as_was = fit_terms(before.dataset, (*before.terms, *found))
+        if best == present and _left(searched) >= BETTER * _left(as_was):
+            return None
+        return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
         """Return the way that leaves least beside so many functions, or the first: see HALF."""

@@ -15,8 +15,7 @@ DECOYS = 5
 def paired(before: Floats, after: Floats) -> tuple[float, float]:
     """Difference of two chains' held-out errors, and its standard error over the parts."""
     difference = after - before
-    error = np.std(difference, ddof=1) * np.sqrt(difference.size)
-    return float(difference.sum()), float(error)
+    return float(difference.sum()), float(np.std(difference, ddof=1) * np.sqrt(difference.size))
 
 
 def p_value(t_value: float, n_parts: int) -> float:

@@ -49,6 +49,20 @@ def test_parameters_that_are_not_given_are_searched_and_the_order_stays(dataset)
     assert fit.rmse(sealed=True) < 0.1 * without.rmse(sealed=True)
 
 
+def test_parameters_are_searched_again_beside_what_was_found():
+    """Alone a Stribeck speed of 1.8 rad/s made up for the weight that the model lacked."""
+    recording = joint_of("cyclic", stribeck, strength=5.0, rate=100.0)
+    names = ("inertia", "offset", "coulomb", "viscous", "stribeck")
+    ways = Ways([recording], Joint(), lambda _: declared(*names))
+    before, gravity = ways.best_fit(), Term(LIBRARY["gravity"], {})
+    assert before.terms[-1].parameters["stribeck_speed"] > 1
+    after = ways.fit_anew(before, (gravity,))
+    assert names_of(after) == list(names)
+    assert after.terms[-1].parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.02)
+    # Where that is no better, nothing is done again.
+    assert ways.fit_anew(after, (gravity,)) is None
+
+
 def test_parameters_that_are_given_are_believed(dataset):
     given = Term(LIBRARY["stribeck"], {"stribeck_speed": 0.4, "exponent": 2.0})
     fit = declared_fit(dataset, (*declared(*BASE), (LIBRARY["stribeck"], given)))
