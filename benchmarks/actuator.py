@@ -184,7 +184,7 @@ def limits(machine: Machine, n_baseline: int, n_target: int, most: int, seed: in
 
 
 def main() -> None:
-    """Print the tables of docs/decision.md."""
+    """Print what docs/decision.md says of a measured machine."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--draws", type=int, default=40)
     parser.add_argument("--seed", type=int, default=0)
