@@ -16,6 +16,7 @@ from math import factorial
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
@@ -167,6 +168,8 @@ def _check_rows(
     for field in needed:
         if table.num_rows:
             _check_values(path, table.column(field.name), field.name, record)
+    if "segment" in table.column_names:
+        _check_segments(path, table, record)
     if "counts" in table.column_names and "order" in table.column_names:
         _check_counts(path, table, record)
     if "runs" in record and "run" in table.column_names:
@@ -178,6 +181,22 @@ def _check_rows(
                     f"run `opamc {record['stage']}` again"
                 )
                 raise InputError(msg)
+
+
+def _check_segments(path: Path, table: pa.Table, record: Mapping[str, Any]) -> None:
+    """Refuse segments that stand twice or not in their order, as of tables laid together."""
+    names = {"role", "run", "axis", "motion", "order"}.intersection(table.column_names)
+    if not {"run", "axis"} <= names:
+        return
+    keys = [table[name].combine_chunks().dictionary_encode().indices.to_numpy() for name in names]
+    rows = np.lexsort(keys)  # stable
+    same_axis = np.all([np.diff(key[rows]) == 0 for key in keys], axis=0)
+    if np.any(same_axis & (np.diff(table["segment"].to_numpy()[rows]) <= 0)):
+        msg = (
+            f"{path}: has segments of an axis twice or not in their order; "
+            f"run `opamc {record['stage']}` again"
+        )
+        raise InputError(msg)
 
 
 def _check_values(

@@ -125,7 +125,7 @@ def test_files_that_are_not_parquet_are_refused(tmp_path, content):
     ],
 )
 def test_rows_that_no_stage_writes_are_refused(tmp_path, column, value, expected):
-    rows = [ROW, {**ROW, column: value}]
+    rows = [ROW, {**ROW, "segment": 1, column: value}]
     table = pa.Table.from_pylist(rows, schema=SEGMENTS)
     path = write(tmp_path / "segments.parquet", table, extra={"runs": [RUN]})
     if expected is None:
@@ -203,6 +203,13 @@ def test_counts_are_as_many_as_their_order_has_patterns(tmp_path, length, fits):
         return
     with pytest.raises(InputError, match=f"counts of order 3 are {length}, there are 6 patterns"):
         read_table(path, "patterns", PATTERNS)
+
+
+@pytest.mark.parametrize("rows", [[0, 1, 0, 1], [1, 0]])
+def test_segments_stand_once_and_in_order(tmp_path, rows):
+    path = write(tmp_path / "segments.parquet", TABLE.take(rows))
+    with pytest.raises(InputError, match=r"segments of an axis twice or not in their order"):
+        read_table(path, "segment", SEGMENTS)
 
 
 def test_metadata_that_is_not_json_is_refused(tmp_path):
