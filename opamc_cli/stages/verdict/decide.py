@@ -11,7 +11,8 @@ from typing import Any
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, OpamcError
 from opamc_cli.stages.chain import score, to_patterns
-from opamc_cli.stages.chain.compared.side import Sides, read_side
+from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
+from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict import verdict
 from opamc_cli.stages.verdict.agreement.common import far_together
 from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
@@ -60,9 +61,9 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     Raises
     ------
     InputError
-        If a table cannot be used, or the two cannot be compared.
+        If a table cannot be used or is not there, or the two cannot be compared.
     """
-    sides = Sides(read_side(baseline), read_side(target), config.score.day_starts_at)
+    sides = Sides(_whole(baseline), _whole(target), config.score.day_starts_at)
     found = read_findings(folder, (baseline, target))
     scored = score.compare_sides(sides, config, out)
     decided = verdict.decide(sides, config)
@@ -85,6 +86,19 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     errors = (*decided.odd_ones(), *unsure)
     worst = ExitCode.NOT_ENOUGH_DATA if unsure else ExitCode.PARTIAL if errors else ExitCode.DONE
     return DecideOutcome(written.verdict, written.exit_code or worst, errors)
+
+
+def _whole(patterns: Path) -> Side:
+    """Read the tables of one side; a witness whose table was lost would be missed by nobody."""
+    side = read_side(patterns)
+    for witness in WITNESSES:
+        if witness.FILE_NAME not in side.witnesses:
+            msg = (
+                f"{patterns.with_name(witness.FILE_NAME)}: no such file; it belongs to "
+                f"{patterns.name}: run `opamc patterns` again"
+            )
+            raise InputError(msg)
+    return side
 
 
 def _beside(folder: Path, tables: tuple[Path, Path]) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """Deciding again from tables, and the documents that programs read."""
 
 import json
+import shutil
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -80,6 +81,13 @@ def test_other_limits_decide_otherwise_and_keep_the_cause(diagnosed):
 def test_decide_without_a_diagnosis(tmp_path, capsys):
     assert ended("decide", "--out", tmp_path) == 3
     assert "baseline/patterns.parquet: no such file" in capsys.readouterr().err
+
+
+def test_a_witness_whose_table_was_lost_is_not_passed_over(diagnosed, tmp_path, capsys):
+    copy = shutil.copytree(diagnosed, tmp_path / "copy")
+    (copy / "baseline" / "spectra.parquet").unlink()
+    assert ended("decide", "--out", copy) == 3
+    assert "baseline/spectra.parquet: no such file" in capsys.readouterr().err
 
 
 def test_a_verdict_keeps_to_its_schema(diagnosed):
