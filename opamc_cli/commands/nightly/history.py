@@ -55,6 +55,8 @@ def history(
         if value is not None:
             where.append(condition)
             values.append(str(value))
+    if out is not None:
+        _refuse_to_replace_others(out)
     with open_history(load_cell(cell), read_only=True) as opened:
         known = {name for name, _ in opened.nights()}
         for name in robot or ():
@@ -97,7 +99,11 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
     from opamc_cli.commands.terminal.streams import printable
     from opamc_cli.stages.report.wording import number, p_value
 
-    names = ("time", "robot", "axis", "kind", "text") if events else SHOWN
+    names = ["time", "robot", "axis", "kind", "text"] if events else [*SHOWN]
+    if not events and len({(row["robot"], row["program"]) for row in rows}) > len(
+        {row["robot"] for row in rows}
+    ):
+        names.insert(1, "program")
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in names:
         table.add_column(name.replace("_", " "))
@@ -112,6 +118,25 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
             )
         )
     return table
+
+
+def _refuse_to_replace_others(path: Path) -> None:
+    """Refuse to write over what is no earlier export, such as a recording."""
+    from opamc_cli.storage.files.parquet import read_schema
+
+    if not path.is_file():
+        return
+    if path.suffix == ".parquet":
+        try:
+            ours = "robot" in read_schema(path, "").names
+        except InputError:
+            ours = False
+    else:
+        with path.open("rb") as file:
+            ours = file.read(20).startswith((b"[", b'"robot","program"', b'"time","robot"'))
+    if not ours:
+        msg = f"--out {path}: is no export of `opamc history` and would be replaced; name another"
+        raise UsageError(msg)
 
 
 def _export(path: Path, rows: list[dict[str, Any]], table: str) -> None:
