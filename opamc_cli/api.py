@@ -133,7 +133,7 @@ class ClosedLoop(Rows):
     axes: tuple[Mapping[str, Any], ...] = ()
 
 
-def read_run(path: AnyPath, columns: Sequence[str] | None = None) -> RunRows:
+def read_run(path: AnyPath, columns: str | Sequence[str] | None = None) -> RunRows:
     """Read the samples of a run.
 
     Parameters
@@ -141,7 +141,7 @@ def read_run(path: AnyPath, columns: Sequence[str] | None = None) -> RunRows:
     path
         The file.
     columns
-        Such as ``["axis1_a", "axis1_position"]``; None: all.
+        Such as ``["axis1_a", "axis1_position"]``, or one; None: all.
 
     Raises
     ------
@@ -149,7 +149,9 @@ def read_run(path: AnyPath, columns: Sequence[str] | None = None) -> RunRows:
         If it is no run, or has no such column.
     """
     with Run(Path(path)) as run:
-        names = list(columns) if columns is not None else [*run.columns]
+        if columns is None:
+            columns = run.columns
+        names = [columns] if isinstance(columns, str) else list(columns)
         for name in names:
             if name not in run.columns:
                 msg = f"{path}: has no column {name}; it has {', '.join(run.columns)}"
@@ -323,8 +325,7 @@ def close_loop(
     """
     folder = Path(out)
     declared = load_joint_model(Path(model), _overrides(settings))
-    extended = [path.name for path in folder.glob("model_axis*.yaml")]
-    with output_lock(folder), result(folder, *joint_model.CLOSE_FILES, *extended) as staged:
+    with output_lock(folder), result(folder, *joint_model.close_files(folder)) as staged:
         done = joint_model.close(declared, find_runs(_paths(runs)), axes, staged, seed, jobs=jobs)
     rows = [
         {**step, "axis": axis["axis"], "parameters": json.dumps(step["parameters"])}
@@ -341,7 +342,14 @@ def _paths(given: AnyPaths) -> list[Path]:
 
 
 def _overrides(settings: Settings | None) -> list[str]:
-    return [f"{name}={json.dumps(value)}" for name, value in (settings or {}).items()]
+    return [
+        f"{name}={json.dumps(value, default=_plain)}" for name, value in (settings or {}).items()
+    ]
+
+
+def _plain(value: object) -> Any:
+    """Return what JSON has no word for: numbers and arrays of numpy, paths."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _config(settings: Settings | None) -> Config:

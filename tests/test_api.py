@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import opamc_cli
@@ -68,3 +69,12 @@ def test_what_a_command_refuses_is_raised(tmp_path):
         opamc_cli.read_table(ONE)
     with output_lock(tmp_path), pytest.raises(LockedError):
         opamc_cli.segment(ONE, out=tmp_path)
+
+
+def test_what_a_notebook_has_at_hand_is_taken(tmp_path):
+    settings = {"segment.min_motion_s": np.float32(0.25), "segment.windows": np.int64(3)}
+    cut = opamc_cli.segment(ONE, out=tmp_path, settings=settings)
+    assert cut.table.num_rows > 0
+    assert opamc_cli.read_run(ONE, "axis3_a").table.column_names == ["axis3_a"]
+    with pytest.raises(InputError, match="no run was named"):
+        opamc_cli.segment([], out=tmp_path)

@@ -115,10 +115,9 @@ def close(
     forgo_pandas()
     output = Output(as_json, quiet)
     declared = load_joint_model(model, overrides or ())
-    extended = [path.name for path in out.glob("model_axis*.yaml")]
     with (
         output_lock(out),
-        result(out, *stage.CLOSE_FILES, *extended) as staged,
+        result(out, *stage.close_files(out)) as staged,
         _naming(model),
         output.steps() as steps,
     ):

@@ -10,6 +10,7 @@ import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
 from opamc_cli.config.yaml.values import yaml_of
+from opamc_cli.errors import UsageError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.intervals import certainty, drag_t
 from opamc_cli.joint.loop import close_loop, untestable
@@ -64,6 +65,22 @@ CLOSE_FILES = (
     files.ORDER_SPECTRUM,
 )
 """What closing the loop leaves, beside `model_axis1.yaml` and so on where there are many axes."""
+
+
+def close_files(folder: Path) -> tuple[str, ...]:
+    """Return what a close writes into a folder or removes from it, models of many axes too.
+
+    Raises
+    ------
+    UsageError
+        If a model lies there that no close has written: a user has declared it.
+    """
+    extended = [path.name for path in folder.glob("model_axis*.yaml")]
+    for path in (folder / name for name in (files.MODEL, *extended)):
+        if path.is_file() and b"\nclosed:" not in path.read_bytes():
+            msg = f"{path}: is no model of a close and would be replaced; choose another --out"
+            raise UsageError(msg)
+    return (*CLOSE_FILES, *extended)
 
 
 def fit(

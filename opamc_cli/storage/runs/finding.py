@@ -19,8 +19,11 @@ def find_runs(paths: Sequence[Path]) -> list[tuple[str, Path]]:
     Raises
     ------
     InputError
-        If a path does not exist or a folder holds no run.
+        If there is no path, one does not exist or a folder holds no run.
     """
+    if not paths:
+        msg = "no run was named; name files or folders of them"
+        raise InputError(msg)
     found: dict[Path, str] = {}
     for path in expand_patterns(paths):
         if path.is_dir():

@@ -2,7 +2,9 @@
 
 import pytest
 
+from opamc_cli.errors import UsageError
 from opamc_cli.joint.explain.saturated import unnamed_library
+from opamc_cli.stages.model.model import close_files
 from opamc_cli.stages.model.tables import ADVICE, MEANINGS, separating_experiment
 
 
@@ -46,3 +48,12 @@ def test_a_function_of_the_measured_acceleration_is_no_response_for_certain():
 @pytest.mark.parametrize("name", MEANINGS)
 def test_a_meaning_belongs_to_a_function_that_there_is(name):
     assert name in unnamed_library()
+
+
+@pytest.mark.parametrize("name", ["model.yaml", "model_axis2.yaml"])
+def test_a_close_replaces_the_model_of_a_close_alone(tmp_path, name):
+    (tmp_path / name).write_text("joint: {}\nclosed:\n  unit: A\n", encoding="utf-8")
+    assert name in close_files(tmp_path)
+    (tmp_path / name).write_text("joint: {}  # closed: no\n", encoding="utf-8")
+    with pytest.raises(UsageError, match="is no model of a close"):
+        close_files(tmp_path)
