@@ -309,6 +309,26 @@ def record_at(path: Path) -> dict[str, Any]:
     return table_record(path, read_schema(path, "make the table again").metadata)
 
 
+def check_current(path: Path) -> None:
+    """Refuse a stage table if the table beside it that it was made from has been made anew.
+
+    Raises
+    ------
+    InputError
+        If so: a stage between the two was not run again.
+    """
+    record = record_at(path)
+    for source in record["inputs"]:
+        beside = path.parent / source["path"]
+        own_folder = beside.parent == path.parent
+        if own_folder and beside.is_file() and file_sha256(beside) != source["sha256"]:
+            msg = (
+                f"{path}: was made from another {beside.name} than the one beside it; "
+                f"run `opamc {record['stage']}` again"
+            )
+            raise InputError(msg)
+
+
 def table_input(path: Path) -> tuple[Path, str]:
     """Return (path, SHA-256), the form in which `write_table` takes its inputs."""
     return path, file_sha256(path)

@@ -10,6 +10,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.storage.schemas.tables import MAY_BE_NULL, PATTERNS, SEGMENTS, TABLES
 from opamc_cli.storage.tables import (
     TABLE_KEY,
+    check_current,
     read_table,
     record_at,
     table_input,
@@ -210,6 +211,19 @@ def test_segments_stand_once_and_in_order(tmp_path, rows):
     path = write(tmp_path / "segments.parquet", TABLE.take(rows))
     with pytest.raises(InputError, match=r"segments of an axis twice or not in their order"):
         read_table(path, "segment", SEGMENTS)
+
+
+def test_a_table_of_another_input_than_lies_beside_it_is_refused(tmp_path):
+    first = write(tmp_path / "segments.parquet")
+    second = write(tmp_path / "motions.parquet", stage="identify", inputs=[table_input(first)])
+    check_current(second)
+    check_current(write(tmp_path / "b" / "motions.parquet", inputs=[table_input(first)]))
+    write(first, config={"a": 2})
+    with pytest.raises(InputError, match=r"another segments.parquet .* run `opamc identify` again"):
+        check_current(second)
+    check_current(tmp_path / "b" / "motions.parquet")  # of another folder: a variant that is kept
+    first.unlink()
+    check_current(second)
 
 
 def test_metadata_that_is_not_json_is_refused(tmp_path):

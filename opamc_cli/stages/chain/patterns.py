@@ -24,7 +24,7 @@ from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_pa
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, PLACE
 from opamc_cli.storage.sources import read_sources, sources_record
-from opamc_cli.storage.tables import read_table, record_at, table_input, write_table
+from opamc_cli.storage.tables import check_current, read_table, record_at, table_input, write_table
 
 FILES = (files.PATTERNS, *(witness.FILE_NAME for witness in WITNESSES))
 
@@ -90,6 +90,7 @@ def run(
         If a table or run cannot be used.
     """
     table = read_table(motions, "identify", MOTIONS)
+    check_current(motions)
     sources = read_sources(motions, moved_to)
     work = [_Job(part, config.patterns) for part in identified_parts(table, sources)]
     outcome = map_items(remembered(_analyse, kept), work, jobs, watch)

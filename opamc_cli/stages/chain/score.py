@@ -23,7 +23,7 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import FEATURES, SCORES
 from opamc_cli.storage.sources import check_comparable
-from opamc_cli.storage.tables import record_at, table_input, write_table
+from opamc_cli.storage.tables import check_current, record_at, table_input, write_table
 
 if TYPE_CHECKING:
     from opamc_cli.stages.chain.compared.discriminants import LatentModels
@@ -77,6 +77,8 @@ def run(
         under other conditions.
     """
     sides = Sides(read_side(baseline), read_side(target), config.score.day_starts_at)
+    for side in (baseline, target):
+        check_current(side)
     return compare_sides(sides, config, out, models=models)
 
 

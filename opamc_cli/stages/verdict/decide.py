@@ -22,6 +22,7 @@ from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import other_robot
+from opamc_cli.storage.tables import check_current
 
 FILES = (files.VERDICT, *score.FILES)
 
@@ -91,13 +92,13 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
 def _whole(patterns: Path) -> Side:
     """Read the tables of one side; a witness whose table was lost would be missed by nobody."""
     side = read_side(patterns)
+    check_current(patterns)
     for witness in WITNESSES:
+        path = patterns.with_name(witness.FILE_NAME)
         if witness.FILE_NAME not in side.witnesses:
-            msg = (
-                f"{patterns.with_name(witness.FILE_NAME)}: no such file; it belongs to "
-                f"{patterns.name}: run `opamc patterns` again"
-            )
+            msg = f"{path}: no such file; it belongs to {patterns.name}: run `opamc patterns` again"
             raise InputError(msg)
+        check_current(path)
     return side
 
 
