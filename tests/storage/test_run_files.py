@@ -157,7 +157,7 @@ def raw_run(path, metadata, columns=None):
         ({"opamc": '{"sampling_rate_hz": 1, "started_at": 5}'}, None, "started_at is 5; an ISO"),
         ({"opamc": '{"sampling_rate_hz": 1}'}, {"axis1_a": ["x"]}, "axis1_a has type string"),
         ({"opamc": '{"sampling_rate_hz": 1}'}, {"current": [1.0]}, "no current column among"),
-        ({"opamc": '{"sampling_rate_hz": 1}'}, {"axis0_a": [1.0]}, "no current column among"),
+        ({"opamc": '{"sampling_rate_hz": 1}'}, {"axis0_a": [1.0]}, "axes count from 1 to 999"),
         (
             {"opamc": '{"sampling_rate_hz": 1}'},
             {"axis1_position": [1.0]},

@@ -102,6 +102,8 @@ def test_bounds_of_metadata(tmp_path, key, good, bad):
         ("axis999_a", None),
         ("axis1000_a", "axes count from 1 to 999"),
         ("axis99999999999999999999_a", "axes count from 1 to 999"),
+        ("axis0_a", "axes count from 1 to 999"),
+        ("Axis 00 position", "axes count from 1 to 999"),
         ("Axis2_A", "is it axis2_a"),
         ("axis 02 current", "is it axis2_current"),
         ("axis1 a", None),  # its right name is there beside it

@@ -49,13 +49,16 @@ class AxisChannels:
         return self.columns.get("velocity")
 
 
+_COUNTED = "{}: column {}: axes count from 1 to " + str(MOST_AXES)
+
+
 def axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
     """Return the columns of each axis that has a current, ascending.
 
     Raises
     ------
     InputError
-        If no axis has one, or if one is no number, misspelt or of an axis beyond 999.
+        If no axis has one, or if one is no number, misspelt or of an axis 0 or beyond 999.
     """
     by_axis: dict[int, set[str]] = {}
     for field in schema:
@@ -68,8 +71,7 @@ def axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
             raise InputError(msg)
         if match is not None:
             if len(match[1]) > len(str(MOST_AXES)) or int(match[1]) > MOST_AXES:
-                msg = f"{path}: column {shown(field.name)}: axes count from 1 to {MOST_AXES}"
-                raise InputError(msg)
+                raise InputError(_COUNTED.format(path, shown(field.name)))
             by_axis.setdefault(int(match[1]), set()).add(match[2])
     channels = {}
     for axis in sorted(by_axis):
@@ -89,6 +91,8 @@ def axis_channels(path: Path, schema: pa.Schema) -> dict[int, AxisChannels]:
 def _refuse_misspelt(path: Path, name: str, names: Sequence[str]) -> None:
     """Refuse a column that is nearly an axis's: an axis left out on both sides is never missed."""
     match = NEARLY_COLUMN.fullmatch(name)
+    if match and match[1] == "0":
+        raise InputError(_COUNTED.format(path, shown(name)))
     meant = match and f"axis{match[1]}_{match[2].lower()}"
     if meant and meant not in names:
         msg = f"{path}: column {shown(name)}: is it {meant}? Rename it"

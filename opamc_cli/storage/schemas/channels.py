@@ -94,7 +94,7 @@ COLUMN = re.compile(rf"axis([1-9][0-9]*)_({'|'.join(CHANNELS)})")
 """Name of a run's column."""
 
 NEARLY_COLUMN = re.compile(
-    rf"\s*axis[\s_-]*0*([1-9][0-9]*)[\s_-]+({'|'.join(CHANNELS)})\s*", re.IGNORECASE | re.ASCII
+    rf"\s*axis[\s_-]*0*([0-9]+)[\s_-]+({'|'.join(CHANNELS)})\s*", re.IGNORECASE | re.ASCII
 )
 """What somebody may have written for one."""
 
