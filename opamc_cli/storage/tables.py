@@ -168,7 +168,7 @@ def _check_rows(
     for field in needed:
         if table.num_rows:
             _check_values(path, table.column(field.name), field.name, record)
-    if "segment" in table.column_names:
+    if "segment" in table.column_names and "role" not in table.column_names:
         _check_segments(path, table, record)
     if "counts" in table.column_names and "order" in table.column_names:
         _check_counts(path, table, record)
@@ -185,7 +185,7 @@ def _check_rows(
 
 def _check_segments(path: Path, table: pa.Table, record: Mapping[str, Any]) -> None:
     """Refuse segments that stand twice or not in their order, as of tables laid together."""
-    names = {"role", "run", "axis", "motion", "order"}.intersection(table.column_names)
+    names = {"run", "axis", "motion", "order"}.intersection(table.column_names)
     if not {"run", "axis"} <= names:
         return
     keys = [table[name].combine_chunks().dictionary_encode().indices.to_numpy() for name in names]
