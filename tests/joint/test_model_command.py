@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from closing import moved
 from simulator import simulate
 from threadpoolctl import threadpool_limits
 
@@ -113,6 +114,22 @@ def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, 
     assert ("ripple may be wrong: the place" in said) == doubted
     assert len(entry["doubts"]) == doubted
     assert any("turned without current (gaps: 2, 0.8 s in all)" in n for n in entry["notes"])
+
+
+@pytest.mark.parametrize("declared", ["coulomb, stribeck", "coulomb, viscous, stribeck"])
+def test_a_declared_friction_that_drives_is_doubted(declared, tmp_path, capsys):
+    """A Stribeck curve below zero stood for a viscous friction, and nothing was said to lack."""
+    position, speed, acceleration = moved("one stroke", rate=100.0)
+    current = 0.2 * acceleration + np.sin(position) + 0.5 * np.sign(speed) + 0.3 * speed
+    current += np.random.default_rng(7).normal(0.0, 0.02, speed.size)
+    write_run(tmp_path / "run.parquet", 100.0, axis1_current=current, axis1_position=position)
+    effects = f"effects: [inertia, gravity, offset, {declared}, load_friction]\n"
+    assert close(tmp_path, "--quiet", model=MODEL.split("\n")[0] + "\n" + effects) == 0
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert entry["verdict"] == "nothing-missing"
+    lacks = "viscous" not in declared
+    assert ("the declared stribeck drives the joint" in capsys.readouterr().err) == lacks
+    assert len(entry["doubts"]) == lacks
 
 
 def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys):
