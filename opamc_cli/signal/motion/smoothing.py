@@ -56,7 +56,7 @@ def _in_steps(path: Floats, rounding: float) -> bool:
 def smoothing_window(path: Floats, rate_hz: float, derivative: int = 2) -> int:
     """Shortest odd window whose derivative noise is small against the derivative itself.
 
-    Of a position (derivative 2) or a speed (1), shape (n,): 5 samples or more, at most 0.2 s or 15
+    Of a position (derivative 2) or a speed (1), shape (n,): 3 samples or more, at most 0.2 s or 15
     samples.
     """
     longest = max(int(LONGEST_WINDOW_S * rate_hz) | 1, LONGEST_WINDOW)
