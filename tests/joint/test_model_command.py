@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 import yaml
 from closing import moved
+from scipy.signal import lfilter
 from simulator import simulate
 from threadpoolctl import threadpool_limits
 
@@ -95,6 +96,21 @@ def test_what_the_sealed_data_do_not_show_is_said_also_if_quiet(tmp_path, capsys
     assert "searched show spring" in capsys.readouterr().err
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     assert (entry["verdict"], entry["unconfirmed"]) == ("nothing-missing", ["spring"])
+
+
+@pytest.mark.parametrize("slow_a", [0.01, 0.1])
+def test_what_nothing_explains_far_beyond_the_noise_is_said_also_if_quiet(slow_a, tmp_path, capsys):
+    position, speed, acceleration = moved("one stroke", rate=100.0)
+    current = 0.2 * acceleration + np.sin(position) + 0.5 * np.sign(speed) + 0.3 * speed
+    white, slow = np.random.default_rng(3).normal(0.0, (0.02, 1.0), (speed.size, 2)).T
+    slow = lfilter([1.0], [1.0, -0.95], slow)
+    current += white + slow_a / np.std(slow) * slow
+    write_run(tmp_path / "run.parquet", 100.0, axis1_current=current, axis1_position=position)
+    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert entry["verdict"] == "nothing-missing"
+    said = "that are left beyond noise" in capsys.readouterr().err
+    assert said == (entry["before"]["rmse_a"] > 3 * entry["noise_a"]) == (slow_a > 0.05)
 
 
 @pytest.mark.parametrize("hidden", ["ripple", "quadratic_friction"])
