@@ -81,12 +81,12 @@ class Ways:
         present, model = before.dataset.smoothing, self._declared(before.dataset)
         beside = (*model, *((term.effect, term) for term in found))
         best = self._best_of(present, beside, 0 if found else FUNCTIONS)
-        if best == present and not found:
+        if best == present and not (found and any(term.parameters for term in before.terms)):
             return None
         dataset = before.dataset if best == present else _differentiated(self._whole, best)
         searched = declared_fit(dataset, beside)
-        as_was = fit_terms(before.dataset, (*before.terms, *found))
-        if best == present and _left(searched) >= BETTER * _left(as_was):
+        kept = (*before.terms, *found)
+        if best == present and _left(searched) >= BETTER * _left(fit_terms(dataset, kept)):
             return None
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
 
