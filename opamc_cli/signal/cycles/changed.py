@@ -5,11 +5,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
-from opamc_cli.signal.cycles.identification import FEWEST, UNIDENTIFIED, identify
+from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify
 from opamc_cli.signal.cycles.reference import find_reference
 
 MOST = 0.5
 """Share of the segments that has to fit then: of two cycles' worth the edges may cut half."""
+
+FEWEST = 3
+"""Motions that have to be left: any two may look like two others."""
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What segments are identified by, and within which limits."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -49,25 +49,6 @@ class SegmentFeatures:
             self.f_max_hz[indices],
             self.direction[indices],
             self.pause_s[indices],
-        )
-
-    def joined(self, first: int) -> "SegmentFeatures | None":
-        """Return the same with a segment and the next as one; None if they go different ways."""
-        pair = slice(first, first + 2)
-        pause_s = float(np.nan_to_num(self.pause_s[first + 1]))
-        if self.direction[first] * self.direction[first + 1] < 0:
-            return None
-        one = SegmentFeatures(
-            np.average(self.variance[pair], weights=self.duration_s[pair], keepdims=True),
-            self.duration_s[pair].sum(keepdims=True) + pause_s,
-            self.f_max_hz[pair].max(keepdims=True),
-            self.direction[first : first + 1],
-            self.pause_s[first : first + 1],
-        )
-        parts = (self.part(0, first), one, self.part(first + 2, len(self)))
-        names = [field.name for field in fields(self)]
-        return SegmentFeatures(
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in names)
         )
 
 

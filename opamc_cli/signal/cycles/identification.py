@@ -6,18 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.signal.cycles.alignment import MISSING, aligned_windows, small
-from opamc_cli.signal.cycles.features import (
-    SAME_PROGRAM,
-    Floats,
-    Ints,
-    MatchRule,
-    SegmentFeatures,
-)
+from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFeatures
 
 UNIDENTIFIED = -1
-
-FEWEST = 3
-"""Motions of a cycle that have to be left: any two may look like two others."""
 
 
 @dataclass(frozen=True)
@@ -127,35 +118,6 @@ def identify_anywhere(
         if worth > most:
             motion = np.where(taken, order[turned.motion], UNIDENTIFIED)
             best, most = replace(turned, motion=motion), worth
-    return best
-
-
-def identify_run_together(
-    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
-) -> Identification:
-    """Find the reference cycle where two of its motions, one after the other, are one segment.
-
-    A standstill as short as what counts as one is seen in one recording and not in the next. What
-    holds both motions is neither, and stays unidentified; of the pairs that go the same way the
-    one is taken with which the most segments fit, of these the most similar.
-    """
-    best, most = identify(reference, segments, rule), (0, 0.0)
-    for first in range(len(reference) - 1 if len(reference) - 2 >= FEWEST else 0):
-        joined = reference.joined(first)
-        if joined is None:
-            continue
-        found = identify(joined, segments, rule)
-        both = found.motion == first
-        # where one of them is lost, the other alone does not last as long as both
-        longer = segments.duration_s[both] / joined.duration_s[first] - 1
-        if (np.abs(longer) > SAME_PROGRAM).any():
-            continue
-        taken = (found.motion > UNIDENTIFIED) & ~both
-        worth = (int(np.count_nonzero(taken)), float(found.similarity[taken].sum()))
-        if both.any() and worth > most:
-            later = np.where(found.motion > first, found.motion + 1, found.motion)
-            cycle, motion = (np.where(both, UNIDENTIFIED, one) for one in (found.cycle, later))
-            best, most = replace(found, cycle=cycle, motion=motion), worth
     return best
 
 

@@ -17,12 +17,7 @@ from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.signal.align import align
 from opamc_cli.signal.cycles.alignment import small
 from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
-from opamc_cli.signal.cycles.identification import (
-    UNIDENTIFIED,
-    identify,
-    identify_anywhere,
-    identify_run_together,
-)
+from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
 from opamc_cli.signal.cycles.reference import find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.stages.chain.compared.speeds import (
@@ -480,8 +475,6 @@ def _identify_part(job: _Job) -> pa.Table:
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = identify_anywhere(reference.features, own, rule)
-        if found.cycle.max() == UNIDENTIFIED:
-            found = identify_run_together(reference.features, own, rule)
         if job.judged and found.cycle.max() == UNIDENTIFIED:
             found = identify(reference.features, own, rule.by_motion())
         cycle[whole], motion[whole] = found.cycle, found.motion

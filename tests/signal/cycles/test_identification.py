@@ -6,10 +6,8 @@ from made_cycles import CYCLE, series
 
 from opamc_cli.signal.cycles.features import MatchRule
 from opamc_cli.signal.cycles.identification import (
-    UNIDENTIFIED,
     _most_windows,
     identify,
-    identify_run_together,
     sliding_similarity,
 )
 from opamc_cli.signal.cycles.reference import find_reference, period
@@ -184,39 +182,3 @@ def test_the_best_similarity_of_what_is_unidentified_is_kept():
     expected = [7.5 / length / np.sqrt(2), 7.5 / length / np.sqrt(2), 4 / length]
     assert found.similarity == pytest.approx(expected)
     assert found.motion.tolist() == found.cycle.tolist() == [-1, -1, -1]
-
-
-# six motions, the third and fourth one after the other with hardly a standstill between them
-SHORT_STOP = [*CYCLE[:2], (0.4, 1.6, 240.0, -1, 0.3), (7.5, 2.0, 280.0, -1, 0.06), *CYCLE[:2]]
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_two_motions_that_run_together_cost_these_two_alone(seed):
-    reference = series(SHORT_STOP, noise=0)
-    both = (4.3, 3.66, 280.0, -1, 0.3)
-    segments = series([*SHORT_STOP[:2], both, *SHORT_STOP[4:]], seed=seed)
-    assert (identify(reference, segments, RULE).cycle == UNIDENTIFIED).all()
-    found = identify_run_together(reference, segments, RULE)
-    assert found.motion.tolist() == [0, 1, UNIDENTIFIED, 4, 5]
-    assert found.cycle.tolist() == [0, 0, UNIDENTIFIED, 0, 0]
-
-
-def test_only_motions_of_one_way_run_together():
-    turning = [(*row[:3], -1 if at == 3 else 1, row[4]) for at, row in enumerate(SHORT_STOP)]
-    both = (4.3, 3.66, 280.0, 1, 0.3)
-    segments = series([*turning[:2], both, *turning[4:]])
-    found = identify_run_together(series(turning, noise=0), segments, RULE)
-    assert (found.motion == UNIDENTIFIED).all()
-
-
-def test_a_motion_that_is_lost_has_not_run_together_with_the_next():
-    segments = series([*SHORT_STOP[:2], *SHORT_STOP[3:]])
-    reference = series([*SHORT_STOP[:2], (7.0, 0.3, 240.0, -1, 0.3), *SHORT_STOP[3:]], noise=0)
-    found = identify_run_together(reference, segments, RULE)
-    assert (found.motion == UNIDENTIFIED).all()
-
-
-def test_of_a_short_cycle_no_two_motions_run_together():
-    segments = series([(3.8, 1.9, 314.0, 1, 0.5), *CYCLE[2:]])
-    found = identify_run_together(series(CYCLE, noise=0), segments, RULE)
-    assert (found.motion == UNIDENTIFIED).all()
