@@ -240,26 +240,23 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
             laid.notes.append(OPPOSITE.format(axis))
     found = {step.term.effect.name for step in loop.steps}
     placed, guessed_s = sorted(found & OF_THE_PLACE), loop.after.dataset.fine.track.guessed_s
+    doubts = []
     if placed and guessed_s:
-        doubt = DOUBTED.format(axis, " and ".join(placed), len(guessed_s), sum(guessed_s))
-        laid.notes.append(doubt)
-        laid.read.doubts.append(doubt)
+        doubts.append(DOUBTED.format(axis, " and ".join(placed), len(guessed_s), sum(guessed_s)))
     sure = certainty(loop.after)
     declared = zip(loop.before.terms, loop.after.coefficients, sure.standard_errors, strict=False)
     for term, values, errors in declared:
         resists = term.effect.resists and not term.effect.at_a_place and term.parameters
         if resists and values[0] < -DRIVEN_T * errors[0]:
-            doubt = DRIVES.format(axis, term.effect.name)
-            laid.notes.append(doubt)
-            laid.read.doubts.append(doubt)
+            doubts.append(DRIVES.format(axis, term.effect.name))
     named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and "coupling" in loop.untestable:
         laid.notes.append(ALONE.format(axis, " and ".join(named)))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
-        doubts = [note for run in runs for note in scaled(run, axis, by_name[run.name])]
-        laid.notes.extend(doubts)
-        laid.read.doubts.extend(doubts)
+        doubts += [note for run in runs for note in scaled(run, axis, by_name[run.name])]
+    laid.notes.extend(doubts)
+    laid.read.doubts.extend(doubts)
     added = {id(step.term) for step in loop.steps}
     return _Closed(
         entry=loop_entry(laid, loop),
