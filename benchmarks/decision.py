@@ -33,6 +33,7 @@ from opamc_cli.decision.divergence.discriminant import fit
 from opamc_cli.decision.divergence.features import compare
 from opamc_cli.decision.divergence.jensen_shannon import divergences_from_pool
 from opamc_cli.decision.judge import Bundle, judge
+from opamc_cli.signal.offset import mean_over_motions
 from opamc_cli.signal.transform.analytic import clarke
 from opamc_cli.stages.chain import patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides
@@ -151,8 +152,8 @@ def rival_rows(recordings: dict, motions: list[dict]) -> dict:
     for (name, axis), rows in by_axis.items():
         vector = clarke(*recordings[name].axes[axis].phases_a.T.astype(np.float64))
         spans = [aligned_span(row) for row in rows]
-        # as the stage `patterns` does: the sensors' offset is the mean over all turns
-        vector = vector - np.concatenate([vector[a:b] for a, b in spans]).mean()
+        # as the stage `patterns` does
+        vector = vector - mean_over_motions(vector[a:b] for a, b in spans)
         envelope = np.abs(vector)
         # The square's angle does not jump where the torque changes its sign: half of it is the
         # carrier's, and the vector turned back by it is the torque current with its sign.

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 PIECE_S = 0.25
 TURNS = 4.0
 """Fewest turns of a piece: a tapered mean over them holds less than 1 % of a steady carrier."""
-
-
-MANY_TURNS = 50.0
-"""Fewest turns of whole motions: fewer leave more of the vector than of the offset."""
+TURNS_AT_TOP_SPEED = 12.0
+"""Fewest turns that a motion would make at its highest frequency, for its tapered mean to hold 2 to
+3 % of the current (it makes half of them to two thirds)."""
 
 
 def turns(z: NDArray[np.complex128]) -> NDArray[np.float64]:
@@ -22,27 +21,30 @@ def turns(z: NDArray[np.complex128]) -> NDArray[np.float64]:
     return np.asarray(np.abs(advance) / (4 * np.pi))
 
 
-def mean_over_turns(vectors: Iterable[NDArray[np.complexfloating]]) -> complex:
-    """Offset of the current vector from whole motions: its mean over many turns.
+def mean_over_motions(vectors: Iterable[NDArray[np.complexfloating]]) -> complex:
+    """Offset of the current vector from whole motions: their tapered mean.
+
+    A motion begins and ends slowly: without a taper its first and last turn weigh as much as all
+    others, and the mean is off by 5 % of the current where 150 turns are known, with it by 0.4 %
+    (72 joints of the testbed).
 
     Parameters
     ----------
     vectors : iterable of array, shape (n,), A
-        Current vector of each motion; NaN are passed over.
+        Current vector of each motion, see `TURNS_AT_TOP_SPEED`; NaN are passed over.
 
     Returns
     -------
     complex
-        In ampere; 0 for fewer than fifty turns in all.
+        In ampere; 0 without a sample.
     """
-    total, count, n_turns = 0j, 0, 0.0
+    total, weight = 0j, 0.0
     for vector in vectors:
-        z = vector[np.isfinite(vector)].astype(np.complex128)
-        if z.size > 1:
-            n_turns += float(turns(z))
-            total += complex(z.sum())
-            count += z.size
-    return total / count if n_turns >= MANY_TURNS else 0j
+        finite = np.isfinite(vector)
+        taper = np.hanning(vector.size + 2)[1:-1][finite]
+        total += complex(vector[finite].astype(np.complex128) @ taper)
+        weight += float(taper.sum())
+    return total / weight if weight else 0j
 
 
 def turning_means(z: NDArray[np.complexfloating], fs_hz: float) -> NDArray[np.complex128]:

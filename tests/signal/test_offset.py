@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.offset import mean_over_turns, turning_means, turning_offset, turns
+from opamc_cli.signal.offset import mean_over_motions, turning_means, turning_offset, turns
 
 FS_HZ = 2048.0
 
@@ -51,17 +51,28 @@ def test_turns_are_counted_whatever_the_torque_s_sign() -> None:
     assert turns(np.stack([z, z[::-1], 0 * z + 1])) == pytest.approx([3.25, 3.25, 0])
 
 
-@pytest.mark.parametrize(("n_turns", "known"), [(49.9, False), (50.1, True)])
-def test_the_mean_over_fifty_turns_is_the_offset(n_turns: float, known: bool) -> None:
-    motions = [0.1 + 0.2j + turning(n_turns / 2, 2501)[:2500] for _ in range(2)]
-    motions[0][7] = np.nan
-    found = mean_over_turns([*motions, np.array([9.0 + 0j])])  # a single sample tells nothing
-    if known:
-        each = [z[np.isfinite(z)] for z in motions]
-        assert found == pytest.approx(np.concatenate(each).mean())
-    else:
-        assert found == 0j
-    assert mean_over_turns([]) == 0j
+def motion(n_turns: float, n: int = 2000) -> np.ndarray:
+    """A motion that begins and ends slowly, with a current that grows as it accelerates."""
+    s = np.linspace(0, 1, n)
+    angle = 2 * np.pi * n_turns * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    return (2 + np.cos(np.pi * s)) * np.exp(1j * angle)
+
+
+@pytest.mark.parametrize(("n_turns", "off_by"), [(7, 0.03), (20, 0.01)])
+def test_the_tapered_mean_over_motions_is_the_offset(n_turns: float, off_by: float) -> None:
+    offset = 0.1 + 0.2j
+    motions = [offset + motion(n_turns), offset + motion(n_turns + 0.5)]
+    motions[0][700] = np.nan
+    found = mean_over_motions(motions)
+    assert abs(found - offset) < off_by * 2
+    # the plain mean holds the slow turns at both ends
+    assert abs(np.nanmean(np.concatenate(motions)) - offset) > 5 * abs(found - offset)
+
+
+def test_no_sample_has_no_offset() -> None:
+    assert mean_over_motions([]) == 0j
+    assert mean_over_motions([np.array([np.nan + 0j]), np.zeros(0, complex)]) == 0j
+    assert mean_over_motions([np.array([3 + 1j])]) == 3 + 1j
 
 
 @pytest.mark.parametrize(("turns_of_a_piece", "n_pieces"), [(3.9, 0), (4.1, 3)])
@@ -83,8 +94,3 @@ def test_the_offset_is_the_median_of_four_pieces_at_least() -> None:
     means = np.array([1 + 1j, 2 + 9j, 3 + 2j, 90 + 3j])
     assert turning_offset(means) == 2.5 + 2.5j
     assert turning_offset(means[:3]) == 0j
-
-
-def test_motions_of_two_samples_turn_too() -> None:
-    pair = np.array([1, np.exp(1.5j)])
-    assert mean_over_turns([pair] * 300) == pytest.approx(pair.mean())

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.signal.offset import mean_over_turns
+from opamc_cli.signal.offset import mean_over_motions
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, envelope
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
@@ -53,17 +53,16 @@ def current_offset(
 ) -> complex:
     """Estimate what the current sensors add to the current vector of an axis, A.
 
-    The vector turns, its sensors' offset stands still: it is the mean over many turns, in `spans`
-    of samples (half-open) in which the axis moves. Left in, it modulates the envelope once per
-    electrical period, by more than early damage does, and it drifts from session to session.
+    The vector turns, its sensors' offset stands still: it is the mean over `spans` of samples
+    (half-open), motions that turn often. Left in, it modulates the envelope once per electrical
+    period, by more than early damage does, and it drifts from session to session.
 
-    It is 0 for a reported current, whose mean is torque, and where the vector turns too little,
-    see `signal.offset.mean_over_turns`.
+    It is 0 for a reported current, whose mean is torque, and without such a motion.
     """
     if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
         return 0j
     some = spans[:: -(-len(spans) // OFFSET_SPANS) or 1]
-    return mean_over_turns(read_current(run, axis, *span, wanted) for span in some)
+    return mean_over_motions(read_current(run, axis, *span, wanted) for span in some)
 
 
 def read_envelope(

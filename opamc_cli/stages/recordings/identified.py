@@ -9,6 +9,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
+from opamc_cli.signal.offset import TURNS_AT_TOP_SPEED
 from opamc_cli.stages.recordings.envelope import current_offset, read_course
 from opamc_cli.storage.sources import RunSource
 
@@ -42,7 +43,10 @@ class IdentifiedPart:
         with self.source.open() as run:
             offset = 0j
             if config.remove_offset:
-                offset = current_offset(run, self.axis, spans, config.envelope)
+                often = [
+                    span for row, span in zip(self.rows, spans, strict=True) if turns_often(row)
+                ]
+                offset = current_offset(run, self.axis, often, config.envelope)
             for row, (start, stop) in zip(self.rows, spans, strict=True):
                 current = read_course(run, self.axis, start, stop, config.envelope, offset)
                 # a current without bound is a fault of the logger, not a rank
@@ -81,3 +85,12 @@ def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
         return row["start"], row["stop"]
     start = max(row["start"] + row["lag"], 0)
     return start, start + row["reference_samples"]
+
+
+def turns_often(row: dict[str, Any]) -> bool:
+    """Whether the current vector turns often enough in a segment for its mean to be an offset.
+
+    The reference segment tells, so that all recordings that are compared agree.
+    """
+    seconds = row["reference_samples"] / row["sampling_rate_hz"]
+    return bool(row["reference_f_max_hz"] * seconds >= TURNS_AT_TOP_SPEED)

@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from opamc_cli.config import load_config
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
+from opamc_cli.stages.recordings.identified import IdentifiedPart
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
+from opamc_cli.storage.sources import RunSource
 
 RATE_HZ = 2048.0
 OFFSETS_A = (0.2, -0.15, 0.07)
@@ -46,10 +49,9 @@ def test_the_offset_of_a_single_phase_is_its_mean(tmp_path):
         assert current_offset(run, 1, [(0, 8192)]).real == pytest.approx(0.2, abs=0.03)
 
 
-def test_a_vector_that_hardly_turns_keeps_its_mean(tmp_path):
+def test_the_offset_of_no_motion_is_none(tmp_path):
     write(tmp_path / "run.parquet")
     with Run(tmp_path / "run.parquet") as run:
-        assert current_offset(run, 1, [(0, 1000)]) == 0j
         assert current_offset(run, 1, []) == 0j
 
 
@@ -57,3 +59,23 @@ def test_the_mean_of_a_reported_current_is_torque(tmp_path):
     write(tmp_path / "run.parquet", reported=True)
     with Run(tmp_path / "run.parquet") as run:
         assert current_offset(run, 1, [(0, 8192)]) == 0j
+
+
+@pytest.mark.parametrize(("f_max_hz", "taken_off"), [(5.9, False), (6.1, True)])
+def test_a_motion_s_reference_tells_whether_its_offset_is_taken_off(tmp_path, f_max_hz, taken_off):
+    # 2 s, twelve turns at the highest frequency: one motion alone, or many of them
+    torque = write(tmp_path / "run.parquet")
+    for stops in ([4096], [4096, 8192]):
+        rows = [
+            {"kind": "motion", "start": stop - 4096, "stop": stop, "lag": 0}
+            | {"reference_samples": 4096, "reference_f_max_hz": f_max_hz}
+            | {"sampling_rate_hz": RATE_HZ}
+            for stop in stops
+        ]
+        with Run(tmp_path / "run.parquet") as run:
+            source = RunSource.of(run)
+        courses = IdentifiedPart(source, 1, tuple(rows)).courses(load_config().patterns)
+        error = max(
+            np.abs(course - torque[r["start"] : r["stop"]]).max() for r, course, _ in courses
+        )
+        assert (error < 0.1) == taken_off
