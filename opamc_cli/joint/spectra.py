@@ -31,11 +31,6 @@ def highest_order(track: Track) -> float:
     return NYQUIST_SHARE * np.pi / typical if typical > 0 else 0.0
 
 
-def order_resolution(track: Track) -> float:
-    """Smallest difference of orders that the travelled angle can tell apart."""
-    return float(2 * np.pi / np.ptp(track.machine_angle_rad[track.moving]))
-
-
 def highest_folded(track: Track) -> float:
     """Highest order that is looked for where the motion's changes of speed unfold it."""
     highest = highest_order(track)
@@ -87,7 +82,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     residual, (n,) at the full rate, is zero where samples do not count.
     """
     orders, power = order_spectrum(track, residual, highest_folded(track))
-    lowest = max(LOWEST_ORDER[track.angle_kind], 3 * order_resolution(track))
+    lowest = max(LOWEST_ORDER[track.angle_kind], 3 * track.order_resolution)
     first = int(np.searchsorted(orders, lowest))
     if orders.size - first < 8:
         return []
@@ -99,7 +94,7 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     # A sine that holds a share s of the power shows with half of s times the samples.
     threshold = 0.5 * LEAST_LINE * np.count_nonzero(residual)
     spacing = float(orders[1] - orders[0])
-    guard = max(int(1.5 * order_resolution(track) / spacing), OVERSAMPLING)
+    guard = max(int(1.5 * track.order_resolution / spacing), OVERSAMPLING)
     # What repeats with the motion lifts whole stretches of the spectrum: a line stands out.
     around = uniform_filter1d(power, 2 * SURROUNDINGS * guard + 1, mode="nearest")
     peaks: list[tuple[float, float]] = []

@@ -11,7 +11,6 @@ from opamc_cli.joint.spectra import (
     highest_order,
     line_power,
     order_lines,
-    order_resolution,
     order_spectrum,
     standing_views,
     vertex,
@@ -43,7 +42,7 @@ def test_the_highest_order_is_nine_tenths_of_two_samples_a_wave():
     assert highest_order(track) == pytest.approx(0.9 * np.pi / step)
     # 500 Hz: up to four times as high, where that is not above 500 Hz at the median speed
     assert highest_folded(track) == pytest.approx(500 / (0.45 * 500) * highest_order(track))
-    assert order_resolution(track) == pytest.approx(
+    assert track.order_resolution == pytest.approx(
         2 * np.pi / np.ptp(track.machine_angle_rad[track.moving])
     )
     still = replace(track, moving=np.zeros(track.size, dtype=bool))
@@ -65,9 +64,9 @@ def test_a_line_of_either_direction_alone_is_seen():
     _, track = track_of()
     wave = np.cos(7 * track.machine_angle_rad) * (track.direction > 0)
     peaks = order_lines(track, np.where(track.moving, wave, 0.0), 2)
-    assert peaks[0][0] == pytest.approx(7.0, abs=0.1 * order_resolution(track))
+    assert peaks[0][0] == pytest.approx(7.0, abs=0.1 * track.order_resolution)
     apart = [abs(a - b) for i, (a, _) in enumerate(peaks) for b, _ in peaks[:i]]
-    assert not apart or min(apart) >= 1.4 * order_resolution(track)
+    assert not apart or min(apart) >= 1.4 * track.order_resolution
 
 
 def test_the_vertex_of_a_parabola_lies_between_the_samples():

@@ -8,7 +8,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.motion.track import Floats, Ints, Track
-from opamc_cli.joint.spectra import highest_order, order_lines, order_resolution
+from opamc_cli.joint.spectra import highest_order, order_lines
 from opamc_cli.signal.transform.second_order import answers
 
 SWITCHES = ("speed", "direction", "load", "current")
@@ -75,7 +75,7 @@ class Ripple(Effect):
         if order > highest_order(track) or top_hz <= LOWEST_HZ:
             # Its frequency is not the one that the samples show, or nothing answers to it.
             return 0.0
-        turns = order / order_resolution(track)
+        turns = order / track.order_resolution
         for least, density in FILTERS_PER_OCTAVE.items():
             # With fewer turns than pairs of coefficients in each direction a wave takes the form
             # of any friction.
@@ -89,7 +89,7 @@ class Ripple(Effect):
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
         """Half of what two orders have to differ by."""
-        return {"order": 0.5 * order_resolution(track)}
+        return {"order": 0.5 * track.order_resolution}
 
     def is_constant(self, parameters: Parameters) -> bool:
         """Only the load's sign and the current follow the model."""
@@ -153,7 +153,7 @@ class Ripple(Effect):
         if track.angle_kind == "motor" and ratio:
             named += [2 * teeth / ratio * k for _, teeth in meshes(ratio) for k in range(1, 5)]
         nearest = min(named, key=lambda one: abs(one - order))
-        close = abs(nearest - order) < 0.25 * order_resolution(track)
+        close = abs(nearest - order) < 0.25 * track.order_resolution
         return parameters | {"order": nearest} if close else parameters
 
     def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
@@ -231,7 +231,7 @@ def order_ties(order: float, track: Track) -> list[str]:
     for (formula, teeth), k in product(meshes(ratio), (1, 2)):
         line = 2 * teeth / ratio * k
         lines.append((line, f"flexspline tooth damage ({formula}, order {line:.4g})"))
-    close = [line for line in lines if abs(line[0] - order) < order_resolution(track)]
+    close = [line for line in lines if abs(line[0] - order) < track.order_resolution]
     return [name for _, name in sorted(close, key=lambda line: abs(line[0] - order))[1:]]
 
 
@@ -260,7 +260,7 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
         )
         return OrderMeaning("unknown", f"unknown periodic source, {text}")
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
-    width = min(0.35 * order_resolution(track), 0.25)
+    width = min(0.35 * track.order_resolution, 0.25)
     if ratio:
         for harmonic, (formula, teeth) in product((1, 2), meshes(ratio)):
             tooth = 2 * teeth / ratio * harmonic

@@ -125,6 +125,11 @@ class Track:
         return float(np.ptp(self.position_rad[self.moving]))
 
     @cached_property
+    def order_resolution(self) -> float:
+        """Smallest difference of orders that the travelled angle can tell apart."""
+        return float(2 * np.pi / np.ptp(self.machine_angle_rad[self.moving]))
+
+    @cached_property
     def middle_temperature_c(self) -> float:
         """Mean temperature of the moving samples; 0 where none is logged."""
         if self.reference is not None and self.reference.temperature_c is not None:
@@ -204,8 +209,8 @@ class Track:
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
         new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
         # What follows from the motion alone stays, and is asked for at every step of a fit.
-        for name in ("speed_scale", "inertia_weights"):
-            new.__dict__[name] = getattr(self, name)
+        kept = {"speed_scale", "order_resolution", "inertia_weights"} & vars(self).keys()
+        new.__dict__.update({name: getattr(self, name) for name in kept})
         new.__dict__["laid"] = self.laid if laid is None else laid
         return new
 

@@ -44,12 +44,13 @@ class Batch:
 
 def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batch]:
     """Compute the regressors of guesses and their products, by width."""
-    parts = dataset.parts[0 if fine else 1]
-    current = (dataset.grid_of(fine).track.current_a)[parts.rows][:, None]
+    parts, track = dataset.parts[0 if fine else 1], dataset.grid_of(fine).track
+    current = track.current_a[parts.rows][:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        columns = term.columns(dataset.grid_of(fine).track, parts.rows)
-        alike.setdefault((columns.shape[1], term.effect.whole), []).append((term, columns))
+        met = term.effect.from_terms  # Many chains have the same static terms.
+        block = dataset.columns(term, fine) if met else term.columns(track, parts.rows)
+        alike.setdefault((block.shape[1], term.effect.whole), []).append((term, parts.taken(block)))
     batches = []
     for (width, _), members in alike.items():
         count = len(members)

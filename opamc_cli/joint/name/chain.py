@@ -90,7 +90,7 @@ class Chain:
             chain = without(chain, place)
         return chain
 
-    @property
+    @cached_property
     def _signs(self) -> list[bool]:
         pairs, grid = self._valued, self.fit.dataset.fine
         way, speed = np.unique(grid.track.direction[grid.fit]), np.abs(grid.track.velocity)

@@ -126,9 +126,8 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
         and not effect.untestable(dataset.coarse.track)
         for term in guessed(effect, dataset)
     ]
-    names = {effect.name for effect in free}
     guesses = slow.candidates((*pool.slow, *batches_of(dataset, following, fine=False)))
-    found = [candidate for candidate in guesses if candidate.term.effect.name in names]
+    found = [one for one in guesses if one.term.effect in free]
     among_fast = any(term.effect.fast for term in chain.fit.terms)
     fast = Beside(chain, fine=True) if among_fast or any(one.fast for one in free) else slow
     if among_fast:
@@ -173,8 +172,7 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
     Chains that are `known` are not tried again; new ones are added.
     """
     tried = set() if known is None else known
-    ordered = [[candidate.term] for candidate in candidates(chain, pool)]
-    ordered = [forms for forms in ordered if not forms[0].effect.follows_load]
+    ordered = [[one.term] for one in candidates(chain, pool) if not one.term.effect.follows_load]
     found = []
     for forms in (*ordered, *_by_load(chain, pool)):
         track = chain.fit.dataset.fine.track

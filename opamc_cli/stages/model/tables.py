@@ -16,7 +16,7 @@ from opamc_cli.joint.loop import Loop, Step
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Tried
-from opamc_cli.joint.spectra import highest_order, order_resolution, order_spectrum
+from opamc_cli.joint.spectra import highest_order, order_spectrum
 from opamc_cli.signal.transform.least_squares import root_of
 from opamc_cli.stages.model.axis_model import AxisModel
 from opamc_cli.storage.schemas.tables import ORDER_SPECTRUM, RESIDUALS
@@ -174,7 +174,7 @@ def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, An
         ties += order_ties(order, track)
         for other in others:
             near = other.term.parameters.get("order")
-            if other is not step and near and abs(near - order) < order_resolution(track):
+            if other is not step and near and abs(near - order) < track.order_resolution:
                 ties.append(f"ripple of order {near:.5g}")
     return {
         "effect": step.term.effect.name,
@@ -259,7 +259,7 @@ def _orders(track: Track) -> str:
     """Say what the recordings can tell of orders."""
     return (
         f"orders count per {track.angle_kind} revolution; orders closer than "
-        f"{order_resolution(track):.3g} cannot be told apart, and above "
+        f"{track.order_resolution:.3g} cannot be told apart, and above "
         f"{highest_order(track):.4g} they fold at the median speed"
     )
 

@@ -14,7 +14,6 @@ from opamc_cli.joint.effects.ripple import Ripple, order_ties, read_order
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import build_track
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.joint.spectra import order_resolution
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
 ANSWERED = EVERYTHING | {"answer": 2.0, "top_hz": 60.0}
@@ -113,7 +112,7 @@ def test_lines_of_healthy_gears_are_called_so_without_a_comparison(order):
 
 def test_orders_closer_than_the_resolution_are_tied():
     _, track = track_of(Joint(100.0, 5))
-    width = order_resolution(track)
+    width = track.order_resolution
     tied = order_ties(2.02, track)
     assert any("kinematic error (order 2)" in name for name in tied) == (width > 0.02)
     assert order_ties(3.3, track) == []

@@ -23,7 +23,6 @@ from opamc_cli.joint.name.chain import (
     signature_of,
     without,
 )
-from opamc_cli.joint.spectra import order_resolution
 
 LIBRARY = built_in_library()
 CHARGE = 0.02
@@ -232,7 +231,7 @@ def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
 def test_lines_are_the_same_where_the_travel_cannot_tell_them_apart(chain):
     """Two digits made one line of 320 and 322 per turn: the second was never tried."""
     track = chain.fit.dataset.fine.track
-    apart = order_resolution(track)
+    apart = track.order_resolution
 
     def line(order, **flags):
         return signature_of((Term(LIBRARY["ripple"], {"order": order, **flags}),), track)
