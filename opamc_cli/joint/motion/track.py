@@ -209,8 +209,8 @@ class Track:
         load_a, model_a = self.own_means(load_a), self.own_means(model_a)
         new = replace(self, load_a=load_a, model_a=model_a, static_terms=static_terms, full=full)
         # What follows from the motion alone stays, and is asked for at every step of a fit.
-        kept = {"speed_scale", "order_resolution", "inertia_weights"} & vars(self).keys()
-        new.__dict__.update({name: getattr(self, name) for name in kept})
+        for name in ("speed_scale", "inertia_weights", *{"order_resolution"} & vars(self).keys()):
+            new.__dict__[name] = getattr(self, name)
         new.__dict__["laid"] = self.laid if laid is None else laid
         return new
 

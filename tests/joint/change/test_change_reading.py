@@ -14,8 +14,7 @@ def track_of(kind="motor", ratio=100.0, poles=5, *channels):
     return SimpleNamespace(
         angle_kind=kind,
         joint=Joint(ratio, poles),
-        machine_angle_rad=np.linspace(0, 400.0, 50),
-        moving=np.ones(50, dtype=bool),
+        order_resolution=2 * np.pi / 400.0,
         channels=frozenset(channels),
     )
 
