@@ -62,6 +62,14 @@ def test_values_that_cannot_be_meant_are_refused(override):
         load_config(None, [override])
 
 
+@pytest.mark.parametrize("key", ["joint.gear_ratio", "joint.pole_pairs", "patterns.tau"])
+def test_a_number_is_not_yes_or_no(key):
+    """It would count as 1."""
+    with pytest.raises(ConfigError, match=rf"^--set: {key}: it cannot be yes or no"):
+        load_config(None, [f"{key}=true"])
+    assert load_config(None, ["joint.explain=false"]).joint.explain is False
+
+
 @pytest.mark.parametrize(
     "rule",
     ["alarm: {gross: 90}", "alarm: {of: 1000}", "set: {score.false_alarm_rate: 1.0e-300}"],
