@@ -228,7 +228,7 @@ def order_ties(order: float, track: Track) -> list[str]:
     if track.angle_kind != "motor" or not ratio:
         return []
     lines = [(float(k), f"kinematic error (order {k})") for k in (2, 4)]
-    for (formula, teeth), k in product(meshes(ratio), (1, 2)):
+    for (formula, teeth), k in product(meshes(ratio), (1, 2, 3)):
         line = 2 * teeth / ratio * k
         lines.append((line, f"flexspline tooth damage ({formula}, order {line:.4g})"))
     close = [line for line in lines if abs(line[0] - order) < track.order_resolution]
@@ -252,17 +252,15 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
     Many healthy gears have one of the gear's lines: where it was not `compared` with an earlier
     recording nothing is to be inspected.
     """
+    unknown = f"unknown periodic source, order {order:.5g} per {track.angle_kind} revolution"
     if track.angle_kind != "motor":
         lacking = "gear ratio" if track.angle_kind == "joint" else "pole pairs"
-        text = (
-            f"order {order:.5g} per {track.angle_kind} revolution ({lacking} unknown, so it cannot "
-            "be counted per motor revolution)"
-        )
-        return OrderMeaning("unknown", f"unknown periodic source, {text}")
+        unknown += f" ({lacking} unknown, so it cannot be counted per motor revolution)"
+        return OrderMeaning("unknown", unknown)
     ratio, poles = track.joint.gear_ratio, track.joint.pole_pairs
     width = min(0.35 * track.order_resolution, 0.25)
     if ratio:
-        for harmonic, (formula, teeth) in product((1, 2), meshes(ratio)):
+        for harmonic, (formula, teeth) in product((1, 2, 3), meshes(ratio)):
             tooth = 2 * teeth / ratio * harmonic
             damage = (
                 f"flexspline tooth damage ({formula}): inspect the flexspline"
@@ -296,5 +294,4 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
     for meant, kind, text in known:
         if abs(order - meant) < width:
             return OrderMeaning(kind, text)
-    unknown = f"unknown periodic source, order {order:.5g} per motor revolution"
     return OrderMeaning("unknown", unknown)

@@ -78,6 +78,7 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
         (2.02, "flexspline tooth damage (2(N+1)/N)"),
         (1.98, "flexspline tooth damage (2(N-1)/N)"),
         (4.0, "kinematic error, four"),
+        (6.06, "flexspline tooth damage (2(N+1)/N)"),
         (5.0, "electrical, 1p"),
         (30.0, "electrical, 6p"),
         (60.0, "cogging of 12 slots"),
