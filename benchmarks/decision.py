@@ -39,7 +39,7 @@ from opamc_cli.stages.chain import patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import WITNESSES
-from opamc_cli.stages.recordings.identified import aligned_span
+from opamc_cli.stages.recordings.identified import aligned_span, turning_spans
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
@@ -153,7 +153,7 @@ def rival_rows(recordings: dict, motions: list[dict]) -> dict:
         vector = clarke(*recordings[name].axes[axis].phases_a.T.astype(np.float64))
         spans = [aligned_span(row) for row in rows]
         # as the stage `patterns` does
-        vector = vector - mean_over_motions(vector[a:b] for a, b in spans)
+        vector = vector - mean_over_motions(vector[a:b] for a, b in turning_spans(rows))
         envelope = np.abs(vector)
         # The square's angle does not jump where the torque changes its sign: half of it is the
         # carrier's, and the vector turned back by it is the torque current with its sign.

@@ -7,16 +7,17 @@ import hashlib
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self, get_args
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import (
     BaseModel,
     ConfigDict,
     Field,
-    ValidationInfo,
+    ValidatorFunctionWrapHandler,
     field_validator,
     model_validator,
 )
+from pydantic_core import PydanticKnownError
 
 Positive = Annotated[float, Field(gt=0, le=1e15, allow_inf_nan=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
@@ -33,15 +34,15 @@ class Section(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    @field_validator("*", mode="before")
+    @field_validator("*", mode="wrap")
     @classmethod
-    def _is_no_switch(cls, value: Any, info: ValidationInfo) -> Any:
+    def _is_no_switch(cls, value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
         """Refuse `yes` where a number is asked: it would count as 1."""
-        kind = cls.model_fields[str(info.field_name)].annotation
-        if isinstance(value, bool) and bool not in {kind, *get_args(kind)}:
-            msg = "it cannot be yes or no"
-            raise ValueError(msg)
-        return value
+        taken = handler(value)
+        if isinstance(value, bool) and not isinstance(taken, bool):
+            asked: Literal["float_type"] = "float_type"
+            raise PydanticKnownError(asked)
+        return taken
 
 
 class JointConfig(Section):

@@ -65,7 +65,7 @@ def test_values_that_cannot_be_meant_are_refused(override):
 @pytest.mark.parametrize("key", ["joint.gear_ratio", "joint.pole_pairs", "patterns.tau"])
 def test_a_number_is_not_yes_or_no(key):
     """It would count as 1."""
-    with pytest.raises(ConfigError, match=rf"^--set: {key}: it cannot be yes or no"):
+    with pytest.raises(ConfigError, match=rf"^--set: {key} is True; it takes a number"):
         load_config(None, [f"{key}=true"])
     assert load_config(None, ["joint.explain=false"]).joint.explain is False
 

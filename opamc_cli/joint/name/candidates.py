@@ -48,8 +48,8 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     current = track.current_a[parts.rows][:, None]
     alike: dict[tuple[int, bool], list[tuple[Term, Floats]]] = {}
     for term in terms:
-        met = term.effect.from_terms  # Many chains have the same static terms.
-        block = dataset.columns(term, fine) if met else term.columns(track, parts.rows)
+        shared = term.effect.from_terms  # Many chains have the same static terms.
+        block = dataset.columns(term, fine) if shared else term.columns(track, parts.rows)
         alike.setdefault((block.shape[1], term.effect.whole), []).append((term, parts.taken(block)))
     batches = []
     for (width, _), members in alike.items():

@@ -43,10 +43,7 @@ class IdentifiedPart:
         with self.source.open() as run:
             offset = 0j
             if config.remove_offset:
-                often = [
-                    span for row, span in zip(self.rows, spans, strict=True) if turns_often(row)
-                ]
-                offset = current_offset(run, self.axis, often, config.envelope)
+                offset = current_offset(run, self.axis, turning_spans(self.rows), config.envelope)
             for row, (start, stop) in zip(self.rows, spans, strict=True):
                 current = read_course(run, self.axis, start, stop, config.envelope, offset)
                 # a current without bound is a fault of the logger, not a rank
@@ -87,10 +84,14 @@ def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
     return start, start + row["reference_samples"]
 
 
-def turns_often(row: dict[str, Any]) -> bool:
-    """Whether the current vector turns often enough in a segment for its mean to be an offset.
+def turning_spans(rows: Sequence[dict[str, Any]]) -> list[tuple[int, int]]:
+    """Return the segments in which the current vector turns so often that its mean is an offset.
 
     The reference segment tells, so that all recordings that are compared agree.
     """
-    seconds = row["reference_samples"] / row["sampling_rate_hz"]
-    return bool(row["reference_f_max_hz"] * seconds >= TURNS_AT_TOP_SPEED)
+    return [
+        aligned_span(row)
+        for row in rows
+        if row["reference_f_max_hz"] * row["reference_samples"]
+        >= TURNS_AT_TOP_SPEED * row["sampling_rate_hz"]
+    ]
