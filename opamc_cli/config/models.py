@@ -39,10 +39,19 @@ class Section(BaseModel):
     def _is_no_switch(cls, value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
         """Refuse `yes` where a number is asked: it would count as 1."""
         taken = handler(value)
-        if isinstance(value, bool) and not isinstance(taken, bool):
+        if _counts_as_number(value, taken):
             asked: Literal["float_type"] = "float_type"
             raise PydanticKnownError(asked)
         return taken
+
+
+def _counts_as_number(value: Any, taken: Any) -> bool:
+    """Tell whether a yes or no was taken for a number, by itself or among others."""
+    if isinstance(value, dict) and isinstance(taken, dict):
+        return any(_counts_as_number(one, taken.get(name)) for name, one in value.items())
+    if isinstance(value, list) and isinstance(taken, tuple):
+        return any(map(_counts_as_number, value, taken))
+    return isinstance(value, bool) and isinstance(taken, int | float) and taken is not value
 
 
 class JointConfig(Section):

@@ -8,6 +8,7 @@ from pydantic import BaseModel
 
 from opamc_cli.config import Config, load_config
 from opamc_cli.config.cell import load_cell
+from opamc_cli.config.joint_model import load_joint_model
 from opamc_cli.config.yaml.document import to_yaml
 from opamc_cli.errors import ConfigError
 
@@ -68,6 +69,14 @@ def test_a_number_is_not_yes_or_no(key):
     with pytest.raises(ConfigError, match=rf"^--set: {key} is True; it takes a number"):
         load_config(None, [f"{key}=true"])
     assert load_config(None, ["joint.explain=false"]).joint.explain is False
+
+
+@pytest.mark.parametrize("entry", ["parameters: {order: yes}", "coefficients: [0.1, yes]"])
+def test_a_number_among_others_is_not_yes_or_no(tmp_path, entry):
+    model = tmp_path / "model.yaml"
+    model.write_text(f"effects: [{{effect: ripple, {entry}}}]\n")
+    with pytest.raises(ConfigError, match="takes a number"):
+        load_joint_model(model)
 
 
 @pytest.mark.parametrize(

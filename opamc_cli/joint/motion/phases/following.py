@@ -102,8 +102,8 @@ def _followed(
 def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     """Follow the current vector's angle, modulo pi, through zeros and reversals of the current.
 
-    Phase currents, (n, 3), are finite and more than 16; the electrical frequency lies below a
-    quarter of the rate.
+    Phase currents, (n, 3), are finite and more than 16; the electrical frequency lies 15 Hz below
+    half the rate.
     """
     bandwidth = widest_bandwidth(rate_hz)
     vector = current_vector(phases_a)

@@ -33,8 +33,7 @@ def rows(
     """Return the spectrum of a segment's course; none if it is too short for any.
 
     A reported current keeps its sign: its size has a corner wherever it passes zero, which moves
-    with friction and fills all bins. Of 80 virtual joints with a quarter of full damage 0.58 are
-    found so, 0.24 by the size.
+    with friction and fills all bins (docs/decision.md has what each finds).
     """
     if not config.frames:
         return []
