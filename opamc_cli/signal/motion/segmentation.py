@@ -33,8 +33,8 @@ class MotionRule:
     """Motion begins where S(t) reaches `on` and lasts while it stays above `off`; 0..1."""
     min_motion_s: float = 0.1
     min_still_s: float = 0.06
-    """With `min_motion_s`: shorter motions are dropped; shorter standstills belong to the motion
-    around them, s."""
+    """With `min_motion_s`: a shorter turn the other way is none; shorter standstills belong to the
+    motion around them, s."""
     max_dip_s: float = 2.0
     """Longest dip of S(t) inside one motion that is bridged because the carrier is as fast after it
     as before it, s."""
@@ -153,8 +153,6 @@ def find_motions(evidence: Evidence, rule: MotionRule) -> list[Motion]:
                 joined.append(lobe)
     motions = []
     for first, last in joined:
-        if (last - first) * evidence.frame_s < rule.min_motion_s:
-            continue
         f_last_hz = float(evidence.frames.ridge_hz[last - 1])
         # A few percent less, or noise would put it anywhere in a cruise at constant speed.
         as_fast = clear[first:last] & (ridge_hz(first, last) >= 0.95 * f_last_hz)

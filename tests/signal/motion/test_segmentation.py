@@ -308,8 +308,10 @@ def found_in(*parts, **options):
     return [(m.first - 20, m.last - 20, m.direction) for m in motions]
 
 
-def test_a_tenth_of_a_second_is_a_motion():
-    assert found_in((9, *MOVES)) == []
+def test_three_clear_frames_are_a_motion():
+    """How long it really lasts is told by its boundaries, not by its wavelets."""
+    assert found_in((2, *MOVES)) == []
+    assert found_in((3, *MOVES)) == [(0, 3, 1)]
     assert found_in((10, *MOVES)) == [(0, 10, 1)]
     assert found_in((10, *BACK)) == [(0, 10, -1)]
     assert found_in((10, *BACK), has_direction=False) == [(0, 10, 0)]

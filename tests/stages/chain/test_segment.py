@@ -62,6 +62,26 @@ def test_rows_hold_what_the_moves_were(tmp_path, two_axes):
         assert row["temperature_c"] is None
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_short_moves_are_found_every_time(tmp_path, seed):
+    """Five turns of the current in a quarter of a second: its wavelets see half of that."""
+    stroke = [Move(40, k, ramp_s=0.12, cruise_s=0.01, rest_s=0.35) for k in (1, -1, -1, 1)]
+    values, recording = columns(moves=stroke * 3, seed=seed)
+    rows = run_stage(tmp_path, save(tmp_path / "a.parquet", values)).table.to_pylist()
+    assert [r["direction"] for r in rows] == [move.direction for move in stroke * 3]
+    for row, (start, stop) in zip(rows, recording.intervals, strict=True):
+        # a jerk-limited ramp of 0.12 s has turned by a hundredth in its first third
+        assert start - 30 < row["start"] < start + 140
+        assert stop - 140 < row["stop"] < stop + 30
+
+
+def test_moves_shorter_than_asked_are_dropped(tmp_path):
+    values, _ = columns(moves=[*MOVES, Move(157, 1, ramp_s=0.04, cruise_s=0.05)])
+    path = save(tmp_path / "a.parquet", values)
+    assert run_stage(tmp_path, path).table.num_rows == 5
+    assert run_stage(tmp_path, path, min_motion_s=0.3).table.num_rows == 4
+
+
 @pytest.mark.long
 def test_result_does_not_depend_on_jobs_or_row_groups(tmp_path, two_axes):
     path, _ = two_axes

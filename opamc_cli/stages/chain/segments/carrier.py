@@ -106,7 +106,7 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
     if _never_stands(motions, evidence):
         segments = _windows(run, names, evidence, motions[0], config)
     else:
-        segments = _refined(run, names, motions, evidence, probe.offset_a)
+        segments = _refined(run, names, motions, evidence, probe.offset_a, config.min_motion_s)
     signal = "phases" if len(names) == 3 else "phase"
     strongest = float(evidence.frames.strength.max(initial=0))
     return AxisSegments(
@@ -323,10 +323,12 @@ def _refined(
     motions: Sequence[Motion],
     evidence: Evidence,
     offset_a: complex,
+    min_motion_s: float,
 ) -> list[Segment]:
     """Place each motion's boundaries between it and its neighbours to the sample."""
     step = evidence.frames.step
     context = round(CONTEXT_S * run.sampling_rate_hz)
+    shortest = min_motion_s * run.sampling_rate_hz
     segments = []
     for i, motion in enumerate(motions):
         start, stop = motion.first * step, min(run.n_samples, motion.last * step)
@@ -348,6 +350,8 @@ def _refined(
             evidence.noise_a,
             motion.n_to_f_last * step if lost_at_speed else None,
         )
+        if refined[1] - refined[0] < shortest:
+            continue
         segments.append(
             Segment(
                 first + refined[0],
