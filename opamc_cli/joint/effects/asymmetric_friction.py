@@ -12,7 +12,7 @@ class AsymmetricFriction(Effect):
     name = "asymmetric_friction"
     domain = "velocity"
     per = ("", "rad/s")
-    meaning = "friction differs between directions: check bearing preload and seal lips"
+    meaning = "friction that differs between directions: check bearing preload and seal lips"
     from_motion = True
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

@@ -18,7 +18,7 @@ class DeadTime(Effect):
     domain = "electrical"
     per = ("",)
     origin = "measurement"
-    meaning = "dead time of the inverter is not compensated: check the drive's setting"
+    meaning = "uncompensated dead time of the inverter: check the drive's setting"
     needs = ("electrical",)
     forms = ("whole",)
     fast = True

@@ -20,7 +20,7 @@ class Elasticity(Effect):
     domain = "acceleration"
     per = ("rad/s²",)
     searches = ("resonance_hz", "damping")
-    meaning = "the joint winds up and rings: check flexspline stiffness, bolts and the belt"
+    meaning = "winding up and ringing of the joint: check flexspline stiffness, bolts and the belt"
     as_smoothing = True
     needs = ("position", "logged")
     from_motion = True

@@ -19,7 +19,7 @@ class Hysteresis(Effect):
     domain = "joint-angle"
     per = ("",)
     searches = ("length_rad",)
-    meaning = "torque lags behind after reversals: check gear preload and backlash"
+    meaning = "torque that lags behind after reversals: check gear preload and backlash"
     resists = True
     from_motion = True
 

@@ -16,7 +16,7 @@ class LoadFriction(Effect):
 
     name = "load_friction"
     domain = "load"
-    meaning = "meshing losses grow with load: check the gear's lubrication and wear"
+    meaning = "meshing losses that grow with load: check the gear's lubrication and wear"
     resists = True
     searches = ("inertia_share", "exponent")
     follows_load = True

@@ -25,7 +25,7 @@ class PayloadChange(Effect):
     origin = "load"
     changes_in_time = True
     searches = ("since_s", "gripped_s", "released_s")
-    meaning = "the payload has changed: check the tool, not the gear"
+    meaning = "another payload: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
 

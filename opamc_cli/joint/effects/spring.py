@@ -12,7 +12,7 @@ class Spring(Effect):
     name = "spring"
     domain = "joint-angle"
     per = ("rad", "")
-    meaning = "a force grows with the angle: check balancing spring and cable package"
+    meaning = "a force that grows with the angle: check balancing spring and cable package"
     from_motion = True
     carries_load = True
 

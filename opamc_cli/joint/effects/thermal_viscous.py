@@ -17,7 +17,7 @@ class ThermalViscous(Effect):
     origin = "environment"
     changes_in_time = True
     searches = ("rate_per_c",)
-    meaning = "grease is stiffer when cold: not a fault"
+    meaning = "grease that is stiffer when cold: not a fault"
     needs = ("position", "temperature")
     resists = True
     from_motion = True

@@ -21,7 +21,7 @@ class TimeDelay(Effect):
     origin = "measurement"
     searches = ("delay_s",)
     forms = ("filtered",)
-    meaning = "current and motion are logged with a delay: check the logger's clocks"
+    meaning = "a delay between current and motion as logged: check the logger's clocks"
     as_smoothing = True
     needs = ("position", "logged")
     static = False

@@ -16,7 +16,7 @@ class Warmup(Effect):
     origin = "environment"
     changes_in_time = True
     searches = ("time_constant_s",)
-    meaning = "friction falls while the joint warms up: not a fault"
+    meaning = "friction that falls while the joint warms up: not a fault"
     needs = ("position", "revisits")
     from_motion = True
 

@@ -221,12 +221,15 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
     share, t_value = child.gain_over(parent)
     effect = child.terms[-1].effect
-    error = 0.0 if effect.unnamed else share / max(t_value, 1.0)  # Those claim nothing.
+    error = 0.0 if effect.unnamed else abs(share) / max(abs(t_value), 1.0)
     # What one effect leaves, beside a motion that the same phases tell, is no other one.
     followed = "logged" not in child.fit.dataset.fine.track.channels
     beside = followed and any(not term.effect.unnamed for term in parent.terms)
     if share - (LEAST_T if beside else 1.0) * error < (least := pool.least_share):
-        return f"takes {share:.1%} ± {error:.1%} off the held-out error, {least:.0%} is asked"
+        return (
+            f"takes {share:.1%} ± {error:.1%} off the held-out error; {least:.0%} is asked "
+            "beyond that doubt"
+        )
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     drifts = effect.changes_in_time and "drift" not in pool.without

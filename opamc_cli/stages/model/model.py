@@ -13,6 +13,7 @@ from opamc_cli.config.yaml.values import yaml_of
 from opamc_cli.errors import UsageError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.intervals import certainty, drag_t
+from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop, untestable
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.search import Pool, trials
@@ -38,11 +39,21 @@ from opamc_cli.storage.schemas.tables import CANDIDATES, FIT
 from opamc_cli.storage.tables import write_table
 
 Entry = dict[str, Any]
-LIKE_ANOTHER_JOINT = {"position_drag", "hysteresis", "time_delay"}
-"""What gravity on the sum of two joints' angles was called where the second was not logged."""
+LIKE_ANOTHER_JOINT = {
+    "hysteresis", "payload_change", "position_drag", "quadratic_friction", "ripple", "spring",
+    "stribeck", "time_delay",
+}  # fmt: skip
+"""What the motion of other joints was called where they were not logged: 12 of 18 such programs of
+three arms whose joints all move."""
+LEAST_RATIO = 30.0
+"""Of strain wave gears, where none is given."""
 ALONE = (
     "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
     "like {}; log it beside to tell"
+)
+ONE_PROGRAM = (
+    "axis {}: which of the other joints load it, and what of that is an effect of its own, one "
+    "program does not tell for certain; close it on several programs at once"
 )
 OF_THE_PLACE = {
     "gravity", "hysteresis", "load_friction", "payload_change", "position_drag", "ripple", "spring",
@@ -250,8 +261,12 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         if resists and values[0] < -DRIVEN_T * errors[0]:
             doubts.append(DRIVES.format(axis, term.effect.name))
     named = sorted(found & LIKE_ANOTHER_JOINT)
-    if named and "coupling" in loop.untestable:
-        laid.notes.append(ALONE.format(axis, " and ".join(named)))
+    if named and not any(one.others_rad for one in laid.read.recordings):
+        ratio = LEAST_RATIO if model.joint.gear_ratio is None else 1.0
+        unlikely = any(_of_the_program(step.term, ratio) for step in loop.steps)
+        (doubts if unlikely else laid.notes).append(ALONE.format(axis, ", ".join(named)))
+    if "coupling" in found and len(runs) == 1:
+        laid.notes.append(ONE_PROGRAM.format(axis))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
         doubts += [note for run in runs for note in scaled(run, axis, by_name[run.name])]
@@ -269,6 +284,17 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         spectrum=spectrum_table(axis, loop),
         extended=extended_model(model, laid, loop),
     )
+
+
+def _of_the_program(term: Term, ratio: float) -> bool:
+    """Tell whether a name follows the program as another joint would, and no gear does.
+
+    A payload that is held in a part of every cycle, or a line slower than the motor turns, where a
+    joint's own are one to its turn or two.
+    """
+    if term.effect.name == "payload_change":
+        return "gripped_s" in term.parameters
+    return term.effect.name == "ripple" and term.parameters["order"] < ratio
 
 
 def _write(

@@ -337,8 +337,26 @@ def unreliable(entry: Mapping[str, Any]) -> list[str]:
     entry
         One object of loop.json's `axes`.
     """
-    reasons = entry.get("fails"), _sealed_apart(entry), _unconfirmed(entry)
+    reasons = entry.get("fails"), _sealed_apart(entry), far_from_noise(entry), _unconfirmed(entry)
     return [why for why in reasons if why]
+
+
+def far_from_noise(entry: Mapping[str, Any]) -> str | None:
+    """Return that a loop which is called closed leaves far more than noise, where it does.
+
+    Parameters
+    ----------
+    entry
+        One object of loop.json's `axes`.
+    """
+    noise, left = entry.get("noise_a"), (entry.get("after") or {}).get("rmse_a")
+    if entry.get("verdict") != "closed" or not noise or not left or left <= FAR_ABOVE_NOISE * noise:
+        return None
+    unit = entry.get("unit", "A")
+    return (
+        f"{left / noise:.0f} times the noise between samples ({noise:.2g} {unit}) are left, which "
+        "nothing here explains"
+    )
 
 
 def _unconfirmed(entry: Mapping[str, Any]) -> str | None:
