@@ -9,6 +9,9 @@ SAME_PROGRAM = 0.05
 """Relative difference of durations and speeds below which a cycle is another one's motion, whatever
 it draws. Of half of its segments: the edges of short ones move with the current."""
 
+SAME_PLACE = 0.02
+"""Of the range of a cycle, within which a motion starts and stops at the same place."""
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -27,11 +30,31 @@ class SegmentFeatures:
     """-1, 0 (unknown) or 1."""
     pause_s: Floats
     """Standstill before the segment, s; NaN where the recording starts too late to know."""
+    places_rad: Floats | None = None
+    """Where the joint is at each one's start and stop, (n, 2), rad; NaN where not known, None where
+    no position is logged."""
 
     @property
     def way(self) -> Floats:
         """How far each segment goes at most, in turns of its carrier: speed times length."""
         return self.f_max_hz * self.duration_s
+
+    def at_places_of(self, others: "SegmentFeatures") -> npt.NDArray[np.bool_]:
+        """Tell which segments lead from where to where others of a cycle do; (n, m).
+
+        So does whatever is not known to lead elsewhere.
+        """
+        if self.places_rad is None or others.places_rad is None:
+            return np.ones((len(self), len(others)), dtype=bool)
+        away = np.abs(self.places_rad[:, np.newaxis] - others.places_rad).max(axis=2)
+        return np.asarray(~(away > SAME_PLACE * others.range_rad))
+
+    @property
+    def range_rad(self) -> float:
+        """How far apart the places are that are known; 0 if none is."""
+        known = np.zeros(0) if self.places_rad is None else self.places_rad
+        known = known[np.isfinite(known)]
+        return float(np.ptp(known)) if known.size else 0.0
 
     def __len__(self) -> int:
         """Return the number of segments."""
@@ -49,6 +72,7 @@ class SegmentFeatures:
             self.f_max_hz[indices],
             self.direction[indices],
             self.pause_s[indices],
+            None if self.places_rad is None else self.places_rad[indices],
         )
 
 

@@ -59,7 +59,8 @@ def identify(
 
     Variances are positive, so two cycles of alike motions are similar at every shift. A window
     is therefore a cycle only if each of its segments also agrees with its reference in
-    duration, f_d,max and direction. A window may lack a small segment of the reference, or have one
+    duration, f_d,max and direction, and leads from the same place to the same place, where they are
+    known. A window may lack a small segment of the reference, or have one
     more between its motions (`opamc_cli.signal.cycles.alignment`), and is compared without. Of the
     windows that pass, the most that do not overlap are taken, among equally many those with the
     most motions, then those of the largest similarity. What fits nothing stays unidentified.
@@ -137,6 +138,7 @@ def _windows(reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchR
         agree &= difference <= tolerance * want
         if rule.middle_tolerance is not None:
             beyond.append(difference - rule.middle_tolerance * want)
+    agree &= segments.at_places_of(reference)
     if rule.use_direction:
         agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
     extra, optional = small(segments, reference), small(reference, reference)

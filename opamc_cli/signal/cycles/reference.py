@@ -6,6 +6,9 @@ from opamc_cli.signal.cycles.alignment import small
 from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify
 
+MOSTLY = 0.9
+"""Share of the pairs of segments that are at the same places where a shift repeats a series."""
+
 REPEATED = 2.0
 """Squared distance of segments, in their spreads, within which a shift repeats a series: of the
 true shift it is below 0.01 in a noisy closed loop and up to 1.7 in a joint of the testbed that
@@ -107,6 +110,10 @@ def period(segments: SegmentFeatures) -> int:
     distance = np.array(
         [np.median(((features[k:] - features[:-k]) ** 2).sum(axis=1)) for k in range(1, m)]
     )
+    if segments.places_rad is not None:
+        same = segments.at_places_of(segments)
+        elsewhere = [np.mean(np.diagonal(same, -k)) < MOSTLY for k in range(1, m)]
+        distance[np.array(elsewhere)] = np.inf
     by_half, beyond = distance[: m // 2], distance[m // 2 : -1]
     if by_half.min() <= REPEATED:
         return 1 + int(np.argmax(by_half <= max(4.0 * float(by_half.min()), 0.5)))

@@ -18,7 +18,7 @@ from opamc_cli.signal.align import align
 from opamc_cli.signal.cycles.alignment import small
 from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
-from opamc_cli.signal.cycles.reference import find_reference
+from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.stages.chain.compared.speeds import (
     OTHER_SPEEDS,
@@ -44,6 +44,11 @@ REPEATS = 0.75
 
 MOST_HELD = 16
 """Recordings that a cycle is looked for in."""
+
+AT_PLACES = 0.5
+"""Of the segments that are told wherever they lead, which have to lead to their places: of a long
+cycle, such as a pallet's, both ends of a recording hold a part. Else the program goes elsewhere
+each time, as one does that a camera guides."""
 
 SAME_DURATION = 0.1
 """Relative difference of the durations of motions at the edges of recordings that begin and end
@@ -159,14 +164,14 @@ def run(
     sources = {source.name: source for source in read_sources(segments, moved_to)}
     rule = match_rule(config.identify)
     parts = [p for p in _parts(table, sources) if (p.source.name, p.axis) not in without]
+    parts = _with_places(parts, jobs, kept)
     if reference is not None:
-        references = _given_references(reference, moved_to)
+        references = _given_references(reference, moved_to, jobs, kept)
     else:
+        chosen = (segments, parts, rule, config.identify, reference_run)
         references = {
             axis: _with_carrier(found, axis, config)
-            for axis, found in _own_references(
-                segments, parts, rule, config.identify, reference_run
-            ).items()
+            for axis, found in _references_of_places(*chosen).items()
         }
     work = [
         _Job(
@@ -296,6 +301,38 @@ def _column(rows: pa.Table, name: str) -> npt.NDArray[Any]:
 def _whole(part: _Axis) -> npt.NDArray[np.int64]:
     """Return the indices of the segments that no edge of the recording has cut."""
     return np.flatnonzero(~_column(part.rows, "edge").astype(bool))
+
+
+def _references_of_places(
+    path: Path,
+    parts: Sequence[_Axis],
+    rule: MatchRule,
+    config: IdentifyConfig,
+    reference_run: str | None,
+) -> dict[int, _Reference]:
+    """Find reference cycles whose motions lead to their places, but where the program's do not."""
+    anywhere = [_anywhere(part) for part in parts]
+    loose = _own_references(path, anywhere, rule, config, reference_run)
+    if all(part.features.places_rad is None for part in parts):
+        return loose
+    strict = _own_references(path, parts, rule, config, reference_run)
+    for axis, reference in loose.items():
+        known, kept = (
+            sum(_told(part, one, rule) for part in own if part.axis == axis)
+            for own, one in ((anywhere, reference), (parts, strict[axis]))
+        )
+        if kept >= AT_PLACES * known:
+            loose[axis] = strict[axis]
+    return loose
+
+
+def _anywhere(part: _Axis) -> _Axis:
+    return replace(part, features=replace(part.features, places_rad=None))
+
+
+def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> int:
+    own = part.features.take(_usable(part, reference))
+    return int(np.count_nonzero(identify_anywhere(reference.features, own, rule).motion >= 0))
 
 
 def _own_references(
@@ -434,7 +471,9 @@ def _with_carrier(reference: _Reference, axis: int, config: Config) -> _Referenc
     return replace(reference, carrier_hz=np.full(len(found), float(np.median(found))))
 
 
-def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Reference]:
+def _given_references(
+    path: Path, moved_to: Sequence[Path], jobs: int, kept: KeptResults | None
+) -> dict[int, _Reference]:
     """Take the reference cycles of a motion table."""
     table = read_table(path, "identify", MOTIONS)
     sources = {source.name: source for source in read_sources(path, moved_to)}
@@ -445,16 +484,51 @@ def _given_references(path: Path, moved_to: Sequence[Path]) -> dict[int, _Refere
             "the baseline, or set identify.segments_per_cycle"
         )
         raise NotEnoughDataError(msg)
-    return {
-        part.axis: _Reference(
+    held = set(zip(rows["run"].to_pylist(), rows["axis"].to_pylist(), strict=True))
+    own = [part for part in _parts(table, sources) if (part.source.name, part.axis) in held]
+    references = {}
+    for part in _with_places(own, jobs, kept):
+        which = np.flatnonzero(_column(part.rows, "reference"))
+        features = part.features.take(which)
+        motion = _column(part.rows, "motion")
+        told = motion > UNIDENTIFIED
+        same = part.features.take(np.flatnonzero(told)).at_places_of(features)
+        if np.mean(same[np.arange(len(same)), motion[told]]) < MOSTLY:
+            features = replace(features, places_rad=None)
+        references[part.axis] = _Reference(
             part.source,
-            part.features,
-            tuple(_span(part.rows, i) for i in range(part.rows.num_rows)),
-            _column(part.rows, "reference_f_max_hz"),
-            bool(_column(part.rows, "edge").any()),
+            features,
+            tuple(_span(part.rows, i) for i in which.tolist()),
+            _column(part.rows, "reference_f_max_hz")[which],
+            bool(_column(part.rows, "edge")[which].any()),
         )
-        for part in _parts(rows, sources)
-    }
+    return references
+
+
+def _with_places(parts: Sequence[_Axis], jobs: int, kept: KeptResults | None) -> list[_Axis]:
+    """Add where the joint is at each segment's start and stop, of axes that log it."""
+    found = map_items(remembered(_places, kept), parts, jobs, unwatched)
+    if found.errors:  # which the identification meets again, and tells
+        return list(parts)
+    return [
+        replace(part, features=replace(part.features, places_rad=places)) if places.size else part
+        for part, places in zip(parts, found.results, strict=True)
+    ]
+
+
+def _places(part: _Axis) -> npt.NDArray[np.float64]:
+    """Read where an axis is at each segment's start and stop, (n, 2); empty if it is not logged."""
+    with part.source.open() as run:
+        column = run.channels(part.axis).position
+        if column is None or part.rows["kind"][0].as_py() == "window":
+            return np.empty((0, 2))
+        asked = np.column_stack([_column(part.rows, "start"), _column(part.rows, "stop") - 1])
+        places = np.full(asked.shape, np.nan)
+        for start, block in run.blocks([column]):
+            values = block[column]
+            here = (asked >= start) & (asked < start + values.size)
+            places[here] = values[asked[here] - start]
+    return places
 
 
 def _span(rows: pa.Table, index: int) -> tuple[int, int]:

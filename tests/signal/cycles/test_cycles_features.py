@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 
 from opamc_cli.signal.cycles.features import SAME_PROGRAM, MatchRule, SegmentFeatures
@@ -17,3 +19,14 @@ def test_a_part_is_half_open_and_takes_every_column():
 def test_by_motion_the_current_says_nothing_and_half_of_the_motions_more():
     rule = MatchRule(0.8, 0.2, 0.1, use_direction=False)
     assert rule.by_motion() == MatchRule(0.0, 0.2, 0.1, False, SAME_PROGRAM)
+
+
+def test_places_are_the_same_within_a_fiftieth_of_the_range():
+    cycle = replace(FIVE.part(0, 2), places_rad=np.array([[0.0, 1.0], [1.0, 0.0]]))
+    assert cycle.range_rad == 1.0
+    own = np.array([[0.0, 1.019], [0.021, 1.0], [1.0, np.nan]])
+    told = replace(FIVE.part(0, 3), places_rad=own).at_places_of(cycle)
+    # of what is not known nothing speaks against it
+    assert told.tolist() == [[True, False], [False, False], [True, True]]
+    assert FIVE.at_places_of(cycle).all()
+    assert FIVE.range_rad == 0.0

@@ -37,9 +37,9 @@ def test_an_added_run_costs_that_run_and_the_tables_are_the_same(kept_and_plain)
     before = files_of(kept)
     run_chain(RUNS, config, folder / "again", kept=kept)
     added = files_of(kept) - before
-    # two runs of three axes, three stages; what follows on the segments as a whole
-    assert len(before) == 2 * 3 * 3 + 1
-    assert len(added) == 3 * 3 + 1
+    # two runs of three axes, three stages and the places; what follows on the segments as a whole
+    assert len(before) == 2 * 3 * 4 + 1
+    assert len(added) == 3 * 4 + 1
     assert tables(folder / "again") == tables(folder / "plain")
 
 

@@ -1,0 +1,71 @@
+"""Strokes that are alike but for where they lead: a pallet's, and those that a camera guides."""
+
+from itertools import pairwise
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from opamc_cli.config import load_config
+from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.storage.runs.metadata import RunInfo
+from opamc_cli.storage.runs.writing import save_run
+
+RATE_HZ = 250.0
+PICK = 0.7
+PALLET = (-0.61, -0.65, -0.70)
+"""Places to which the joint moves in turn, and from each back, rad."""
+
+
+def save(path, places, seed, first=0):
+    """Strokes from the pick to one place after another and back, from a stroke on; their ends."""
+    rng = np.random.default_rng(seed)
+    stops = [stop for place in places for stop in (place, PICK)]
+    stops = [PICK, *stops][first:]
+    pieces = [np.full(150, stops[0])]
+    for at, to in pairwise(stops):
+        n = round(100 + 250 * abs(to - at))
+        pieces += [at + (to - at) * (0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n))]
+        pieces += [np.full(rng.integers(60, 140), to)]
+    position = np.concatenate(pieces)
+    speed = np.gradient(position) * RATE_HZ
+    current = np.tanh(speed / 0.02) + 0.5 * speed + 0.01 * rng.normal(size=speed.size)
+    columns = {
+        "axis1_current": current,
+        "axis1_position": position + 1e-5 * rng.normal(size=speed.size),
+    }
+    save_run(path, RunInfo(sampling_rate_hz=RATE_HZ), columns)
+    return position
+
+
+def identified(tmp_path, baseline, target):
+    """Motions of a target by the baseline's cycle, with where each leads, by the truth."""
+    for number, places in enumerate(baseline):
+        save(tmp_path / "base" / f"{number}.parquet", places, seed=number)
+    position = save(tmp_path / "target" / "t.parquet", *target)
+    chain = [load_config(), tmp_path / "out"]
+    done = run_chain([tmp_path / "base"], *chain)
+    done = run_chain([tmp_path / "target"], chain[0], tmp_path / "t", reference=done.motions)
+    rows = pq.read_table(done.motions).to_pylist()
+    return [(row["motion"], position[row["start"]], position[row["stop"] - 1]) for row in rows]
+
+
+@pytest.mark.parametrize("first", range(6))
+def test_the_strokes_of_a_pallet_are_told_by_their_places(tmp_path, first):
+    """More cycles would fit where each stroke is taken for that of the next place."""
+    found = identified(tmp_path, [PALLET * 5] * 2, (PALLET * 5, 7, first))
+    led = {}
+    for motion, start, stop in found:
+        led.setdefault(motion, []).append((start, stop))
+    assert len(led.keys() - {-1}) == 6
+    assert len(led.get(-1, ())) < 6
+    for motion, ends in led.items():
+        if motion >= 0:
+            assert np.ptp(ends, axis=0) == pytest.approx([0, 0], abs=0.01)
+
+
+def test_what_a_camera_guides_is_told_wherever_it_leads(tmp_path):
+    rng = np.random.default_rng(1)
+    guided = [tuple(rng.uniform(-0.8, -0.5, 12)) for _ in range(3)]
+    found = identified(tmp_path, guided[:2], (guided[2], 7))
+    assert [motion for motion, *_ in found] == [0, 1] * 12
