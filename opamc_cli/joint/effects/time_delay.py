@@ -9,6 +9,8 @@ from opamc_cli.signal.transform.least_squares import solve
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
+LEAST_SAMPLES = 0.5
+"""Less no clock is late; beside ringing it stood for corners that sampling had rounded off."""
 
 
 class TimeDelay(Effect):
@@ -48,11 +50,12 @@ class TimeDelay(Effect):
         The coefficients of the unshifted fit would not do: they have already bent to the delay.
         """
         rows = track.open_samples
-        if not track.static_terms or rows is None:
-            return np.zeros((track.size, 1))
-        full = track.full or track
+        full, filtered = track.full or track, parameters.get("filtered")
         samples = parameters["delay_s"] * full.rate_hz
-        if parameters.get("filtered"):
+        none = abs(samples) < LEAST_SAMPLES and not filtered
+        if not track.static_terms or rows is None or none:
+            return np.zeros((track.size, 1))
+        if filtered:
             pole = np.exp(-1.0 / max(samples, 1e-3))
             columns = track.full_columns
             late = [lagging(columns[start:stop], pole) for start, stop in full.bounds]

@@ -226,10 +226,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     followed = "logged" not in child.fit.dataset.fine.track.channels
     beside = followed and any(not term.effect.unnamed for term in parent.terms)
     if share - (LEAST_T if beside else 1.0) * error < (least := pool.least_share):
-        return (
-            f"takes {share:.1%} ± {error:.1%} off the held-out error; {least:.0%} is asked "
-            "beyond that doubt"
-        )
+        return f"takes {share:.1%} ± {error:.1%} off the error; {least:.0%} is asked beyond that"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     drifts = effect.changes_in_time and "drift" not in pool.without
