@@ -557,8 +557,9 @@ def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp
         assert ("the opposite sign of its motion" in capsys.readouterr().err) == (sign < 0)
         entries += json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     straight, opposed = entries
-    assert straight["notes"] == []
-    assert {**opposed, "notes": []} == straight
+    (note,) = straight["notes"]
+    assert "which of the other joints load it" in note
+    assert {**opposed, "notes": [note]} == straight
     closed = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())["closed"]
     assert closed["opposite_sign"] is True
 

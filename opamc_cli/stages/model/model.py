@@ -45,8 +45,8 @@ LIKE_ANOTHER_JOINT = {
 }  # fmt: skip
 """What the motion of other joints was called where they were not logged: 12 of 18 such programs of
 three arms whose joints all move."""
-LEAST_RATIO = 30.0
-"""Of strain wave gears, where none is given."""
+SLOWEST_ORDERS = {"motor": 1.0, "joint": 30.0}
+"""A motor's turn, per revolution of the angle that is known: no strain wave gear's ratio is less."""
 ALONE = (
     "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
     "like {}; log it beside to tell"
@@ -262,8 +262,8 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
             doubts.append(DRIVES.format(axis, term.effect.name))
     named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and not any(one.others_rad for one in laid.read.recordings):
-        ratio = LEAST_RATIO if model.joint.gear_ratio is None else 1.0
-        unlikely = any(_of_the_program(step.term, ratio) for step in loop.steps)
+        slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)
+        unlikely = any(_of_the_program(step.term, slowest) for step in loop.steps)
         (doubts if unlikely else laid.notes).append(ALONE.format(axis, ", ".join(named)))
     if "coupling" in found and len(runs) == 1:
         laid.notes.append(ONE_PROGRAM.format(axis))
@@ -286,7 +286,7 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     )
 
 
-def _of_the_program(term: Term, ratio: float) -> bool:
+def _of_the_program(term: Term, slowest: float) -> bool:
     """Tell whether a name follows the program as another joint would, and no gear does.
 
     A payload that is held in a part of every cycle, or a line slower than the motor turns, where a
@@ -294,7 +294,7 @@ def _of_the_program(term: Term, ratio: float) -> bool:
     """
     if term.effect.name == "payload_change":
         return "gripped_s" in term.parameters
-    return term.effect.name == "ripple" and term.parameters["order"] < ratio
+    return term.effect.name == "ripple" and term.parameters["order"] < slowest
 
 
 def _write(

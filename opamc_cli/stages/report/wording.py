@@ -64,12 +64,27 @@ def headline(verdict: Mapping[str, Any]) -> str:
         "healthy": "healthy",
     }
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
+    for place, state in enumerate(states):
+        most = _far_most(verdict, states[state])
+        if state in ("fault", "changed") and most is not None:
+            parts[place] += f" (axis {most} by far the most: look there first)"
     if not parts:
         return "No axis was judged"
     if len(healthy) > 1 and len(parts) > 1:
         parts[-1] = f"the other {len(healthy)} axes healthy"
     text = "; ".join(parts)
     return text[0].upper() + text[1:]
+
+
+def _far_most(verdict: Mapping[str, Any], axes: Sequence[int]) -> int | None:
+    """Return the axis that lies at least twice as far off as all others: it shakes them."""
+    found = [
+        (float(one.get("health_index") or 0.0), int(one["axis"]))
+        for one in verdict.get("axes", ())
+        if int(one["axis"]) in axes
+    ]
+    *_, second, first = [(0.0, 0), *sorted(found)]
+    return first[1] if len(found) > 1 and first[0] > 2 * max(second[0], 0.0) else None
 
 
 def number(value: object, digits: int = 3) -> str:

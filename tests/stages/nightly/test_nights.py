@@ -418,9 +418,9 @@ def test_new_files_cost_their_night_and_a_bad_one_is_its_robots_line(cell, opamc
     }
     opamc("nightly", cell, "--quiet")
     new = {path for path in (cell.parent / "nightly" / ".kept").rglob("*") if path.is_file()} - kept
-    # two axes of the one file, three stages; its channels, and what tells it from a copy; of the
-    # whole baseline its tables, and how far its cycles scatter
-    assert len(new) == 2 * 3 + 2 + 2
+    # two axes of the one file, three stages and its places; its channels, and what tells it from a
+    # copy; of the whole baseline its tables, and how far its cycles scatter
+    assert len(new) == 2 * 4 + 2 + 2
 
     # what was judged stays judged when logs are cleared away
     shutil.rmtree(logs / "r1" / NIGHTS[3])

@@ -97,6 +97,14 @@ def test_numbers_in_few_digits(value: object, text: str) -> None:
     assert wording.number(value) == text
 
 
+def test_the_headline_tells_which_joint_shakes_the_others() -> None:
+    for index, said in ((20.1, " (axis 2 by far the most: look there first)"), (20.0, "")):
+        axes = [(1, "fault", 10.0), (2, "fault", index), (3, "healthy", 0.1)]
+        found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
+        said_of = wording.headline({"axes": found})
+        assert said_of == f"Axes 1 and 2 at fault{said}; axis 3 healthy"
+
+
 def test_the_headline_tells_the_worst_first() -> None:
     states = {1: "healthy", 2: "changed", 3: "fault", 4: "healthy", 5: "fault"}
     verdict = {"axes": [{"axis": axis, "state": state} for axis, state in states.items()]}

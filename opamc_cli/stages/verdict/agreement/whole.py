@@ -78,9 +78,12 @@ def _cut(axes: Mapping[int, _Held], usual: Mapping[int, Sequence[_Held]]) -> str
     most = max(axes, key=lambda axis: axes[axis].cycles)
     own, others = axes[most], sorted({one.cycles for one in usual[most]})
     hold = " to ".join(map(str, dict.fromkeys((others[0], others[-1]))))
+    ends_s = max(one.ends_s for one in axes.values())
+    ended = ends_s < min(one.ends_s for one in usual[most])
+    why = f"its motion ends at {ends_s:.3g} s" if ended else "it stands still for longer in between"
     return (
         f"holds {own.cycles} cycle{'s' * (own.cycles > 1)} where the baseline's recordings hold "
-        f"{hold} (its motion ends at {max(one.ends_s for one in axes.values()):.3g} s)"
+        f"{hold} ({why})"
     )
 
 
