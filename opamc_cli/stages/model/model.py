@@ -46,7 +46,7 @@ LIKE_ANOTHER_JOINT = {
 """What the motion of other joints was called where they were not logged: 12 of 18 such programs of
 three arms whose joints all move."""
 SLOWEST_ORDERS = {"motor": 1.0, "joint": 30.0}
-"""A motor's turn, per revolution of the angle that is known: no strain wave gear's ratio is less."""
+"""A motor's turn, per turn of the angle that is known: no strain wave gear's ratio is less."""
 ALONE = (
     "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
     "like {}; log it beside to tell"
