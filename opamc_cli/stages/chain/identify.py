@@ -549,8 +549,12 @@ def _identify_part(job: _Job) -> pa.Table:
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = identify_anywhere(reference.features, own, rule)
+        # what was taught elsewhere, or has another zero since, is told as where none is logged
+        elsewhere = replace(own, places_rad=None)
+        if job.judged and found.cycle.max() == UNIDENTIFIED and own.places_rad is not None:
+            found = identify_anywhere(reference.features, elsewhere, rule)
         if job.judged and found.cycle.max() == UNIDENTIFIED:
-            found = identify(reference.features, own, rule.by_motion())
+            found = identify(reference.features, elsewhere, rule.by_motion())
         cycle[whole], motion[whole] = found.cycle, found.motion
         similarity[whole] = found.similarity
         for i in np.flatnonzero(motion >= 0).tolist():

@@ -17,11 +17,11 @@ PALLET = (-0.61, -0.65, -0.70)
 """Places to which the joint moves in turn, and from each back, rad."""
 
 
-def save(path, places, seed, first=0):
+def save(path, places, seed, first=0, moved=0.0):
     """Strokes from the pick to one place after another and back, from a stroke on; their ends."""
     rng = np.random.default_rng(seed)
     stops = [stop for place in places for stop in (place, PICK)]
-    stops = [PICK, *stops][first:]
+    stops = [stop + moved for stop in (PICK, *stops)][first:]
     pieces = [np.full(150, stops[0])]
     for at, to in pairwise(stops):
         n = round(100 + 250 * abs(to - at))
@@ -62,6 +62,11 @@ def test_the_strokes_of_a_pallet_are_told_by_their_places(tmp_path, first):
     for motion, ends in led.items():
         if motion >= 0:
             assert np.ptp(ends, axis=0) == pytest.approx([0, 0], abs=0.01)
+
+
+def test_a_joint_with_another_zero_is_told_all_the_same(tmp_path):
+    found = identified(tmp_path, [PALLET * 5] * 2, (PALLET * 5, 7, 0, 0.2))
+    assert [motion for motion, *_ in found] == [0, 1, 2, 3, 4, 5] * 5
 
 
 def test_what_a_camera_guides_is_told_wherever_it_leads(tmp_path):
