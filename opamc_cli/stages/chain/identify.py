@@ -168,10 +168,13 @@ def run(
     if reference is not None:
         references = _given_references(reference, moved_to, jobs, kept)
     else:
-        chosen = (segments, parts, rule, config.identify, reference_run)
+
+        def found_in(axes: Sequence[_Axis]) -> dict[int, _Reference]:
+            return _own_references(segments, axes, rule, config.identify, reference_run)
+
         references = {
             axis: _with_carrier(found, axis, config)
-            for axis, found in _references_of_places(*chosen).items()
+            for axis, found in _references_of_places(parts, found_in, rule).items()
         }
     work = [
         _Job(
@@ -304,18 +307,16 @@ def _whole(part: _Axis) -> npt.NDArray[np.int64]:
 
 
 def _references_of_places(
-    path: Path,
     parts: Sequence[_Axis],
+    found_in: Callable[[Sequence[_Axis]], dict[int, _Reference]],
     rule: MatchRule,
-    config: IdentifyConfig,
-    reference_run: str | None,
 ) -> dict[int, _Reference]:
     """Find reference cycles whose motions lead to their places, but where the program's do not."""
     anywhere = [_anywhere(part) for part in parts]
-    loose = _own_references(path, anywhere, rule, config, reference_run)
+    loose = found_in(anywhere)
     if all(part.features.places_rad is None for part in parts):
         return loose
-    strict = _own_references(path, parts, rule, config, reference_run)
+    strict = found_in(parts)
     for axis, reference in loose.items():
         known, kept = (
             sum(_told(part, one, rule) for part in own if part.axis == axis)
