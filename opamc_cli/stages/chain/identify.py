@@ -66,7 +66,7 @@ class IdentifyOutcome:
     errors: tuple[OpamcError, ...]
     """One for each axis of a run that could not be read."""
     notes: tuple[str, ...]
-    """One for each axis of which only the motion told the cycles."""
+    """One for each axis of which only the motion told the cycles, or that moves elsewhere."""
     other_speeds: Mapping[str, float]
     """What `odd_speeds` found: runs that are left out for their speed."""
 
@@ -215,7 +215,7 @@ def run(
         extra=sources_record(list(sources.values()), out)
         | {OTHER_SPEEDS: other_speeds, TWO_SPEEDS: sorted({run for run, _ in midway})},
     )
-    notes = tuple(_unlike(motions, rule))
+    notes = (*_unlike(motions, rule), *_elsewhere(motions, parts, references))
     return IdentifyOutcome(path, motions, errors, notes, other_speeds)
 
 
@@ -259,6 +259,26 @@ def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:
         f"({rule.min_similarity:.2g} asked); the motions were told by duration, speed and direction"
         for axis, similarity in sorted(least.items())
     ]
+
+
+def _elsewhere(
+    motions: pa.Table, parts: Sequence[_Axis], references: Mapping[int, _Reference]
+) -> Iterator[str]:
+    """Say of which recordings the motions lead elsewhere than those of the reference cycle."""
+    runs, axes, numbers = (np.asarray(motions[name]) for name in ("run", "axis", "motion"))
+    for part in parts:
+        reference = references.get(part.axis)
+        if reference is None or reference.features.places_rad is None:
+            continue
+        motion = numbers[(runs == part.source.name) & (axes == part.axis)]
+        told = np.flatnonzero(motion > UNIDENTIFIED)
+        same = part.features.take(told).at_places_of(reference.features)
+        if told.size and np.mean(same[np.arange(told.size), motion[told]]) < MOSTLY:
+            yield (
+                f"{part.source.path}: the motions of axis {part.axis} lead elsewhere than the "
+                "reference's and were told by duration, speed and direction: was the program "
+                "edited, or the position's zero set anew?"
+            )
 
 
 def match_rule(config: IdentifyConfig) -> MatchRule:

@@ -46,6 +46,7 @@ def identified(tmp_path, baseline, target):
     chain = [load_config(), tmp_path / "out"]
     done = run_chain([tmp_path / "base"], *chain)
     done = run_chain([tmp_path / "target"], chain[0], tmp_path / "t", reference=done.motions)
+    assert any("axis 1 lead elsewhere" in note for note in done.notes) == (len(target) > 3)
     rows = pq.read_table(done.motions).to_pylist()
     return [(row["motion"], position[row["start"]], position[row["stop"] - 1]) for row in rows]
 
