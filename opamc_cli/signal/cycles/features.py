@@ -12,6 +12,13 @@ it draws. Of half of its segments: the edges of short ones move with the current
 SAME_PLACE = 0.02
 """Of the range of a cycle, within which a motion starts and stops at the same place."""
 
+SAME_WAY = 0.04
+"""Of the longest way of a cycle, within which a current vector turns as far: see `net_turns`;
+twice what a motion's places may differ by, which it ends at."""
+
+LEAST_TURNS = 1.5
+"""Turns that always count as none: both ends of a motion are told within a turn or so."""
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
@@ -33,21 +40,35 @@ class SegmentFeatures:
     places_rad: Floats | None = None
     """Where the joint is at each one's start and stop, (n, 2), rad; NaN where not known, None where
     no position is logged."""
+    turns: Floats | None = None
+    """How far the current vector turns in each, net, turns; None where that is not known."""
 
     @property
     def way(self) -> Floats:
         """How far each segment goes at most, in turns of its carrier: speed times length."""
         return self.f_max_hz * self.duration_s
 
-    def at_places_of(self, others: "SegmentFeatures") -> npt.NDArray[np.bool_]:
+    @property
+    def lead_somewhere(self) -> bool:
+        """Whether anything is known of where the segments lead."""
+        return self.places_rad is not None or self.turns is not None
+
+    def anywhere(self) -> "SegmentFeatures":
+        """Return the segments as if nothing were known of where they lead."""
+        return replace(self, places_rad=None, turns=None)
+
+    def lead_as(self, others: "SegmentFeatures") -> npt.NDArray[np.bool_]:
         """Tell which segments lead from where to where others of a cycle do; (n, m).
 
-        So does whatever is not known to lead elsewhere.
+        Where no places are known, which go as far. So does whatever is not known to lead elsewhere.
         """
-        if self.places_rad is None or others.places_rad is None:
-            return np.ones((len(self), len(others)), dtype=bool)
-        away = np.abs(self.places_rad[:, np.newaxis] - others.places_rad).max(axis=2)
-        return np.asarray(~(away > SAME_PLACE * others.range_rad))
+        if self.places_rad is not None and others.places_rad is not None:
+            away = np.abs(self.places_rad[:, np.newaxis] - others.places_rad).max(axis=2)
+            return np.asarray(~(away > SAME_PLACE * others.range_rad))
+        if self.turns is not None and others.turns is not None and others.turns.size:
+            limit = max(SAME_WAY * float(np.abs(others.turns).max()), LEAST_TURNS)
+            return np.asarray(np.abs(self.turns[:, np.newaxis] - others.turns) <= limit)
+        return np.ones((len(self), len(others)), dtype=bool)
 
     @property
     def range_rad(self) -> float:
@@ -73,6 +94,7 @@ class SegmentFeatures:
             self.direction[indices],
             self.pause_s[indices],
             None if self.places_rad is None else self.places_rad[indices],
+            None if self.turns is None else self.turns[indices],
         )
 
 

@@ -138,7 +138,7 @@ def _windows(reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchR
         agree &= difference <= tolerance * want
         if rule.middle_tolerance is not None:
             beyond.append(difference - rule.middle_tolerance * want)
-    agree &= segments.at_places_of(reference)
+    agree &= segments.lead_as(reference)
     if rule.use_direction:
         agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
     extra, optional = small(segments, reference), small(reference, reference)

@@ -7,7 +7,7 @@ from opamc_cli.signal.cycles.features import Floats, Ints, MatchRule, SegmentFea
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify
 
 MOSTLY = 0.9
-"""Share of the pairs of segments that are at the same places where a shift repeats a series."""
+"""Share of the pairs of segments that lead to the same places where a shift repeats a series."""
 
 REPEATED = 2.0
 """Squared distance of segments, in their spreads, within which a shift repeats a series: of the
@@ -110,8 +110,8 @@ def period(segments: SegmentFeatures) -> int:
     distance = np.array(
         [np.median(((features[k:] - features[:-k]) ** 2).sum(axis=1)) for k in range(1, m)]
     )
-    if segments.places_rad is not None:
-        same = segments.at_places_of(segments)
+    if segments.lead_somewhere:
+        same = segments.lead_as(segments)
         elsewhere = [np.mean(np.diagonal(same, -k)) < MOSTLY for k in range(1, m)]
         distance[np.array(elsewhere)] = np.inf
     by_half, beyond = distance[: m // 2], distance[m // 2 : -1]

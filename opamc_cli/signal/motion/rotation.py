@@ -6,6 +6,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+PARTS_OF_A_TURN = 16
+"""Means of the current vector per turn at its highest frequency; it turns by 22 degrees between
+two, and by less than half a turn up to eight times that frequency."""
+
+SMOOTHED_TURNS = 8
+"""Turns at the highest frequency over which the angle between parts is smoothed: unsmoothed the
+turns of 96 motions of the testbed's joint under load, whose torque changes sign, scatter by 1.1 to
+2.4, over four by 0.1 to 3.4, over eight by 0.1 to 1.2, over sixteen they are short by one."""
+
 
 @dataclass(frozen=True)
 class Rotation:
@@ -90,6 +99,32 @@ def join_rotation(pieces: list[Rotation]) -> Rotation:
     return Rotation(
         np.concatenate([p.turn for p in pieces]), np.concatenate([p.along for p in pieces])
     )
+
+
+def net_turns(z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float) -> float:
+    """How far a motion's current vector turns, net, in turns; negative backwards.
+
+    Noise and a torque that changes sign win or lose half turns where the current is small: there
+    its neighbours tell.
+
+    Parameters
+    ----------
+    z : array, shape (n,), A
+        Current vector, without its sensors' offset; NaN are passed over.
+    f_max_hz : float
+        Highest frequency at which it turns, > 0, Hz.
+    fs_hz : float
+        Sampling rate, Hz.
+    """
+    z = z[np.isfinite(z)]
+    length = max(1, int(fs_hz / (PARTS_OF_A_TURN * f_max_hz)))
+    count = z.size // length
+    parts = z[: count * length].reshape(count, length).mean(axis=1)
+    if count < 2:
+        return 0.0
+    taper = np.hanning(SMOOTHED_TURNS * PARTS_OF_A_TURN + 2)[1:-1]
+    steps = np.convolve(parts[1:] * parts[:-1].conj(), taper)[taper.size // 2 :][: count - 1]
+    return float(np.angle(steps).sum() / (2 * np.pi))
 
 
 @njit(cache=True, nogil=True)

@@ -20,6 +20,8 @@ from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
+from opamc_cli.signal.motion.rotation import net_turns
+from opamc_cli.signal.offset import TURNS_AT_TOP_SPEED
 from opamc_cli.stages.chain.compared.speeds import (
     OTHER_SPEEDS,
     TWO_SPEEDS,
@@ -28,7 +30,13 @@ from opamc_cli.stages.chain.compared.speeds import (
 )
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
-from opamc_cli.stages.recordings.envelope import EnvelopeKind, read_course, read_envelope
+from opamc_cli.stages.recordings.envelope import (
+    EnvelopeKind,
+    current_offset,
+    read_course,
+    read_current,
+    read_envelope,
+)
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.channels import same_clock
@@ -164,7 +172,7 @@ def run(
     sources = {source.name: source for source in read_sources(segments, moved_to)}
     rule = match_rule(config.identify)
     parts = [p for p in _parts(table, sources) if (p.source.name, p.axis) not in without]
-    parts = _with_places(parts, jobs, kept)
+    parts = _with_leads(parts, jobs, kept)
     if reference is not None:
         references = _given_references(reference, moved_to, jobs, kept)
     else:
@@ -272,7 +280,7 @@ def _elsewhere(
             continue
         motion = numbers[(runs == part.source.name) & (axes == part.axis)]
         told = np.flatnonzero(motion > UNIDENTIFIED)
-        same = part.features.take(told).at_places_of(reference.features)
+        same = part.features.take(told).lead_as(reference.features)
         if told.size and np.mean(same[np.arange(told.size), motion[told]]) < MOSTLY:
             yield (
                 f"{part.source.path}: the motions of axis {part.axis} lead elsewhere than the "
@@ -332,9 +340,9 @@ def _references_of_places(
     rule: MatchRule,
 ) -> dict[int, _Reference]:
     """Find reference cycles whose motions lead to their places, but where the program's do not."""
-    anywhere = [_anywhere(part) for part in parts]
+    anywhere = [replace(part, features=part.features.anywhere()) for part in parts]
     loose = found_in(anywhere)
-    if all(part.features.places_rad is None for part in parts):
+    if not any(part.features.lead_somewhere for part in parts):
         return loose
     strict = found_in(parts)
     for axis, reference in loose.items():
@@ -345,10 +353,6 @@ def _references_of_places(
         if kept >= AT_PLACES * known:
             loose[axis] = strict[axis]
     return loose
-
-
-def _anywhere(part: _Axis) -> _Axis:
-    return replace(part, features=replace(part.features, places_rad=None))
 
 
 def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> int:
@@ -508,14 +512,14 @@ def _given_references(
     held = set(zip(rows["run"].to_pylist(), rows["axis"].to_pylist(), strict=True))
     own = [part for part in _parts(table, sources) if (part.source.name, part.axis) in held]
     references = {}
-    for part in _with_places(own, jobs, kept):
+    for part in _with_leads(own, jobs, kept):
         which = np.flatnonzero(_column(part.rows, "reference"))
         features = part.features.take(which)
         motion = _column(part.rows, "motion")
         told = motion > UNIDENTIFIED
-        same = part.features.take(np.flatnonzero(told)).at_places_of(features)
+        same = part.features.take(np.flatnonzero(told)).lead_as(features)
         if np.mean(same[np.arange(len(same)), motion[told]]) < MOSTLY:
-            features = replace(features, places_rad=None)
+            features = features.anywhere()
         references[part.axis] = _Reference(
             part.source,
             features,
@@ -526,30 +530,60 @@ def _given_references(
     return references
 
 
-def _with_places(parts: Sequence[_Axis], jobs: int, kept: KeptResults | None) -> list[_Axis]:
-    """Add where the joint is at each segment's start and stop, of axes that log it."""
-    found = map_items(remembered(_places, kept), parts, jobs, unwatched)
+def _with_leads(parts: Sequence[_Axis], jobs: int, kept: KeptResults | None) -> list[_Axis]:
+    """Add where each segment leads: its places where they are logged, else how far it turns."""
+    found = map_items(remembered(_leads, kept), parts, jobs, unwatched)
     if found.errors:  # which the identification meets again, and tells
         return list(parts)
     return [
-        replace(part, features=replace(part.features, places_rad=places)) if places.size else part
-        for part, places in zip(parts, found.results, strict=True)
+        replace(part, features=_leading(part.features, **leads))
+        for part, leads in zip(parts, found.results, strict=True)
     ]
 
 
-def _places(part: _Axis) -> npt.NDArray[np.float64]:
-    """Read where an axis is at each segment's start and stop, (n, 2); empty if it is not logged."""
+def _leading(
+    features: SegmentFeatures,
+    places_rad: npt.NDArray[np.float64] | None = None,
+    turns: npt.NDArray[np.float64] | None = None,
+) -> SegmentFeatures:
+    return replace(features, places_rad=places_rad, turns=turns)
+
+
+def _leads(part: _Axis) -> dict[str, npt.NDArray[np.float64]]:
+    """Read what `SegmentFeatures` knows of where segments lead; empty where nothing tells."""
+    if part.rows["kind"][0].as_py() == "window":
+        return {}
     with part.source.open() as run:
-        column = run.channels(part.axis).position
-        if column is None or part.rows["kind"][0].as_py() == "window":
-            return np.empty((0, 2))
-        asked = np.column_stack([_column(part.rows, "start"), _column(part.rows, "stop") - 1])
-        places = np.full(asked.shape, np.nan)
-        for start, block in run.blocks([column]):
-            values = block[column]
-            here = (asked >= start) & (asked < start + values.size)
-            places[here] = values[asked[here] - start]
+        channels = run.channels(part.axis)
+        if channels.position is not None:
+            return {"places_rad": _places(run, part, channels.position)}
+        return {"turns": _turns(run, part)} if len(channels.phases) == 3 else {}
+
+
+def _places(run: Run, part: _Axis, column: str) -> npt.NDArray[np.float64]:
+    """Read where an axis is at each segment's start and stop, (n, 2), rad."""
+    asked = np.column_stack([_column(part.rows, "start"), _column(part.rows, "stop") - 1])
+    places = np.full(asked.shape, np.nan)
+    for start, block in run.blocks([column]):
+        values = block[column]
+        here = (asked >= start) & (asked < start + values.size)
+        places[here] = values[asked[here] - start]
     return places
+
+
+def _turns(run: Run, part: _Axis) -> npt.NDArray[np.float64]:
+    """Read how far the current vector of an axis turns in each segment, (n,)."""
+    rate_hz, top_hz = run.sampling_rate_hz, part.features.f_max_hz
+    spans = [_span(part.rows, i) for i in range(len(top_hz))]
+    often = part.features.way >= TURNS_AT_TOP_SPEED
+    whole = [span for span, tells in zip(spans, often, strict=True) if tells]
+    offset = current_offset(run, part.axis, whole, "clarke")
+    return np.array(
+        [
+            net_turns(read_current(run, part.axis, *span, "clarke") - offset, hz, rate_hz)
+            for span, hz in zip(spans, top_hz.tolist(), strict=True)
+        ]
+    )
 
 
 def _span(rows: pa.Table, index: int) -> tuple[int, int]:
@@ -571,8 +605,8 @@ def _identify_part(job: _Job) -> pa.Table:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = identify_anywhere(reference.features, own, rule)
         # what was taught elsewhere, or has another zero since, is told as where none is logged
-        elsewhere = replace(own, places_rad=None)
-        if job.judged and found.cycle.max() == UNIDENTIFIED and own.places_rad is not None:
+        elsewhere = own.anywhere()
+        if job.judged and found.cycle.max() == UNIDENTIFIED and own.lead_somewhere:
             found = identify_anywhere(reference.features, elsewhere, rule)
         if job.judged and found.cycle.max() == UNIDENTIFIED:
             found = identify(reference.features, elsewhere, rule.by_motion())

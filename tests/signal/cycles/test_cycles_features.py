@@ -25,8 +25,8 @@ def test_places_are_the_same_within_a_fiftieth_of_the_range():
     cycle = replace(FIVE.part(0, 2), places_rad=np.array([[0.0, 1.0], [1.0, 0.0]]))
     assert cycle.range_rad == 1.0
     own = np.array([[0.0, 1.019], [0.021, 1.0], [1.0, np.nan]])
-    told = replace(FIVE.part(0, 3), places_rad=own).at_places_of(cycle)
+    told = replace(FIVE.part(0, 3), places_rad=own).lead_as(cycle)
     # of what is not known nothing speaks against it
     assert told.tolist() == [[True, False], [False, False], [True, True]]
-    assert FIVE.at_places_of(cycle).all()
+    assert FIVE.lead_as(cycle).all()
     assert FIVE.range_rad == 0.0

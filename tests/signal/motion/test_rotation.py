@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.motion.rotation import RotationStream, join_rotation
+from opamc_cli.signal.motion.rotation import RotationStream, join_rotation, net_turns
 
 
 def rotation_of(z, step=16):
@@ -68,3 +68,24 @@ def test_missing_samples_are_passed_over():
     z = vector(100.0)
     z[500] = np.nan
     assert np.isfinite(rotation_of(z).turn).all()
+
+
+@pytest.mark.parametrize("n_turns", [-25, 40])
+@pytest.mark.parametrize("torque", [1.0, "changing sign"])
+def test_a_motion_s_turns_are_told_beneath_noise(n_turns, torque):
+    rng = np.random.default_rng(1)
+    fs_hz, s = 2000.0, np.linspace(0, 1, 4000)
+    angle = 2 * np.pi * n_turns * (10 * s**3 - 15 * s**4 + 6 * s**5)
+    if torque == "changing sign":
+        torque = np.cos(np.pi * s)
+    noise = rng.normal(size=s.size) + 1j * rng.normal(size=s.size)
+    z = torque * np.exp(1j * angle) + 0.05 * noise
+    z[100] = np.nan
+    f_max_hz = abs(n_turns) * 1.875 / 2
+    assert net_turns(z, f_max_hz, fs_hz) == pytest.approx(n_turns, abs=0.7)
+
+
+def test_what_is_too_short_does_not_turn():
+    assert net_turns(vector(100.0, 3), 100.0, 2048.0) == pytest.approx(2 * 100 / 2048, rel=0.01)
+    assert net_turns(vector(100.0, 1), 100.0, 2048.0) == 0
+    assert net_turns(vector(100.0, 0), 100.0, 2048.0) == 0
