@@ -33,13 +33,13 @@ from opamc_cli.decision.divergence.discriminant import fit
 from opamc_cli.decision.divergence.features import compare
 from opamc_cli.decision.divergence.jensen_shannon import divergences_from_pool
 from opamc_cli.decision.judge import Bundle, judge
-from opamc_cli.signal.offset import mean_over_motions
+from opamc_cli.signal.offset import mean_over_turns
 from opamc_cli.signal.transform.analytic import clarke
 from opamc_cli.stages.chain import patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.chain.witnesses import WITNESSES
-from opamc_cli.stages.recordings.identified import aligned_span, turning_spans
+from opamc_cli.stages.recordings.identified import aligned_span, turning_motions
 from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
@@ -153,7 +153,8 @@ def rival_rows(recordings: dict, motions: list[dict]) -> dict:
         vector = clarke(*recordings[name].axes[axis].phases_a.T.astype(np.float64))
         spans = [aligned_span(row) for row in rows]
         # as the stage `patterns` does
-        vector = vector - mean_over_motions(vector[a:b] for a, b in turning_spans(rows))
+        turning = ((vector[a:b], f_max_hz) for a, b, f_max_hz in turning_motions(rows))
+        vector = vector - mean_over_turns(turning, RATE_HZ)
         envelope = np.abs(vector)
         # The square's angle does not jump where the torque changes its sign: half of it is the
         # carrier's, and the vector turned back by it is the torque current with its sign.

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.signal.offset import mean_over_motions, turning_means, turning_offset, turns
+from opamc_cli.signal.offset import mean_over_turns, turning_means, turning_offset, turns
 
 FS_HZ = 2048.0
 
@@ -51,28 +51,38 @@ def test_turns_are_counted_whatever_the_torque_s_sign() -> None:
     assert turns(np.stack([z, z[::-1], 0 * z + 1])) == pytest.approx([3.25, 3.25, 0])
 
 
-def motion(n_turns: float, n: int = 2000) -> np.ndarray:
-    """A motion that begins and ends slowly, with a current that grows as it accelerates."""
-    s = np.linspace(0, 1, n)
+FS_OF_MOTIONS_HZ = 2000.0
+
+
+def motion(n_turns: float, at_rest: int = 0) -> tuple[np.ndarray, float]:
+    """A motion of a second that begins and ends slowly, and then holds; its highest frequency.
+
+    Its current grows as it accelerates.
+    """
+    s = np.linspace(0, 1, 2000)
     angle = 2 * np.pi * n_turns * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    return (2 + np.cos(np.pi * s)) * np.exp(1j * angle)
+    z = (2 + np.cos(np.pi * s)) * np.exp(1j * angle)
+    return np.append(z, np.full(at_rest, z[-1])), 1.875 * n_turns
 
 
-@pytest.mark.parametrize(("n_turns", "off_by"), [(7, 0.03), (20, 0.01)])
-def test_the_tapered_mean_over_motions_is_the_offset(n_turns: float, off_by: float) -> None:
+@pytest.mark.parametrize("at_rest", [0, 600])
+@pytest.mark.parametrize(("n_turns", "off_by"), [(7, 0.008), (20, 0.002), (100, 0.002)])
+def test_the_mean_over_turns_is_the_offset(n_turns: float, off_by: float, at_rest: int) -> None:
     offset = 0.1 + 0.2j
-    motions = [offset + motion(n_turns), offset + motion(n_turns + 0.5)]
-    motions[0][700] = np.nan
-    found = mean_over_motions(motions)
-    assert abs(found - offset) < off_by * 2
-    # the plain mean holds the slow turns at both ends
-    assert abs(np.nanmean(np.concatenate(motions)) - offset) > 5 * abs(found - offset)
+    motions = [motion(n_turns, at_rest), motion(n_turns + 0.5, at_rest)]
+    for z, _ in motions:
+        z += offset
+    motions[0][0][700] = np.nan
+    assert abs(mean_over_turns(motions, FS_OF_MOTIONS_HZ) - offset) < off_by * 2
+    # over time the slow turns at both ends weigh most
+    plain = np.nanmean(np.concatenate([z for z, _ in motions]))
+    assert abs(plain - offset) > 3 * off_by * 2
 
 
-def test_no_sample_has_no_offset() -> None:
-    assert mean_over_motions([]) == 0j
-    assert mean_over_motions([np.array([np.nan + 0j]), np.zeros(0, complex)]) == 0j
-    assert mean_over_motions([np.array([3 + 1j])]) == 3 + 1j
+def test_what_does_not_turn_has_no_offset() -> None:
+    for vector in (np.zeros(0), np.array([np.nan]), np.array([3.0]), np.full(500, 3.0)):
+        assert mean_over_turns([(vector + 0j, 10.0)], FS_OF_MOTIONS_HZ) == 0j
+    assert mean_over_turns([], FS_OF_MOTIONS_HZ) == 0j
 
 
 @pytest.mark.parametrize(("turns_of_a_piece", "n_pieces"), [(3.9, 0), (4.1, 3)])

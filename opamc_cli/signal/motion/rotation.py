@@ -101,8 +101,10 @@ def join_rotation(pieces: list[Rotation]) -> Rotation:
     )
 
 
-def net_turns(z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float) -> float:
-    """How far a motion's current vector turns, net, in turns; negative backwards.
+def turning_parts(
+    z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float
+) -> tuple[NDArray[np.complexfloating], NDArray[np.float64]]:
+    """Cut a motion's current vector into parts of a turn, and tell how far it turns in each.
 
     Noise and a torque that changes sign win or lose half turns where the current is small: there
     its neighbours tell.
@@ -110,21 +112,29 @@ def net_turns(z: NDArray[np.complexfloating], f_max_hz: float, fs_hz: float) -> 
     Parameters
     ----------
     z : array, shape (n,), A
-        Current vector, without its sensors' offset; NaN are passed over.
+        Current vector; NaN are passed over.
     f_max_hz : float
         Highest frequency at which it turns, > 0, Hz.
     fs_hz : float
         Sampling rate, Hz.
+
+    Returns
+    -------
+    parts : array, shape (k,), A
+        Means of the vector.
+    turns : array, shape (k,)
+        Of the vector in each, smoothed; negative backwards.
     """
     z = z[np.isfinite(z)]
     length = max(1, int(fs_hz / (PARTS_OF_A_TURN * f_max_hz)))
     count = z.size // length
     parts = z[: count * length].reshape(count, length).mean(axis=1)
     if count < 2:
-        return 0.0
+        return parts, np.zeros(count)
     taper = np.hanning(SMOOTHED_TURNS * PARTS_OF_A_TURN + 2)[1:-1]
     steps = np.convolve(parts[1:] * parts[:-1].conj(), taper)[taper.size // 2 :][: count - 1]
-    return float(np.angle(steps).sum() / (2 * np.pi))
+    between = np.pad(np.angle(steps) / (2 * np.pi), 1, mode="edge")
+    return parts, np.asarray((between[1:] + between[:-1]) / 2, dtype=np.float64)
 
 
 @njit(cache=True, nogil=True)

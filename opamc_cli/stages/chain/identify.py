@@ -20,7 +20,7 @@ from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
-from opamc_cli.signal.motion.rotation import net_turns
+from opamc_cli.signal.motion.rotation import turning_parts
 from opamc_cli.signal.offset import TURNS_AT_TOP_SPEED
 from opamc_cli.stages.chain.compared.speeds import (
     OTHER_SPEEDS,
@@ -573,17 +573,17 @@ def _places(run: Run, part: _Axis, column: str) -> npt.NDArray[np.float64]:
 
 def _turns(run: Run, part: _Axis) -> npt.NDArray[np.float64]:
     """Read how far the current vector of an axis turns in each segment, (n,)."""
-    rate_hz, top_hz = run.sampling_rate_hz, part.features.f_max_hz
-    spans = [_span(part.rows, i) for i in range(len(top_hz))]
-    often = part.features.way >= TURNS_AT_TOP_SPEED
-    whole = [span for span, tells in zip(spans, often, strict=True) if tells]
-    offset = current_offset(run, part.axis, whole, "clarke")
-    return np.array(
-        [
-            net_turns(read_current(run, part.axis, *span, "clarke") - offset, hz, rate_hz)
-            for span, hz in zip(spans, top_hz.tolist(), strict=True)
-        ]
-    )
+    motions = [
+        (*_span(part.rows, i), f_max_hz)
+        for i, f_max_hz in enumerate(part.features.f_max_hz.tolist())
+    ]
+    often = [motions[i] for i in np.flatnonzero(part.features.way >= TURNS_AT_TOP_SPEED)]
+    offset = current_offset(run, part.axis, often, "clarke")
+    turns = np.zeros(len(motions))
+    for i, (start, stop, f_max_hz) in enumerate(motions):
+        vector = read_current(run, part.axis, start, stop, "clarke") - offset
+        turns[i] = turning_parts(vector, f_max_hz, run.sampling_rate_hz)[1].sum()
+    return turns
 
 
 def _span(rows: pa.Table, index: int) -> tuple[int, int]:

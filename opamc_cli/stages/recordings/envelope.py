@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.errors import InputError
-from opamc_cli.signal.offset import mean_over_motions
+from opamc_cli.signal.offset import mean_over_turns
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, envelope
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
@@ -44,25 +44,35 @@ def envelope_kind(path: object, channels: AxisChannels, wanted: EnvelopeKind) ->
     return wanted
 
 
-OFFSET_SPANS = 64
+OFFSET_MOTIONS = 64
 """Most segments that the sensors' offset is estimated from."""
 
 
 def current_offset(
-    run: Run, axis: int, spans: Sequence[tuple[int, int]], wanted: EnvelopeKind = "auto"
+    run: Run, axis: int, motions: Sequence[tuple[int, int, float]], wanted: EnvelopeKind = "auto"
 ) -> complex:
     """Estimate what the current sensors add to the current vector of an axis, A.
 
-    The vector turns, its sensors' offset stands still: it is the mean over `spans` of samples
-    (half-open), motions that turn often. Left in, it modulates the envelope once per electrical
-    period, by more than early damage does, and it drifts from session to session.
+    The vector turns, its sensors' offset stands still: it is the mean over what motions turn by
+    that turn often. Left in, it modulates the envelope once per electrical period, by more than
+    early damage does, and it drifts from session to session.
 
     It is 0 for a reported current, whose mean is torque, and without such a motion.
+
+    Parameters
+    ----------
+    run, axis
+        Open run, and axis counted from 1.
+    motions
+        Start and stop of each, in samples (half-open), and its highest frequency, Hz.
+    wanted
+        See `read_course`.
     """
     if envelope_kind(run.path, run.channels(axis), wanted) == "reported":
         return 0j
-    some = spans[:: -(-len(spans) // OFFSET_SPANS) or 1]
-    return mean_over_motions(read_current(run, axis, *span, wanted) for span in some)
+    some = motions[:: -(-len(motions) // OFFSET_MOTIONS) or 1]
+    vectors = ((read_current(run, axis, start, stop, wanted), hz) for start, stop, hz in some)
+    return mean_over_turns(vectors, run.sampling_rate_hz)
 
 
 def read_envelope(

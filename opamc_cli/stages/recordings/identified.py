@@ -43,7 +43,7 @@ class IdentifiedPart:
         with self.source.open() as run:
             offset = 0j
             if config.remove_offset:
-                offset = current_offset(run, self.axis, turning_spans(self.rows), config.envelope)
+                offset = current_offset(run, self.axis, turning_motions(self.rows), config.envelope)
             for row, (start, stop) in zip(self.rows, spans, strict=True):
                 current = read_course(run, self.axis, start, stop, config.envelope, offset)
                 # a current without bound is a fault of the logger, not a rank
@@ -84,13 +84,14 @@ def aligned_span(row: dict[str, Any]) -> tuple[int, int]:
     return start, start + row["reference_samples"]
 
 
-def turning_spans(rows: Sequence[dict[str, Any]]) -> list[tuple[int, int]]:
+def turning_motions(rows: Sequence[dict[str, Any]]) -> list[tuple[int, int, float]]:
     """Return the segments in which the current vector turns so often that its mean is an offset.
 
-    The reference segment tells, so that all recordings that are compared agree.
+    Start, stop and highest frequency, Hz, of each. The reference segment tells, so that all
+    recordings that are compared agree.
     """
     return [
-        aligned_span(row)
+        (*aligned_span(row), row["reference_f_max_hz"])
         for row in rows
         if row["reference_f_max_hz"] * row["reference_samples"]
         >= TURNS_AT_TOP_SPEED * row["sampling_rate_hz"]

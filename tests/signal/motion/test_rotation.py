@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from opamc_cli.signal.motion.rotation import RotationStream, join_rotation, net_turns
+from opamc_cli.signal.motion.rotation import RotationStream, join_rotation, turning_parts
 
 
 def rotation_of(z, step=16):
@@ -82,10 +82,15 @@ def test_a_motion_s_turns_are_told_beneath_noise(n_turns, torque):
     z = torque * np.exp(1j * angle) + 0.05 * noise
     z[100] = np.nan
     f_max_hz = abs(n_turns) * 1.875 / 2
-    assert net_turns(z, f_max_hz, fs_hz) == pytest.approx(n_turns, abs=0.7)
+    parts, turns = turning_parts(z, f_max_hz, fs_hz)
+    assert parts.size == turns.size == pytest.approx(16 * f_max_hz * 2, rel=0.3)
+    assert turns.sum() == pytest.approx(n_turns, abs=0.7)
 
 
 def test_what_is_too_short_does_not_turn():
-    assert net_turns(vector(100.0, 3), 100.0, 2048.0) == pytest.approx(2 * 100 / 2048, rel=0.01)
-    assert net_turns(vector(100.0, 1), 100.0, 2048.0) == 0
-    assert net_turns(vector(100.0, 0), 100.0, 2048.0) == 0
+    one_hz = vector(100.0, 3)
+    parts, turns = turning_parts(one_hz, 100.0, 2048.0)
+    assert parts == pytest.approx(one_hz)
+    assert turns == pytest.approx(100 / 2048, rel=1e-3)
+    for n in (0, 1):
+        assert turning_parts(one_hz[:n], 100.0, 2048.0)[1].tolist() == [0.0] * n

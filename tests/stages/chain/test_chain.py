@@ -13,7 +13,7 @@ from opamc_cli.signal.ordinal.patterns import time_delay
 from opamc_cli.stages.chain import identify, patterns, segment
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.recordings.envelope import current_offset, read_envelope
-from opamc_cli.stages.recordings.identified import aligned_span
+from opamc_cli.stages.recordings.identified import aligned_span, turning_motions
 from opamc_cli.stages.tuning import sweep
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.tables import record_at
@@ -78,7 +78,7 @@ def test_counts_are_those_of_the_envelope_itself(chain):
     with Run(ONE) as run:
         for row in rows:
             same = [m for m in motions if (m["run"], m["axis"]) == (row["run"], row["axis"])]
-            offset = current_offset(run, row["axis"], [aligned_span(m) for m in same])
+            offset = current_offset(run, row["axis"], turning_motions(same))
             assert 0 < abs(offset) < 0.5
             values = read_envelope(run, row["axis"], row["start"], row["stop"], offset=offset)
             assert row["tau"] == time_delay(2048, row["f_max_hz"], row["order"], 2.0)
