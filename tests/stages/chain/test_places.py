@@ -11,38 +11,47 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 
-RATE_HZ = 250.0
 PICK = 0.7
 PALLET = (-0.61, -0.65, -0.70)
 """Places to which the joint moves in turn, and from each back, rad."""
+ELECTRICAL = 200
+"""Turns of the current vector per turn of the joint."""
 
 
-def save(path, places, seed, first=0, moved=0.0):
-    """Strokes from the pick to one place after another and back, from a stroke on; their ends."""
+def save(path, places, seed, first=0, moved=0.0, phases=False):
+    """Strokes from the pick to one place after another and back, from a stroke on; their ends.
+
+    A reported current with the position, or phase currents alone.
+    """
     rng = np.random.default_rng(seed)
     stops = [stop for place in places for stop in (place, PICK)]
     stops = [stop + moved for stop in (PICK, *stops)][first:]
-    pieces = [np.full(150, stops[0])]
+    scale = 4 if phases else 1
+    rate_hz = 250.0 * scale
+    pieces = [np.full(150 * scale, stops[0])]
     for at, to in pairwise(stops):
-        n = round(100 + 250 * abs(to - at))
+        n = round(100 + 250 * abs(to - at)) * scale
         pieces += [at + (to - at) * (0.5 - 0.5 * np.cos(np.pi * np.arange(n) / n))]
-        pieces += [np.full(rng.integers(60, 140), to)]
+        pieces += [np.full(rng.integers(60, 140) * scale, to)]
     position = np.concatenate(pieces)
-    speed = np.gradient(position) * RATE_HZ
+    speed = np.gradient(position) * rate_hz
     current = np.tanh(speed / 0.02) + 0.5 * speed + 0.01 * rng.normal(size=speed.size)
-    columns = {
-        "axis1_current": current,
-        "axis1_position": position + 1e-5 * rng.normal(size=speed.size),
-    }
-    save_run(path, RunInfo(sampling_rate_hz=RATE_HZ), columns)
+    if phases:
+        angle = ELECTRICAL * position[:, np.newaxis] - 2 * np.pi / 3 * np.arange(3)
+        vector = current[:, np.newaxis] * np.cos(angle) + 0.01 * rng.normal(size=angle.shape)
+        columns = {f"axis1_{phase}": vector[:, k] for k, phase in enumerate("abc")}
+    else:
+        logged = position + 1e-5 * rng.normal(size=speed.size)
+        columns = {"axis1_current": current, "axis1_position": logged}
+    save_run(path, RunInfo(sampling_rate_hz=rate_hz), columns)
     return position
 
 
-def identified(tmp_path, baseline, target):
+def identified(tmp_path, baseline, target, phases=False):
     """Motions of a target by the baseline's cycle, with where each leads, by the truth."""
     for number, places in enumerate(baseline):
-        save(tmp_path / "base" / f"{number}.parquet", places, seed=number)
-    position = save(tmp_path / "target" / "t.parquet", *target)
+        save(tmp_path / "base" / f"{number}.parquet", places, seed=number, phases=phases)
+    position = save(tmp_path / "target" / "t.parquet", *target, phases=phases)
     chain = [load_config(), tmp_path / "out"]
     done = run_chain([tmp_path / "base"], *chain)
     done = run_chain([tmp_path / "target"], chain[0], tmp_path / "t", reference=done.motions)
@@ -51,10 +60,12 @@ def identified(tmp_path, baseline, target):
     return [(row["motion"], position[row["start"]], position[row["stop"] - 1]) for row in rows]
 
 
+@pytest.mark.parametrize("phases", [False, True])
 @pytest.mark.parametrize("first", range(6))
-def test_the_strokes_of_a_pallet_are_told_by_their_places(tmp_path, first):
+def test_the_strokes_of_a_pallet_are_told_by_where_they_lead(tmp_path, first, phases):
     """More cycles would fit where each stroke is taken for that of the next place."""
-    found = identified(tmp_path, [PALLET * 5] * 2, (PALLET * 5, 7, first))
+    places = (-0.61, -0.70, -0.79) if phases else PALLET
+    found = identified(tmp_path, [places * 5] * 2, (places * 5, 7, first), phases)
     led = {}
     for motion, start, stop in found:
         led.setdefault(motion, []).append((start, stop))
@@ -70,8 +81,9 @@ def test_a_joint_with_another_zero_is_told_all_the_same(tmp_path):
     assert [motion for motion, *_ in found] == [0, 1, 2, 3, 4, 5] * 5
 
 
-def test_what_a_camera_guides_is_told_wherever_it_leads(tmp_path):
+@pytest.mark.parametrize("phases", [False, True])
+def test_what_a_camera_guides_is_told_wherever_it_leads(tmp_path, phases):
     rng = np.random.default_rng(1)
     guided = [tuple(rng.uniform(-0.8, -0.5, 12)) for _ in range(3)]
-    found = identified(tmp_path, guided[:2], (guided[2], 7))
+    found = identified(tmp_path, guided[:2], (guided[2], 7), phases)
     assert [motion for motion, *_ in found] == [0, 1] * 12
