@@ -49,9 +49,10 @@ class SegmentFeatures:
         return self.f_max_hz * self.duration_s
 
     @property
-    def lead_somewhere(self) -> bool:
-        """Whether anything is known of where the segments lead."""
-        return self.places_rad is not None or self.turns is not None
+    def leads_by(self) -> str | None:
+        """Name of what tells where the segments lead; None if nothing does."""
+        known = (name for name in ("places_rad", "turns") if getattr(self, name) is not None)
+        return next(known, None)
 
     def anywhere(self) -> "SegmentFeatures":
         """Return the segments as if nothing were known of where they lead."""
@@ -111,6 +112,10 @@ class MatchRule:
     """Whether known directions must agree."""
     middle_tolerance: float | None = None
     """Within which half of the segments have to be."""
+
+    def by_lead(self) -> "MatchRule":
+        """Return the rule for a joint so faulty that it no longer follows its set speed."""
+        return replace(self, min_similarity=0.0, f_max_tolerance=np.inf)
 
     def by_motion(self) -> "MatchRule":
         """Return the rule for a current that is like nothing: a gross fault changes every one."""

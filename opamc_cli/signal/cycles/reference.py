@@ -110,7 +110,7 @@ def period(segments: SegmentFeatures) -> int:
     distance = np.array(
         [np.median(((features[k:] - features[:-k]) ** 2).sum(axis=1)) for k in range(1, m)]
     )
-    if segments.lead_somewhere:
+    if segments.leads_by:
         same = segments.lead_as(segments)
         elsewhere = [np.mean(np.diagonal(same, -k)) < MOSTLY for k in range(1, m)]
         distance[np.array(elsewhere)] = np.inf

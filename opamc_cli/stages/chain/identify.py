@@ -342,7 +342,7 @@ def _references_of_places(
     """Find reference cycles whose motions lead to their places, but where the program's do not."""
     anywhere = [replace(part, features=part.features.anywhere()) for part in parts]
     loose = found_in(anywhere)
-    if not any(part.features.lead_somewhere for part in parts):
+    if not any(part.features.leads_by for part in parts):
         return loose
     strict = found_in(parts)
     for axis, reference in loose.items():
@@ -605,11 +605,15 @@ def _identify_part(job: _Job) -> pa.Table:
         rule, own = match_rule(job.config), part.features.take(whole)
         found = identify_anywhere(reference.features, own, rule)
         # what was taught elsewhere, or has another zero since, is told as where none is logged
-        elsewhere = own.anywhere()
-        if job.judged and found.cycle.max() == UNIDENTIFIED and own.lead_somewhere:
-            found = identify_anywhere(reference.features, elsewhere, rule)
-        if job.judged and found.cycle.max() == UNIDENTIFIED:
-            found = identify(reference.features, elsewhere, rule.by_motion())
+        others = [
+            (identify_anywhere, own.anywhere(), rule),
+            (identify, own.anywhere(), rule.by_motion()),
+        ]
+        if own.leads_by and own.leads_by == reference.features.leads_by:
+            others.insert(1, (identify_anywhere, own, rule.by_lead()))
+        for look, features, within in others if job.judged else ():
+            if found.cycle.max() == UNIDENTIFIED:
+                found = look(reference.features, features, within)
         cycle[whole], motion[whole] = found.cycle, found.motion
         similarity[whole] = found.similarity
         for i in np.flatnonzero(motion >= 0).tolist():
