@@ -114,7 +114,7 @@ class MatchRule:
     """Within which half of the segments have to be."""
 
     def by_lead(self) -> "MatchRule":
-        """Return the rule for a joint so faulty that it no longer follows its set speed."""
+        """Return the rule for places of a joint so faulty that it no longer follows its speed."""
         return replace(self, min_similarity=0.0, f_max_tolerance=np.inf)
 
     def by_motion(self) -> "MatchRule":

@@ -17,7 +17,12 @@ from opamc_cli.errors import InputError, NotEnoughDataError, OpamcError
 from opamc_cli.signal.align import align
 from opamc_cli.signal.cycles.alignment import small
 from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
-from opamc_cli.signal.cycles.identification import UNIDENTIFIED, identify, identify_anywhere
+from opamc_cli.signal.cycles.identification import (
+    UNIDENTIFIED,
+    Identification,
+    identify,
+    identify_anywhere,
+)
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
 from opamc_cli.signal.motion.rotation import turning_parts
@@ -346,18 +351,34 @@ def _references_of_places(
         return loose
     strict = found_in(parts)
     for axis, reference in loose.items():
+        found = [
+            (_told(bare, reference, rule), _told(part, strict[axis], rule))
+            for bare, part in zip(anywhere, parts, strict=True)
+            if part.axis == axis
+        ]
         known, kept = (
-            sum(_told(part, one, rule) for part in own if part.axis == axis)
-            for own, one in ((anywhere, reference), (parts, strict[axis]))
+            sum(np.count_nonzero(told > UNIDENTIFIED) for told in own)
+            for own in zip(*found, strict=True)
         )
-        if kept >= AT_PLACES * known:
+        told_apart = strict[axis].features.leads_by == "places_rad" or _differ(found)
+        if kept >= AT_PLACES * known and told_apart:
             loose[axis] = strict[axis]
     return loose
 
 
-def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> int:
-    own = part.features.take(_usable(part, reference))
-    return int(np.count_nonzero(identify_anywhere(reference.features, own, rule).motion >= 0))
+def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> npt.NDArray[np.int64]:
+    """Return which motion of a reference each segment of an axis is."""
+    told, usable = np.full(len(part.features), UNIDENTIFIED), _usable(part, reference)
+    own = part.features.take(usable)
+    told[usable] = identify_anywhere(reference.features, own, rule).motion
+    return told
+
+
+def _differ(found: Sequence[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]) -> bool:
+    """Tell whether what one reference takes for one motion is several by the other."""
+    pairs = np.concatenate([np.column_stack(told) for told in found])
+    pairs = np.unique(pairs[(pairs > UNIDENTIFIED).all(axis=1)], axis=0)
+    return len(np.unique(pairs[:, 0])) < len(pairs)
 
 
 def _own_references(
@@ -590,6 +611,22 @@ def _span(rows: pa.Table, index: int) -> tuple[int, int]:
     return rows.column("start")[index].as_py(), rows.column("stop")[index].as_py()
 
 
+def _identified(
+    reference: SegmentFeatures, own: SegmentFeatures, rule: MatchRule
+) -> Identification:
+    """Identify segments; turns are asked only where motions are taken for others without.
+
+    Unlike places they are not always told.
+    """
+    found = identify_anywhere(reference, own, rule)
+    if own.leads_by == reference.leads_by == "turns":
+        loose = identify_anywhere(reference, own.anywhere(), rule)
+        both = (found.motion > UNIDENTIFIED) & (loose.motion > UNIDENTIFIED)
+        if np.array_equal(found.motion[both], loose.motion[both]):
+            return loose
+    return found
+
+
 def _identify_part(job: _Job) -> pa.Table:
     part, reference = job.part, job.reference
     n = part.rows.num_rows
@@ -603,13 +640,13 @@ def _identify_part(job: _Job) -> pa.Table:
     whole = _whole(part) if reference is None else _usable(part, reference)
     if reference is not None and whole.size:
         rule, own = match_rule(job.config), part.features.take(whole)
-        found = identify_anywhere(reference.features, own, rule)
+        found = _identified(reference.features, own, rule)
         # what was taught elsewhere, or has another zero since, is told as where none is logged
         others = [
             (identify_anywhere, own.anywhere(), rule),
             (identify, own.anywhere(), rule.by_motion()),
         ]
-        if own.leads_by and own.leads_by == reference.features.leads_by:
+        if own.leads_by == reference.features.leads_by == "places_rad":
             others.insert(1, (identify_anywhere, own, rule.by_lead()))
         for look, features, within in others if job.judged else ():
             if found.cycle.max() == UNIDENTIFIED:

@@ -1,4 +1,4 @@
-"""What is measured of a reported current, however many motions its recording holds."""
+"""Signs of a reported current, and of a current vector's turning beside a logged motion."""
 
 import numpy as np
 import pyarrow as pa
@@ -74,3 +74,30 @@ def test_a_recording_of_one_way_alone_shows_one_sign(tmp_path):
     # where both sides go one way alone they are asked as ever
     turned = measured(tmp_path, "turned", [(1, 100)], alter=np.negative)
     assert "inverted" in refusal(turned, forth)
+
+
+@pytest.mark.parametrize("logged", ["position", "velocity"])
+def test_beside_a_logged_motion_exchanged_phases_turn_against_it(tmp_path, logged):
+    """Whatever the program: its motions there and back may be alike."""
+
+    def recorded(name, moves, order="abc"):
+        v = np.concatenate([sense * np.hanning(length) for sense, length in moves])
+        position = np.cumsum(v) / RATE_HZ
+        torque = 1 + 3 * np.sign(v)
+        columns = {
+            f"axis1_{phase}": torque * np.cos(40 * position - 2 * np.pi * k / 3)
+            for k, phase in enumerate(order)
+        }
+        columns[f"axis1_{logged}"] = position if logged == "position" else v
+        info, path = RunInfo(sampling_rate_hz=RATE_HZ), tmp_path / f"{name}.parquet"
+        save_run(path, info, columns)
+        row = {"run": [name], "axis": [1], "start": [0], "stop": [v.size]}
+        (own,) = measure([RunSource(name, path, "", v.size, info)], pa.table(row))
+        return own
+
+    usual = recorded("usual", there_and_back(6, 300))
+    assert refusal(recorded("own", there_and_back(5, 300)), usual) == ""
+    one_way = [(-1, 300), (-1, 500)]
+    assert refusal(recorded("one way", one_way), usual) == ""
+    exchanged = recorded("exchanged", there_and_back(5, 300), order="bac")
+    assert "two of its phases exchanged" in refusal(exchanged, usual)

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 
 from opamc_cli.config.models import IdentifyConfig
-from opamc_cli.signal.cycles.identification import identify
+from opamc_cli.signal.cycles.identification import identify_anywhere
 from opamc_cli.stages.chain.identify import match_rule, segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
@@ -17,7 +17,7 @@ from opamc_cli.stages.verdict.agreement.measured import Measured
 def exchanged(
     measured: Sequence[Measured], segments: pa.Table, reference: pa.Table, config: IdentifyConfig
 ) -> list[Finding]:
-    """Find axes whose cycles are recognised better with the current turned the other way.
+    """Find axes without a logged motion whose cycles fit better with the current turned round.
 
     Parameters
     ----------
@@ -41,11 +41,13 @@ def exchanged(
         known = reference.filter(pc.equal(reference["axis"], own.axis))
         if not rows.num_rows or not known.num_rows or len(own.signal) != 3:
             continue
+        if own.turning is not None:  # a logged motion has told it, see `findings`
+            continue
         rows = rows.filter(pc.invert(rows["edge"]))
         features, cycle = segment_features(rows), segment_features(known)
         turned = replace(features, direction=-features.direction)
         as_is, reversed_ = (
-            int(np.count_nonzero(identify(cycle, each, rule).cycle >= 0))
+            int(np.count_nonzero(identify_anywhere(cycle, each, rule).cycle >= 0))
             for each in (features, turned)
         )
         if reversed_ > as_is:

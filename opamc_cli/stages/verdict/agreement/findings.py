@@ -28,7 +28,7 @@ DEAD_SHARE = 0.1
 
 TURNED = 0.2
 """Share of a current that has the sign of the speed: friction makes it positive, a load between
-nothing and some of it; less tells no direction."""
+nothing and some of it; less tells no direction. So of a current vector that turns with it."""
 
 REVERSING = 0.1
 """Share of the samples with the rarer sign, from which on a current that has none lost it."""
@@ -79,6 +79,7 @@ class Reference:
     reversing: Mapping[int, float]
     level: Mapping[int, float]
     returning: Mapping[int, float]
+    turning: Mapping[int, float]
     changing: Mapping[int, float]
     steps: Mapping[int, tuple[float, float]]
 
@@ -105,6 +106,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.turning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
         {axis: sorted(own.steps for own in runs)[len(runs) // 2] for axis, runs in by_axis.items()},
     )
@@ -253,6 +255,18 @@ def _other_sign(own: Measured, reference: Reference) -> str | None:
     return None
 
 
+def _turned_round(own: Measured, reference: Reference) -> str | None:
+    usual = reference.turning[own.axis]
+    if own.turning is None or own.turning * usual >= 0:
+        return None
+    if min(abs(own.turning), abs(usual)) < TURNED:
+        return None
+    return (
+        f"the current of axis {own.axis} turns the other way with the joint's motion than the "
+        "baseline's: are two of its phases exchanged?"
+    )
+
+
 def _incomplete(own: Measured, _: Reference) -> str | None:
     name, share = max(own.missing.items(), default=("", 0.0), key=lambda entry: entry[1])
     if share <= MISSING_SHARE:
@@ -291,6 +305,7 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_unit,
     _unbalanced,
     _other_sign,
+    _turned_round,
     _clipped,
     _incomplete,
     _coarser,

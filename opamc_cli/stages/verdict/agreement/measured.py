@@ -10,6 +10,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.signal.plausible.quality import clipped_share
+from opamc_cli.signal.transform.analytic import clarke
 from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
@@ -73,6 +74,9 @@ class Measured:
     """Of a reported current: root mean square with its mean, which no sign changes."""
     returning: float | None = None
     """Beside a reported current: share of the joint's way that leads in the rarer direction."""
+    turning: float | None = None
+    """Of three phases beside a logged motion: how much more their vector turns with the speed than
+    against it, -1..1; None without both."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,11 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
             run, currents, motion, looks, [start for start, _ in stretches] if spans else []
         ),
         **(_signs(looks, currents[0], motion[0]) if motion_told else {}),
+        **(
+            {"turning": _turning(looks, currents, motion[0])}
+            if motion and len(currents) == 3
+            else {}
+        ),
     }
 
 
@@ -231,17 +240,19 @@ def _still_beside(run: Run, names: Sequence[str], suspects: Sequence[str]) -> li
     return [(at, name) for name, at, others in found if others > SWING * swing]
 
 
+def _turning(looks: Sequence[Mapping[str, Floats]], phases: Sequence[str], motion: str) -> float:
+    """Return how much more a current vector turns with the speed than against it."""
+    vectors = [clarke(*(look[name] for name in phases)) for look in looks]
+    turns = np.concatenate([(z * np.roll(z, 1).conj()).imag[1:] for z in vectors])
+    with_speed = turns * np.sign(np.concatenate([_speed(look, motion)[1:] for look in looks]))
+    size = np.nansum(np.abs(with_speed))
+    return float(np.nansum(with_speed) / size) if size else 0.0
+
+
 def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> dict[str, float]:
     """Return how a reported current leans with the speed, the rarer signs of both, and its size."""
     values = np.concatenate([look[current] for look in looks])
-    speeds = np.concatenate(
-        [
-            look[motion]
-            if motion.endswith("velocity")
-            else np.diff(look[motion], prepend=look[motion][:1])
-            for look in looks
-        ]
-    )
+    speeds = np.concatenate([_speed(look, motion) for look in looks])
     drawn, size = np.nansum(values * np.sign(speeds)), np.nansum(np.abs(values))
     forth, back = (float(np.nansum(np.maximum(way * speeds, 0.0))) for way in (1, -1))
     signed = [int(np.count_nonzero(values > 0)), int(np.count_nonzero(values < 0))]
@@ -251,6 +262,12 @@ def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> 
         "level": _rms([values]),
         "returning": min(forth, back) / (forth + back) if forth + back else 0.0,
     }
+
+
+def _speed(look: Mapping[str, Floats], motion: str) -> Floats:
+    """Return the speed of a look, or what it moves by from sample to sample."""
+    values = look[motion]
+    return values if motion.endswith("velocity") else np.diff(values, prepend=values[:1])
 
 
 def _constant(values: npt.NDArray[np.floating], least: int) -> list[tuple[int, int]]:
