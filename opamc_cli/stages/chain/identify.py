@@ -351,19 +351,30 @@ def _references_of_places(
         return loose
     strict = found_in(parts)
     for axis, reference in loose.items():
-        found = [
-            (_told(bare, reference, rule), _told(part, strict[axis], rule))
-            for bare, part in zip(anywhere, parts, strict=True)
-            if part.axis == axis
+        of_axis = [pair for pair in zip(anywhere, parts, strict=True) if pair[1].axis == axis]
+        told = [_told(bare, reference, rule) for bare, _ in of_axis]
+        led = [_told(part, strict[axis], rule) for _, part in of_axis]
+        known, kept = (sum(int(np.count_nonzero(t >= 0)) for t in each) for each in (told, led))
+        if kept < AT_PLACES * known:
+            continue
+        whole = [_whole(part) for _, part in of_axis]
+        motions = [
+            np.concatenate([t[i] for t, i in zip(each, whole, strict=True)]) for each in (told, led)
         ]
-        known, kept = (
-            sum(np.count_nonzero(told > UNIDENTIFIED) for told in own)
-            for own in zip(*found, strict=True)
-        )
-        told_apart = strict[axis].features.leads_by == "places_rad" or _differ(found)
-        if kept >= AT_PLACES * known and told_apart:
+        if strict[axis].features.leads_by == "places_rad" or _mixes(strict[axis], *motions):
             loose[axis] = strict[axis]
     return loose
+
+
+def _mixes(strict: _Reference, told: npt.NDArray[np.int64], led: npt.NDArray[np.int64]) -> bool:
+    """Tell whether segments are told as one motion that lead elsewhere as those of another cycle.
+
+    Turns of a current vector, unlike places, are not always told: they are asked only then.
+    """
+    same = strict.features.lead_as(strict.features)
+    both = (told > UNIDENTIFIED) & (led > UNIDENTIFIED)
+    as_one = (np.unique(led[both & (told == motion)]) for motion in np.unique(told[both]))
+    return not all(same[np.ix_(motions, motions)].all() for motions in as_one)
 
 
 def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> npt.NDArray[np.int64]:
@@ -372,13 +383,6 @@ def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> npt.NDArray[np
     own = part.features.take(usable)
     told[usable] = identify_anywhere(reference.features, own, rule).motion
     return told
-
-
-def _differ(found: Sequence[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]]) -> bool:
-    """Tell whether what one reference takes for one motion is several by the other."""
-    pairs = np.concatenate([np.column_stack(told) for told in found])
-    pairs = np.unique(pairs[(pairs > UNIDENTIFIED).all(axis=1)], axis=0)
-    return len(np.unique(pairs[:, 0])) < len(pairs)
 
 
 def _own_references(
@@ -614,16 +618,13 @@ def _span(rows: pa.Table, index: int) -> tuple[int, int]:
 def _identified(
     reference: SegmentFeatures, own: SegmentFeatures, rule: MatchRule
 ) -> Identification:
-    """Identify segments; turns are asked only where motions are taken for others without.
-
-    Unlike places they are not always told.
-    """
+    """Identify segments; their turns are asked only where they tell motions from one another."""
     found = identify_anywhere(reference, own, rule)
     if own.leads_by == reference.leads_by == "turns":
         loose = identify_anywhere(reference, own.anywhere(), rule)
         both = (found.motion > UNIDENTIFIED) & (loose.motion > UNIDENTIFIED)
-        if np.array_equal(found.motion[both], loose.motion[both]):
-            return loose
+        same = reference.lead_as(reference)[found.motion[both], loose.motion[both]]
+        return loose if same.all() else found
     return found
 
 
