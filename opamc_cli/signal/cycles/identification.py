@@ -122,25 +122,54 @@ def identify_anywhere(
     return best
 
 
+def identify_one_by_one(
+    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
+) -> Identification:
+    """Tell each segment by itself which motion of the reference cycle it is: by its places.
+
+    For motions in another order than the reference's, or a cycle of which a motion is never whole.
+    What could be two motions, or less than half of the reference's motions, is none. A cycle holds
+    as many as follow one another in the reference's order.
+    """
+    n, m = len(reference), len(segments)
+    motion = np.full(m, UNIDENTIFIED, dtype=np.int64)
+    cycle, similarity = motion.copy(), np.zeros(m)
+    agree = _agreeing(reference, segments, rule)
+    own = np.flatnonzero(agree.sum(axis=1) == 1)
+    motion[own] = agree[own].argmax(axis=1)
+    if segments.places_rad is None or 2 * np.unique(motion[own]).size < n:
+        return Identification(cycle, np.full(m, UNIDENTIFIED, dtype=np.int64), similarity)
+    cycle[own] = np.cumsum(np.diff(motion[own], prepend=-1) <= 0)
+    for each in range(cycle.max() + 1):
+        members = np.flatnonzero(cycle == each)
+        window = np.full((1, n), MISSING)
+        window[0, motion[members]] = members
+        similarity[members] = _similarity(reference.variance, segments.variance, window)
+    return Identification(cycle, motion, similarity)
+
+
+def _agreeing(
+    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
+) -> npt.NDArray[np.bool_]:
+    """Tell which segments each by itself could be which motion of the reference; (m, n)."""
+    agree = segments.lead_as(reference)
+    for have, want, tolerance in (
+        (segments.duration_s, reference.duration_s, rule.duration_tolerance),
+        (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
+    ):
+        agree &= np.abs(have[:, np.newaxis] - want) <= tolerance * want
+    if rule.use_direction:
+        agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
+    return agree
+
+
 def _windows(reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule) -> Ints:
     """Return windows each of whose segments agrees with its reference by itself.
 
     Shape (k, n), in the order of their first segments: which segment each motion is.
     """
     n, m = len(reference), len(segments)
-    agree = np.ones((m, n), dtype=bool)
-    beyond = []
-    for have, want, tolerance in (
-        (segments.duration_s, reference.duration_s, rule.duration_tolerance),
-        (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
-    ):
-        difference = np.abs(have[:, np.newaxis] - want)
-        agree &= difference <= tolerance * want
-        if rule.middle_tolerance is not None:
-            beyond.append(difference - rule.middle_tolerance * want)
-    agree &= segments.lead_as(reference)
-    if rule.use_direction:
-        agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
+    agree = _agreeing(reference, segments, rule)
     extra, optional = small(segments, reference), small(reference, reference)
     if extra.any() or optional.any():
         windows = aligned_windows(agree, extra, optional)
@@ -149,9 +178,14 @@ def _windows(reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchR
         windows = windows[agree[windows, np.arange(n)].all(axis=1)]
     there = windows != MISSING
     fits = there.any(axis=1)
-    for values in beyond:
-        own = np.where(there, values[windows, np.arange(n)], np.nan)
-        fits[fits] &= np.nanmedian(own[fits], axis=1) <= 0
+    for have, want in (
+        (segments.duration_s, reference.duration_s),
+        (segments.f_max_hz, reference.f_max_hz),
+    ):
+        if rule.middle_tolerance is not None:
+            beyond = np.abs(have[windows] - want) - rule.middle_tolerance * want
+            own = np.where(there, beyond, np.nan)
+            fits[fits] &= np.nanmedian(own[fits], axis=1) <= 0
     fitting: Ints = windows[fits]
     return fitting
 
