@@ -155,12 +155,18 @@ def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> l
         ]
         if shortened:
             motions_of = sorted({row["motion"] for row in shortened})
+            one, more = len(motions_of) == 1, len(motions_of) - MOST_NAMED
+            named = ", ".join(map(str, motions_of[:MOST_NAMED])) + f" and {more} more" * (more > 0)
             notes.append(
-                f"axis {axis}: motion {', '.join(map(str, motions_of))} is short for its patterns, "
-                f"whose delay was limited to {used} samples so that half of it is left to count"
+                f"axis {axis}: motion{'' if one else 's'} {named} {'is' if one else 'are'} short "
+                f"for {'its' if one else 'their'} patterns, whose delay was limited to {used} "
+                f"samples so that half of {'it' if one else 'each'} is left to count"
             )
     return notes
 
+
+MOST_NAMED = 5
+"""Motions of an axis that a note names, of up to hundreds in a long program."""
 
 LARGEST_SHARE = 0.5
 """Of a motion that a pattern's window may span: longer ones leave hardly any to count."""
