@@ -54,7 +54,7 @@ STEEPEST_PER_C = 0.06
 
 SMALLEST_WARMTH_C, LARGEST_COLD_FACTOR = 2.0, 2.0
 
-LESS_FRICTION = "less friction, and no warmth that explains it: look for a lost preload, or wear-in"
+LESS_FRICTION = "less friction, and no logged warmth that explains it: a lost preload, or wear-in"
 
 
 @dataclass(frozen=True, kw_only=True)

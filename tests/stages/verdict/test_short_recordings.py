@@ -28,7 +28,10 @@ def side(role, spans):
 @pytest.mark.parametrize(
     ("stop", "says"),
     [
-        (700, "much shorter than the baseline's: its motions of axis 1 last 18% as long"),
+        (
+            700,
+            "much shorter than the baseline's, or the joint stops: its motions of axis 1 last 18% as long",
+        ),
         (3000, "fit no motion of the baseline's cycle: another program or speed"),
     ],
 )

@@ -95,7 +95,8 @@ def of_another_speed(ratio: float) -> str:
     """Say why a run, whose motions last so many times as long as the baseline's, is left out."""
     return (
         f"its motions last {ratio:.2f} times as long as the baseline's: of another speed, or a "
-        "clock or lost samples, nothing can be compared"
+        "clock or lost samples, nothing can be compared; or a fault so gross that the joint no "
+        "longer follows its program"
     )
 
 

@@ -197,9 +197,9 @@ def _unfitting(axis: int, rows: pa.Table, baseline: Side) -> str:
     lasts = _lasts(rows)
     if lasts < MUCH_SHORTER * usual:
         return (
-            f"the recording is much shorter than the baseline's: its motions of axis {axis} last "
-            f"{lasts / usual:.0%} as long as those of the shortest one, and {unknown}; record a "
-            "whole cycle"
+            f"the recording is much shorter than the baseline's, or the joint stops: its motions "
+            f"of axis {axis} last {lasts / usual:.0%} as long as those of the shortest one, and "
+            f"{unknown}; record a whole cycle, or look why the joint stands"
         )
     differs = _one_off(axis, rows, baseline)
     if differs is not None:
@@ -210,8 +210,9 @@ def _unfitting(axis: int, rows: pa.Table, baseline: Side) -> str:
             else f"one motion less: the baseline's motion {differs.motion}, {lasts_s}, is not there"
         )
         return (
-            f"{unknown}: each of its cycles has {what}; all others fit. If the program was changed "
-            "on purpose, record a new baseline"
+            f"{unknown}: each of its cycles has {what}; all others fit. Only if the program was "
+            "changed on purpose, record a new baseline; else look at the joint, a gross fault "
+            "breaks motions up"
         )
     return (
         f"{unknown}: another program or speed, another joint's channels, no cycle that repeats, or "
