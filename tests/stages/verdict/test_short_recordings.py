@@ -30,7 +30,7 @@ def side(role, spans):
     [
         (
             700,
-            "much shorter than the baseline's, or the joint stops: its motions of axis 1 last 18% as long",
+            "or the joint stops: its motions of axis 1 last 18% as long as those of the shortest",
         ),
         (3000, "fit no motion of the baseline's cycle: another program or speed"),
     ],
