@@ -122,32 +122,6 @@ def identify_anywhere(
     return best
 
 
-def identify_one_by_one(
-    reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
-) -> Identification:
-    """Tell each segment by itself which motion of the reference cycle it is: by its places.
-
-    For motions in another order than the reference's, or a cycle of which a motion is never whole.
-    What could be two motions, or less than half of the reference's motions, is none. A cycle holds
-    as many as follow one another in the reference's order.
-    """
-    n, m = len(reference), len(segments)
-    motion = np.full(m, UNIDENTIFIED, dtype=np.int64)
-    cycle, similarity = motion.copy(), np.zeros(m)
-    agree = _agreeing(reference, segments, rule)
-    own = np.flatnonzero(agree.sum(axis=1) == 1)
-    motion[own] = agree[own].argmax(axis=1)
-    if segments.places_rad is None or 2 * np.unique(motion[own]).size < n:
-        return Identification(cycle, np.full(m, UNIDENTIFIED, dtype=np.int64), similarity)
-    cycle[own] = np.cumsum(np.diff(motion[own], prepend=-1) <= 0)
-    for each in range(cycle.max() + 1):
-        members = np.flatnonzero(cycle == each)
-        window = np.full((1, n), MISSING)
-        window[0, motion[members]] = members
-        similarity[members] = _similarity(reference.variance, segments.variance, window)
-    return Identification(cycle, motion, similarity)
-
-
 def _agreeing(
     reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
 ) -> npt.NDArray[np.bool_]:

@@ -22,7 +22,6 @@ from opamc_cli.signal.cycles.identification import (
     Identification,
     identify,
     identify_anywhere,
-    identify_one_by_one,
 )
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
@@ -649,8 +648,7 @@ def _identify_part(job: _Job) -> pa.Table:
             (identify, own.anywhere(), rule.by_motion()),
         ]
         if own.leads_by == reference.features.leads_by == "places_rad":
-            by_lead = rule.by_lead()
-            others[:0] = [(identify_anywhere, own, by_lead), (identify_one_by_one, own, by_lead)]
+            others.insert(0, (identify_anywhere, own, rule.by_lead()))
         for look, features, within in others if job.judged else ():
             if found.cycle.max() == UNIDENTIFIED:
                 found = look(reference.features, features, within)

@@ -96,9 +96,3 @@ def test_a_joint_that_does_not_follow_its_speed_is_told_by_its_places(tmp_path):
     """The grosser a fault is, the less it must be left unjudged: 1.4 times the highest speed."""
     found = identified(tmp_path, [PALLET * 5] * 2, (PALLET * 5, 7), swings=0.05)
     assert [motion for motion, *_ in found] == [0, 1, 2, 3, 4, 5] * 5
-
-
-def test_motions_in_another_order_are_told_one_by_one(tmp_path):
-    shuffled = (PALLET[1], PALLET[0], PALLET[0], PALLET[1]) * 3
-    found = identified(tmp_path, [PALLET * 5] * 2, (shuffled, 7))
-    assert [motion for motion, *_ in found] == [2, 3, 0, 1, 0, 1, 2, 3] * 3

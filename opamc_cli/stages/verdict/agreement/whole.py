@@ -1,17 +1,14 @@
 """Recordings of which much is missing, or of another program: what is left may look healthy."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
-import pyarrow.compute as pc
 
 from opamc_cli.errors import InputError
-from opamc_cli.signal.cycles.alignment import small
-from opamc_cli.stages.chain.identify import segment_features
 from opamc_cli.stages.verdict.agreement.unjudged import Side
 
 FEW_CYCLES = 0.6
@@ -64,8 +61,6 @@ def not_whole(baseline: Side, target: Side) -> list[InputError]:
             why = _of_another_program(axes, odd)
         elif all(_far_fewer(axes[axis].cycles, others) for axis, others in known.items()):
             why = _cut(axes, known)
-        elif lacking := _lacking(baseline, target, run, known):
-            why = lacking
         else:
             continue
         errors.append(InputError(f"{paths[run]}: {why}"))
@@ -101,25 +96,6 @@ def _of_another_program(axes: Mapping[int, _Held], odd: Sequence[int]) -> str:
         "of the baseline's cycle and are not judged: another program before or behind it, or a "
         "fault that changes the motion itself?"
     )
-
-
-def _lacking(baseline: Side, target: Side, run: str, axes: Iterable[int]) -> str | None:
-    """Say which of the baseline's motions a recording does not hold on an axis, but small ones."""
-    for axis in axes:
-        of_axis = baseline.motions.filter(pc.equal(baseline.motions["axis"], axis))
-        reference = of_axis.filter(of_axis["reference"])
-        cycle = segment_features(reference)
-        asked = np.asarray(reference["motion"])[~small(cycle, cycle)]
-        lacking = np.setdiff1d(asked, np.asarray(target.rows(axis, run)["motion"])).tolist()
-        if lacking:
-            numbers = ", ".join(map(str, lacking))
-            return (
-                f"motion{'s' * (len(lacking) > 1)} {numbers} of axis {axis} "
-                f"{'are' if len(lacking) > 1 else 'is'} nowhere in it as the baseline has "
-                f"{'them' if len(lacking) > 1 else 'it'}, and the others were told one by one: "
-                "a program in another order, or a fault that changes the motion itself?"
-            )
-    return None
 
 
 def _held(motions: pa.Table) -> dict[str, dict[int, _Held]]:
