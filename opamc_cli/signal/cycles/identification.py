@@ -122,6 +122,40 @@ def identify_anywhere(
     return best
 
 
+def with_cut_cycles(
+    reference: SegmentFeatures,
+    segments: SegmentFeatures,
+    found: Identification,
+    rule: MatchRule,
+) -> Identification:
+    """Add what both ends of a recording hold of a cycle that they cut.
+
+    It goes on from the first and the last motion that is told, for as long as each segment agrees
+    with the motion that is due.
+    """
+    n, told = len(reference), np.flatnonzero(found.motion > UNIDENTIFIED)
+    if not told.size:
+        return found
+    agree = _agreeing(reference, segments, rule)
+    cycle, motion, similarity = found.cycle.copy(), found.motion.copy(), found.similarity.copy()
+    for last, step in ((int(told[0]), -1), (int(told[-1]), 1)):
+        window, due = np.full((1, n), MISSING), motion[last]
+        for segment in range(last + step, len(segments) if step > 0 else -1, step)[: n - 1]:
+            due = (due + step) % n
+            if not agree[segment, due]:
+                break
+            window[0, due] = segment
+        alike = float(_similarity(reference.variance, segments.variance, window)[0])
+        if alike >= rule.min_similarity:
+            due = np.flatnonzero(window[0] != MISSING)
+            if step < 0:
+                cycle[cycle > UNIDENTIFIED] += 1
+            cut = window[0, due]
+            motion[cut], similarity[cut] = due, alike
+            cycle[cut] = 0 if step < 0 else cycle.max() + 1
+    return Identification(cycle, motion, similarity)
+
+
 def _agreeing(
     reference: SegmentFeatures, segments: SegmentFeatures, rule: MatchRule
 ) -> npt.NDArray[np.bool_]:

@@ -22,6 +22,7 @@ from opamc_cli.signal.cycles.identification import (
     Identification,
     identify,
     identify_anywhere,
+    with_cut_cycles,
 )
 from opamc_cli.signal.cycles.reference import MOSTLY, find_reference
 from opamc_cli.signal.motion.reported import fluctuation_frequency, unwrapped
@@ -624,7 +625,7 @@ def _identified(
         loose = identify_anywhere(reference, own.anywhere(), rule)
         both = (found.motion > UNIDENTIFIED) & (loose.motion > UNIDENTIFIED)
         same = reference.lead_as(reference)[found.motion[both], loose.motion[both]]
-        return loose if same.all() else found
+        return loose if same.all() else with_cut_cycles(reference, own, found, rule)
     return found
 
 
