@@ -9,6 +9,7 @@ from opamc_cli.signal.cycles.identification import (
     _most_windows,
     identify,
     sliding_similarity,
+    with_cut_cycles,
 )
 from opamc_cli.signal.cycles.reference import find_reference, period
 
@@ -182,3 +183,25 @@ def test_the_best_similarity_of_what_is_unidentified_is_kept():
     expected = [7.5 / length / np.sqrt(2), 7.5 / length / np.sqrt(2), 4 / length]
     assert found.similarity == pytest.approx(expected)
     assert found.motion.tolist() == found.cycle.tolist() == [-1, -1, -1]
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (1, 3), (3, 1), (2, 0)])
+def test_cycles_that_the_ends_cut_go_on_from_whole_ones(before, after):
+    cycle = series(CYCLE, noise=0)
+    segments = series((CYCLE * 4)[4 - before : 12 + after], noise=0)
+    found = with_cut_cycles(cycle, segments, identify(cycle, segments, RULE), RULE)
+    order = [0] * before + [1] * 4 + [2] * 4 + [3] * after
+    assert found.cycle.tolist() == [own - (before == 0) for own in order]
+    assert found.motion.tolist() == (list(range(4)) * 4)[4 - before : 12 + after]
+    assert found.similarity == pytest.approx(1.0)
+
+
+def test_what_is_not_the_motion_that_is_due_ends_a_cut_cycle():
+    cycle = series(CYCLE, noise=0)
+    segments = series([CYCLE[2], CYCLE[2], CYCLE[3], *CYCLE, CYCLE[0], CYCLE[2]], noise=0)
+    found = with_cut_cycles(cycle, segments, identify(cycle, segments, RULE), RULE)
+    assert found.motion.tolist() == [-1, 2, 3, 0, 1, 2, 3, 0, -1]
+    assert found.cycle.tolist() == [-1, 0, 0, 1, 1, 1, 1, 2, -1]
+    nothing = series([CYCLE[2], CYCLE[2]], noise=0)
+    none = identify(cycle, nothing, RULE)
+    assert with_cut_cycles(cycle, nothing, none, RULE) is none
