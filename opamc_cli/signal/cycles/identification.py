@@ -122,6 +122,15 @@ def identify_anywhere(
     return best
 
 
+def fits_shifted(reference: SegmentFeatures, rule: MatchRule) -> bool:
+    """Tell whether a cycle fits itself from another motion on, but for where its motions lead."""
+    n = len(reference)
+    cycle = reference.anywhere()
+    agree = _agreeing(cycle, cycle, rule)
+    own = np.arange(n)
+    return any(agree[(own + shift) % n, own].all() for shift in range(1, n))
+
+
 def with_cut_cycles(
     reference: SegmentFeatures,
     segments: SegmentFeatures,

@@ -20,6 +20,7 @@ from opamc_cli.signal.cycles.features import MatchRule, SegmentFeatures
 from opamc_cli.signal.cycles.identification import (
     UNIDENTIFIED,
     Identification,
+    fits_shifted,
     identify,
     identify_anywhere,
     with_cut_cycles,
@@ -619,14 +620,13 @@ def _span(rows: pa.Table, index: int) -> tuple[int, int]:
 def _identified(
     reference: SegmentFeatures, own: SegmentFeatures, rule: MatchRule
 ) -> Identification:
-    """Identify segments; their turns are asked only where they tell motions from one another."""
-    found = identify_anywhere(reference, own, rule)
+    """Identify segments, by turns only of a cycle that would else be taken for itself shifted."""
     if own.leads_by == reference.leads_by == "turns":
-        loose = identify_anywhere(reference, own.anywhere(), rule)
-        both = (found.motion > UNIDENTIFIED) & (loose.motion > UNIDENTIFIED)
-        same = reference.lead_as(reference)[found.motion[both], loose.motion[both]]
-        return loose if same.all() else with_cut_cycles(reference, own, found, rule)
-    return found
+        if not fits_shifted(reference, rule):
+            return identify_anywhere(reference, own.anywhere(), rule)
+        found = identify_anywhere(reference, own, rule)
+        return with_cut_cycles(reference, own, found, rule)
+    return identify_anywhere(reference, own, rule)
 
 
 def _identify_part(job: _Job) -> pa.Table:

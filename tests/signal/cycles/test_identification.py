@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import chain, combinations, pairwise
 
 import numpy as np
@@ -7,6 +8,7 @@ from made_cycles import CYCLE, series
 from opamc_cli.signal.cycles.features import MatchRule
 from opamc_cli.signal.cycles.identification import (
     _most_windows,
+    fits_shifted,
     identify,
     sliding_similarity,
     with_cut_cycles,
@@ -205,3 +207,12 @@ def test_what_is_not_the_motion_that_is_due_ends_a_cut_cycle():
     nothing = series([CYCLE[2], CYCLE[2]], noise=0)
     none = identify(cycle, nothing, RULE)
     assert with_cut_cycles(cycle, nothing, none, RULE) is none
+
+
+def test_a_cycle_whose_halves_are_alike_fits_itself_shifted():
+    """Whatever they turn by, as a pallet's strokes do."""
+    cycle = series(CYCLE, noise=0)
+    assert not fits_shifted(cycle, RULE)
+    assert not fits_shifted(series(CYCLE[:1], noise=0), RULE)
+    pallet = replace(series(CYCLE * 2, noise=0), turns=np.arange(8.0))
+    assert fits_shifted(pallet, RULE)

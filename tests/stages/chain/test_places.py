@@ -72,7 +72,7 @@ def test_the_strokes_of_a_pallet_are_told_by_where_they_lead(tmp_path, first, ph
     for motion, start, stop in found:
         led.setdefault(motion, []).append((start, stop))
     assert len(led.keys() - {-1}) == 6
-    assert len(led.get(-1, ())) < 6
+    assert len(led.get(-1, ())) < (1 if phases else 6)
     for motion, ends in led.items():
         if motion >= 0:
             assert np.ptp(ends, axis=0) == pytest.approx([0, 0], abs=0.01)
