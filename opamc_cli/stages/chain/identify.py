@@ -65,6 +65,10 @@ AT_PLACES = 0.5
 cycle, such as a pallet's, both ends of a recording hold a part. Else the program goes elsewhere
 each time, as one does that a camera guides."""
 
+APART = 5.0
+"""Times the middle deviation of a motion's turns from its own middle, by which motions that are
+told as one have to differ: noise alone makes that of four groups of a few 2 to 4, a pallet 30."""
+
 SAME_DURATION = 0.1
 """Relative difference of the durations of motions at the edges of recordings that begin and end
 with the program; where they cut it anywhere, a motion is as often half as whole."""
@@ -359,24 +363,46 @@ def _references_of_places(
         known, kept = (sum(int(np.count_nonzero(t >= 0)) for t in each) for each in (told, led))
         if kept < AT_PLACES * known:
             continue
-        whole = [_whole(part) for _, part in of_axis]
-        motions = [
-            np.concatenate([t[i] for t, i in zip(each, whole, strict=True)]) for each in (told, led)
-        ]
-        if strict[axis].features.leads_by == "places_rad" or _mixes(strict[axis], *motions):
-            loose[axis] = strict[axis]
+        if strict[axis].features.leads_by == "turns":
+            whole = [_whole(part) for _, part in of_axis]
+            turns = [part.features.turns for _, part in of_axis]
+            if not _mixes(*(_joined(each, whole) for each in (turns, told, led))):
+                continue
+        loose[axis] = strict[axis]
     return loose
 
 
-def _mixes(strict: _Reference, told: npt.NDArray[np.int64], led: npt.NDArray[np.int64]) -> bool:
-    """Tell whether segments are told as one motion that lead elsewhere as those of another cycle.
+def _joined(
+    values: Sequence[npt.NDArray[Any] | None], which: Sequence[npt.NDArray[np.int64]]
+) -> npt.NDArray[Any]:
+    return np.concatenate([np.asarray(of)[i] for of, i in zip(values, which, strict=True)])
 
-    Turns of a current vector, unlike places, are not always told: they are asked only then.
+
+def _mixes(
+    turns: npt.NDArray[np.float64], told: npt.NDArray[np.int64], led: npt.NDArray[np.int64]
+) -> bool:
+    """Tell whether segments are told as one motion that turn by other amounts, each time again.
+
+    Turns, unlike places, scatter where noise hides the current: by others than a motion's own
+    repetitions do, or it is no other motion.
+
+    Parameters
+    ----------
+    turns
+        Of each segment.
+    told, led
+        Which motion it is of a cycle that was found without its turns, and with them.
     """
-    same = strict.features.lead_as(strict.features)
     both = (told > UNIDENTIFIED) & (led > UNIDENTIFIED)
-    as_one = (np.unique(led[both & (told == motion)]) for motion in np.unique(told[both]))
-    return not all(same[np.ix_(motions, motions)].all() for motions in as_one)
+    turns, told, led = turns[both], told[both], led[both]
+    motions, of, count = np.unique(led, return_inverse=True, return_counts=True)
+    middle = np.array([np.median(turns[led == motion]) for motion in motions])
+    again = count[of] > 1
+    if not again.any():
+        return False
+    own = float(np.median(np.abs(turns - middle[of])[again]))
+    apart = max(float(np.ptp(middle[np.unique(of[told == one])])) for one in np.unique(told))
+    return apart > APART * own
 
 
 def _told(part: _Axis, reference: _Reference, rule: MatchRule) -> npt.NDArray[np.int64]:

@@ -7,6 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.config import load_config
+from opamc_cli.stages.chain.identify import _mixes
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
@@ -95,3 +96,16 @@ def test_a_joint_that_does_not_follow_its_speed_is_told_by_its_places(tmp_path):
     """The grosser a fault is, the less it must be left unjudged: 1.4 times the highest speed."""
     found = identified(tmp_path, [PALLET * 5] * 2, (PALLET * 5, 7), swings=0.05)
     assert [motion for motion, *_ in found] == [0, 1, 2, 3, 4, 5] * 5
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_turns_that_scatter_are_no_other_motions(seed):
+    """A recording told as one cycle of sixteen motions, or four, where noise hides the current."""
+    rng = np.random.default_rng(seed)
+    scattered = np.tile([119.0, -175.0, 143.0, -87.0], 8) + 2 * rng.normal(size=32)
+    told, once, again = np.tile(range(4), 8), np.arange(32), np.tile(range(16), 2)
+    assert not _mixes(scattered, told, once)
+    assert not _mixes(scattered, told, again)
+    pallet = np.tile([32.0, -32.0, 33.0, -33.0, 34.0, -34.0], 4) + 0.1 * rng.normal(size=24)
+    assert _mixes(pallet, np.tile(range(2), 12), np.tile(range(6), 4))
+    assert not _mixes(pallet, np.full(24, -1), np.tile(range(6), 4))
