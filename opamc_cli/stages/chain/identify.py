@@ -65,9 +65,9 @@ AT_PLACES = 0.5
 cycle, such as a pallet's, both ends of a recording hold a part. Else the program goes elsewhere
 each time, as one does that a camera guides."""
 
-APART = 5.0
+APART = 10.0
 """Times the middle deviation of a motion's turns from its own middle, by which motions that are
-told as one have to differ: noise alone makes that of four groups of a few 2 to 4, a pallet 30."""
+told as one have to differ: noise alone makes that of groups of two 5 and up to 7, a pallet 30."""
 
 SAME_DURATION = 0.1
 """Relative difference of the durations of motions at the edges of recordings that begin and end
