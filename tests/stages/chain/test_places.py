@@ -98,7 +98,7 @@ def test_a_joint_that_does_not_follow_its_speed_is_told_by_its_places(tmp_path):
     assert [motion for motion, *_ in found] == [0, 1, 2, 3, 4, 5] * 5
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(20))
 def test_turns_that_scatter_are_no_other_motions(seed):
     """A recording told as one cycle of sixteen motions, or four, where noise hides the current."""
     rng = np.random.default_rng(seed)
