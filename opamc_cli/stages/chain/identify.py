@@ -611,7 +611,9 @@ def _leads(part: _Axis) -> dict[str, npt.NDArray[np.float64]]:
         channels = run.channels(part.axis)
         if channels.position is not None:
             return {"places_rad": _places(run, part, channels.position)}
-        return {"turns": _turns(run, part)} if len(channels.phases) == 3 else {}
+        by_carrier = part.rows["signal"].unique().to_pylist() == ["phases"]
+        turn = by_carrier and len(channels.phases) == 3
+        return {"turns": _turns(run, part)} if turn else {}
 
 
 def _places(run: Run, part: _Axis, column: str) -> npt.NDArray[np.float64]:
