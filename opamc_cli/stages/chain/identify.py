@@ -629,16 +629,15 @@ def _places(run: Run, part: _Axis, column: str) -> npt.NDArray[np.float64]:
 
 def _turns(run: Run, part: _Axis) -> npt.NDArray[np.float64]:
     """Read how far the current vector of an axis turns in each segment, (n,)."""
-    motions = [
-        (*_span(part.rows, i), f_max_hz)
-        for i, f_max_hz in enumerate(part.features.f_max_hz.tolist())
-    ]
+    f_max_hz = part.features.f_max_hz
+    motions = [(*_span(part.rows, i), hz) for i, hz in enumerate(f_max_hz.tolist())]
     often = [motions[i] for i in np.flatnonzero(part.features.way >= TURNS_AT_TOP_SPEED)]
     offset = current_offset(run, part.axis, often, "clarke")
     turns = np.zeros(len(motions))
-    for i, (start, stop, f_max_hz) in enumerate(motions):
+    for i in np.flatnonzero(f_max_hz > 0).tolist():
+        start, stop, hz = motions[i]
         vector = read_current(run, part.axis, start, stop, "clarke") - offset
-        turns[i] = turning_parts(vector, f_max_hz, run.sampling_rate_hz)[1].sum()
+        turns[i] = turning_parts(vector, hz, run.sampling_rate_hz)[1].sum()
     return turns
 
 

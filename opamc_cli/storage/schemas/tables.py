@@ -117,6 +117,7 @@ LIMITS: Mapping[str, tuple[float, float]] = {
     "n_masked": (0, 1e15),
     "n_pool": (0, 1e15),
     "f_max_hz": (0, MOST_HZ),
+    "reference_f_max_hz": (1e-9, MOST_HZ),
     "base": (1, 1e15),
     "jsd": (0, 1e3),
     "ks": (0, 1),

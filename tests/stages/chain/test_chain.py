@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -186,3 +187,20 @@ def test_sweep_separates_the_damaged_axis_alone(chain, tmp_path):
         assert best[3, order]["ks"] > 0.95
         gap = {a: best[a, order]["jsd_target"] - best[a, order]["jsd_baseline"] for a in (1, 2, 3)}
         assert gap[3] > 5 * max(abs(gap[1]), abs(gap[2]))
+
+
+@pytest.mark.parametrize("f_max_hz", [0.0, np.nan])
+def test_a_segment_that_turns_at_no_frequency_is_no_motion(tmp_path, chain, f_max_hz):
+    _, outcome = chain
+    table = pq.read_table(outcome.segments)
+    values = table["f_max_hz"].to_numpy().copy()
+    values[0] = f_max_hz
+    at = table.schema.get_field_index("f_max_hz")
+    odd = table.set_column(at, table.schema.field(at), pa.array(values))
+    path = outcome.segments.parent / "odd.parquet"
+    pq.write_table(odd, path)
+    found = identify.run(path, load_config(), tmp_path).table.to_pylist()
+    assert found[0]["motion"] == -1
+    assert max(row["cycle"] for row in found) == max(
+        row["cycle"] for row in pq.read_table(outcome.motions).to_pylist()
+    )
