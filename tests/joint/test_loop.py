@@ -22,9 +22,9 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
-from opamc_cli.joint.motion.groups import cycle_length
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
+from opamc_cli.signal.cycles.period import cycle_length
 from tests.marks import long
 
 SHAPES = {

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.motion.corners import clear_of_corners, widened
-from opamc_cli.joint.motion.groups import cycle_length
 from opamc_cli.joint.motion.phases.angle_filter import NOISE_SHARE
 from opamc_cli.joint.motion.phases.following import follow_phases
 from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.phases.torque_axis import side_of_torque, torque_current
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Track, joined
+from opamc_cli.signal.cycles.period import cycle_length
 from opamc_cli.signal.motion.smoothing import (
     CORNER_WINDOW,
     SHORTEST_WINDOW,

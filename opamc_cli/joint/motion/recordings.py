@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from opamc_cli.joint.motion.groups import Grouping, cycle_length, group_samples
+from opamc_cli.joint.motion.groups import Grouping, group_samples
 from opamc_cli.joint.motion.kinematics import SLOWEST_SHARE, Recording, build_track
 from opamc_cli.joint.motion.track import Floats, Joint, Track, comes_back
+from opamc_cli.signal.cycles.period import cycle_length
 
 SHORTEST_TRAVEL_RAD = 1e-4
 FEWEST_MOVING_SAMPLES = 50
