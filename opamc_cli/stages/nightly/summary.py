@@ -216,6 +216,14 @@ class Summary:
                 named = state not in ("failed", "known", "gone", "baseline", "healthy")
                 names = some([_named(one) for one in self.robots if one.shown == state])
                 parts.append(f"{_robots(counts[state])} {words}" + (f": {names}" if named else ""))
+        beside = [
+            one.name
+            for one in self.robots
+            if one.shown in ("alarm", "fault", "changed")
+            and any(joint.state == "insufficient-data" for joint in one.joints)
+        ]
+        if beside:
+            parts.append(f"{_robots(len(beside))} of these with a joint not judged: {some(beside)}")
         return "; ".join(parts)
 
 

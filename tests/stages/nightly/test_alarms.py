@@ -188,6 +188,14 @@ def test_nights_that_only_changed_are_an_alarm_once_the_chart_says_so():
     assert raised(["healthy"] * 20 + ["fault"] * 10, even) == [22]
 
 
+def test_an_alarm_by_the_chart_alone_says_so_and_none_after_a_night_that_differed():
+    quiet = [*[0.1 * (-1) ** day for day in range(16)], *[1.0] * 6]
+    events = settled(nights_of(["healthy"] * 22, quiet)).events
+    assert any("each night for itself healthy, all together not" in one.text for one in events)
+    (alarm,) = settled(nights_of(["healthy"] * 16 + ["fault"] * 4 + ["healthy"], quiet)).alarms
+    assert alarm.text.startswith("healthy in the last night, effect")
+
+
 def test_an_alarm_does_not_end_while_the_chart_is_near_its_limit():
     def cleared(left):
         distances = [0.1 * (-1) ** day for day in range(16)] + [2.0] * 3 + [left] * 6
@@ -390,4 +398,17 @@ def test_a_robot_whose_last_night_conditions_alone_excuse_is_not_counted_as_heal
     assert not robot("2026-03-09").unwatched
     assert Summary((robot("2026-03-09"),)).headline() == (
         "1 robot with a joint not told from unusual conditions: r1"
+    )
+
+
+def test_a_joint_that_is_not_judged_is_counted_beside_one_that_changed():
+    states = {1: "changed", 2: "insufficient-data"}
+    joints = tuple(
+        JointSummary(axis, "", state, "2026-03-09", "", None, None)
+        for axis, state in states.items()
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-09", "", "done"))
+    assert Summary((robot,)).headline() == (
+        "1 robot changed in the last night, no alarm yet: r1; "
+        "1 robot of these with a joint not judged: r1"
     )

@@ -51,7 +51,8 @@ def alarm_of(
         trend = trend_of(lately, since, joint.fault_effect, joint.baseline_nights)
         reached = (rows[night]["effect"] or 0.0) >= joint.fault_effect
         words = trend_phrase(trend, joint.fault_effect, reached)
-        return trend, f"{_state_phrase(rows[night])}; {words}"
+        alone = any(row["state"] in ("changed", "fault") for row in rows[signal:night])
+        return trend, f"{_state_phrase(rows[night], alone)}; {words}"
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)
@@ -116,11 +117,14 @@ def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any])
     return str(min(seen[begun]["night"], signal["night"]))
 
 
-def _state_phrase(row: Mapping[str, Any]) -> str:
+def _state_phrase(row: Mapping[str, Any], alone: bool) -> str:
+    """Tell a night; `alone` says that one before it differed by itself."""
     phrase = {
         "fault": "at fault",
         "changed": "changed",
-        "healthy": "each night for itself healthy, all together not",
+        "healthy": "healthy in the last night"
+        if alone
+        else "each night for itself healthy, all together not",
         "insufficient-data": "not judged in the last night",
     }.get(row["state"], row["state"])
     if row["effect"] is not None and row["state"] in JUDGED:

@@ -3,7 +3,7 @@
   const data = JSON.parse(document.getElementById("data").textContent);
   const [perUnit, lowest] = data.scale;
   const digits = "0123456789abcdefghijklmnopqrstuvwxyz";
-  const rank = ["alarm", "failed", "missing", "gathering", "fault", "changed", "insufficient-data", "partial", "known", "gone", "baseline", "healthy"];
+  const rank = data.states.map(([name]) => name); // worst first
   const step = 200;
   const rows = [];
   for (const [robot, joints] of data.robots) {

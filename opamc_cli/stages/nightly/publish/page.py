@@ -9,7 +9,7 @@ from importlib import resources
 from typing import Any
 
 from opamc_cli.config.cell import CellConfig
-from opamc_cli.stages.nightly.summary import Summary
+from opamc_cli.stages.nightly.summary import SEVERITY, Summary
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.templates import environment
 from opamc_cli.storage.files.atomic import write_text
@@ -38,8 +38,6 @@ MORE_STATES = {
     "excused": ("?", "unknown"),
 }
 """Sign and colour of what a verdict knows nothing of."""
-
-STATES = ("healthy", "changed", "fault", "insufficient-data", *MORE_STATES)
 
 
 def write_page(cell: CellConfig, history: History, summary: Summary) -> None:
@@ -78,7 +76,7 @@ def _data(history: History, summary: Summary, nights: Sequence[str]) -> dict[str
         rows = [
             [
                 joint.axis,
-                STATES.index(robot.shown_of(joint)),
+                SEVERITY.index(robot.shown_of(joint)),
                 joint.since,
                 joint.night,
                 joint.report,
@@ -88,12 +86,13 @@ def _data(history: History, summary: Summary, nights: Sequence[str]) -> dict[str
             for joint in robot.joints
         ]
         if not rows:
-            rows = [[0, STATES.index(robot.shown), "", robot.last_night, "", "", ""]]
+            rows = [[0, SEVERITY.index(robot.shown), "", robot.last_night, "", "", ""]]
         robots.append([robot.name, rows])
     return {
         "nights": list(nights),
         "states": [
-            [name, *MORE_STATES.get(name, (state_sign(name), state_role(name)))] for name in STATES
+            [name, *MORE_STATES.get(name, (state_sign(name), state_role(name)))]
+            for name in SEVERITY
         ],
         "robots": robots,
         "scale": [PER_UNIT, LOWEST],
