@@ -51,8 +51,8 @@ def alarm_of(
         trend = trend_of(lately, since, joint.fault_effect, joint.baseline_nights)
         reached = (rows[night]["effect"] or 0.0) >= joint.fault_effect
         words = trend_phrase(trend, joint.fault_effect, reached)
-        alone = any(row["state"] in ("changed", "fault") for row in rows[signal:night])
-        return trend, f"{_state_phrase(rows[night], alone)}; {words}"
+        differed = any(row["state"] in ("changed", "fault") for row in rows[signal:night])
+        return trend, f"{_state_phrase(rows[night], differed)}; {words}"
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)
@@ -117,13 +117,13 @@ def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any])
     return str(min(seen[begun]["night"], signal["night"]))
 
 
-def _state_phrase(row: Mapping[str, Any], alone: bool) -> str:
-    """Tell a night; `alone` says that one before it differed by itself."""
+def _state_phrase(row: Mapping[str, Any], differed: bool) -> str:
+    """Tell a night; `differed` says that one before it did so by itself."""
     phrase = {
         "fault": "at fault",
         "changed": "changed",
         "healthy": "healthy in the last night"
-        if alone
+        if differed
         else "each night for itself healthy, all together not",
         "insufficient-data": "not judged in the last night",
     }.get(row["state"], row["state"])
