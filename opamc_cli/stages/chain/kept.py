@@ -22,7 +22,6 @@ from opamc_cli import __version__
 from opamc_cli.config import Config
 from opamc_cli.config.models import Section
 from opamc_cli.errors import OpamcError
-from opamc_cli.stages.chain.segments.rows import AxisSegments
 from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.sources import RunSource
@@ -172,9 +171,6 @@ def _tree(value: object, tables: list[pa.Table]) -> Any:
     if isinstance(value, np.ndarray):
         tables.append(pa.table({SAMPLES: value.ravel()}))
         return {"array": [len(tables) - 1, *value.shape]}
-    if isinstance(value, AxisSegments):
-        values = [getattr(value, field.name) for field in fields(value)]
-        return {"segments": [_tree(each, tables) for each in values]}
     if isinstance(value, tuple | list):
         return {"items": [_tree(each, tables) for each in value]}
     if isinstance(value, Mapping):
@@ -204,5 +200,4 @@ def _value(tree: Any, tables: list[pa.Table]) -> Any:
         return np.array(samples).reshape(shape)  # a copy can be written to, as what was kept
     if kind == "fields":
         return {name: _value(each, tables) for name, each in inner.items()}
-    items = tuple(_value(each, tables) for each in inner)
-    return AxisSegments(*items) if kind == "segments" else items
+    return tuple(_value(each, tables) for each in inner)

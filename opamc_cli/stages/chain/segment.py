@@ -117,14 +117,15 @@ def run(
         except OpamcError as error:
             errors.append(error)
     outcome = map_items(remembered(_segment_axis, kept), work, jobs, watch)
+    results = [AxisSegments(*each) for each in outcome.results]  # a kept one is a tuple
     errors += outcome.errors
-    notes = [note for result in outcome.results for note in result.notes]
-    errors += _runs_without_motion(sources, outcome.results, outcome.errors)
+    notes = [note for result in results for note in result.notes]
+    errors += _runs_without_motion(sources, results, outcome.errors)
     path_of = {source.name: source.path for source in sources}
-    lost = [(path_of[each.run], each.lost) for each in outcome.results if each.lost]
+    lost = [(path_of[each.run], each.lost) for each in results if each.lost]
     errors += [InputError(f"{path}: {what}") for path, what in lost]
     table = pa.Table.from_pylist(
-        [row for result in outcome.results for row in result.rows], schema=SEGMENTS
+        [row for result in results for row in result.rows], schema=SEGMENTS
     )
     if not table.num_rows:
         raise _nothing_usable(errors)

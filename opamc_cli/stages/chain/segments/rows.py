@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -31,8 +31,7 @@ MOST_MISSING = 0.1
 """Share of an axis's samples without a number that is a note; of more it is said that they lack."""
 
 
-@dataclass(frozen=True)
-class AxisSegments:
+class AxisSegments(NamedTuple):
     """What was found on one axis of one run."""
 
     run: str
