@@ -12,8 +12,8 @@ from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcErro
 from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
-from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.common import far_together

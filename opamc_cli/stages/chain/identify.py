@@ -35,7 +35,7 @@ from opamc_cli.stages.chain.compared.speeds import (
     odd_cycles,
     odd_speeds,
 )
-from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.envelope import (
     EnvelopeKind,

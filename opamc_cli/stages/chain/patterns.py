@@ -17,8 +17,8 @@ from opamc_cli.config.models import PatternsConfig
 from opamc_cli.errors import OpamcError
 from opamc_cli.signal.ordinal.patterns import n_windows, ordinal_counts, time_delay
 from opamc_cli.signal.plausible.quality import bridged
-from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.stages.recordings.identified import IdentifiedPart, identified_parts
 from opamc_cli.storage.schemas import files

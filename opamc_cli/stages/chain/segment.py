@@ -9,10 +9,10 @@ import pyarrow as pa
 
 from opamc_cli.config import Config
 from opamc_cli.errors import InputError, OpamcError
-from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.segments.carrier import carrier_segments
 from opamc_cli.stages.chain.segments.joint import joint_segments
 from opamc_cli.stages.chain.segments.rows import AxisSegments
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run

@@ -10,7 +10,7 @@ import pyarrow as pa
 from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain import identify, patterns, segment
-from opamc_cli.stages.chain.kept import UNKNOWN, KeptResults
+from opamc_cli.stages.processes.kept import UNKNOWN, KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.storage.files.atomic import atomic_path
 from opamc_cli.storage.schemas import files

@@ -1,7 +1,7 @@
 """How a joint moved in a recording of the baseline, kept once it was asked for.
 
-Reads and writes what `chain/kept` keeps: of a joint that differs from its baseline the current of
-every baseline recording is followed through all of its motion, which takes longer than the
+Reads and writes what `processes/kept` keeps: of a joint that differs from its baseline the current
+of every baseline recording is followed through all of its motion, which takes longer than the
 comparison itself, and the night after asks for the same.
 """
 
@@ -15,7 +15,7 @@ from opamc_cli.joint.change.units import Follow, Tracked, follow
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint, Track
-from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures.loading import undocumented
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign

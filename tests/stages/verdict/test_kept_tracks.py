@@ -9,8 +9,8 @@ import pytest
 from opamc_cli.joint.change import units
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Joint
-from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.model import kept_tracks
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.axis_recording import read_recording
 from opamc_cli.storage.runs.run import Run
 

@@ -16,8 +16,8 @@ from opamc_cli.stages.chain.compared.pattern_rows import (
     cycle_counts,
     group_patterns,
 )
-from opamc_cli.stages.chain.kept import KeptResults, remembered
 from opamc_cli.stages.chain.witnesses import WITNESSES
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.recordings.sessions import (
     BY_FILE,
     Sessions,

@@ -1,7 +1,8 @@
 """What the first night of a fault would ask of its joint's baseline, found with the baseline.
 
-Reads the baseline's tables of a night that was judged; writes what `chain/kept` keeps. Found when
-it is asked for, it would make that night dearer than the next one by a tenth (30 s recordings).
+Reads the baseline's tables of a night that was judged; writes what `processes/kept` keeps. Found
+when it is asked for, it would make that night dearer than the next one by a tenth (30 s
+recordings).
 """
 
 from collections.abc import Sequence
@@ -12,8 +13,8 @@ from pathlib import Path
 from opamc_cli.config import Config
 from opamc_cli.errors import OpamcError
 from opamc_cli.stages.chain.compared.side import read_side
-from opamc_cli.stages.chain.kept import UNKNOWN, KeptResults
 from opamc_cli.stages.nightly.workers.night import Input
+from opamc_cli.stages.processes.kept import UNKNOWN, KeptResults
 from opamc_cli.stages.report.assemble import draw_baseline
 from opamc_cli.storage.schemas import files
 

@@ -13,7 +13,6 @@ import numpy as np
 from opamc_cli import __version__
 from opamc_cli.errors import InputError, NotEnoughDataError, UsageError
 from opamc_cli.stages import diagnose
-from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.nightly.workers.ahead import look_ahead
 from opamc_cli.stages.nightly.workers.night import (
     AxisResult,
@@ -22,6 +21,7 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramJob,
     ProgramResult,
 )
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.report.wording import axes_phrase
 from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch

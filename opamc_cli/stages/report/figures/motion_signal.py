@@ -14,8 +14,8 @@ from opamc_cli.signal.motion.motion_signal import MotionBand, motion_frames
 from opamc_cli.signal.motion.noise import noise_level
 from opamc_cli.signal.transform.analytic import analytic_signal, clarke, temporal_fine_structure
 from opamc_cli.signal.transform.wavelet import Morse
-from opamc_cli.stages.chain.kept import remembered
 from opamc_cli.stages.chain.segments.carrier import CARRIER_SHARE, FRAME_S, HIGHEST_CARRIER_HZ
+from opamc_cli.stages.processes.kept import remembered
 from opamc_cli.stages.report.figures.figure import (
     MAX_TRACE_POINTS,
     Figure,

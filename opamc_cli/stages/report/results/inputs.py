@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages.chain.kept import KeptResults
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.report.results.columns import Columns, n_rows, select, to_columns
 from opamc_cli.storage.files.json_documents import read_json
 from opamc_cli.storage.files.parquet import read_schema

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from opamc_cli.errors import InputError, OpamcError
-from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run

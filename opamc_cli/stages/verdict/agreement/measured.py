@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.signal.plausible.quality import clipped_share
 from opamc_cli.signal.transform.analytic import clarke
-from opamc_cli.stages.chain.kept import KeptResults, remembered
+from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.sources import RunSource

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from opamc_cli.config import load_config
-from opamc_cli.stages.chain.kept import KeptResults
 from opamc_cli.stages.chain.to_patterns import run_chain
+from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.verdict.agreement import duplicates
 from opamc_cli.storage.runs.run import Run
 
