@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.config import load_config
-from opamc_cli.stages.chain.identify import _mixes
+from opamc_cli.stages.chain.cycles.places import mixes
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
@@ -104,8 +104,8 @@ def test_turns_that_scatter_are_no_other_motions(seed):
     rng = np.random.default_rng(seed)
     scattered = np.tile([119.0, -175.0, 143.0, -87.0], 8) + 2 * rng.normal(size=32)
     told, once, again = np.tile(range(4), 8), np.arange(32), np.tile(range(16), 2)
-    assert not _mixes(scattered, told, once)
-    assert not _mixes(scattered, told, again)
+    assert not mixes(scattered, told, once)
+    assert not mixes(scattered, told, again)
     pallet = np.tile([32.0, -32.0, 33.0, -33.0, 34.0, -34.0], 4) + 0.1 * rng.normal(size=24)
-    assert _mixes(pallet, np.tile(range(2), 12), np.tile(range(6), 4))
-    assert not _mixes(pallet, np.full(24, -1), np.tile(range(6), 4))
+    assert mixes(pallet, np.tile(range(2), 12), np.tile(range(6), 4))
+    assert not mixes(pallet, np.full(24, -1), np.tile(range(6), 4))

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.stages.chain.compared.speeds import OTHER_SPEEDS, TWO_SPEEDS
-from opamc_cli.stages.chain.identify import match_rule
+from opamc_cli.stages.chain.cycles.axis import match_rule
 from opamc_cli.stages.chain.segment import SegmentOutcome
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.verdict.agreement.exchanged import exchanged

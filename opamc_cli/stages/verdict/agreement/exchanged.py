@@ -9,7 +9,7 @@ import pyarrow.compute as pc
 
 from opamc_cli.config.models import IdentifyConfig
 from opamc_cli.signal.cycles.identification import identify_anywhere
-from opamc_cli.stages.chain.identify import match_rule, segment_features
+from opamc_cli.stages.chain.cycles.axis import match_rule, segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 

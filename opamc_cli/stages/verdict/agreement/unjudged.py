@@ -14,7 +14,7 @@ from opamc_cli.signal.cycles.changed import OneOff, one_off
 from opamc_cli.signal.cycles.features import MatchRule
 from opamc_cli.stages.chain.compared.side import Sides
 from opamc_cli.stages.chain.compared.speeds import of_another_speed
-from opamc_cli.stages.chain.identify import segment_features
+from opamc_cli.stages.chain.cycles.axis import segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
 from opamc_cli.stages.verdict.evidence import session_names

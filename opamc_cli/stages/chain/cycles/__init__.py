@@ -1,0 +1,1 @@
+"""The segments of an axis, and the cycle that they are identified by."""
