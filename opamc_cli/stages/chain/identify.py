@@ -1,7 +1,7 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
@@ -21,7 +21,6 @@ from opamc_cli.signal.cycles.identification import (
     identify_anywhere,
     with_cut_cycles,
 )
-from opamc_cli.signal.cycles.reference import MOSTLY
 from opamc_cli.stages.chain.compared.speeds import (
     OTHER_SPEEDS,
     TWO_SPEEDS,
@@ -38,7 +37,7 @@ from opamc_cli.stages.chain.cycles.axis import (
 )
 from opamc_cli.stages.chain.cycles.lags import lags_to
 from opamc_cli.stages.chain.cycles.leads import with_leads
-from opamc_cli.stages.chain.cycles.places import references_of_places
+from opamc_cli.stages.chain.cycles.places import AT_PLACES, references_of_places
 from opamc_cli.stages.chain.cycles.reference import (
     Reference,
     given_references,
@@ -176,7 +175,9 @@ def run(
     motions = _without_cycles(motions, pc.is_in(motions["run"], slower))
     midway = odd_cycles(motions)
     motions = _without_cycles(motions, _of_cycles(motions, midway))
-    errors = (*outcome.errors, *_of_two_speeds(midway, sources))
+    left, led, elsewhere = _leading_elsewhere(motions, parts, references)
+    motions = _without_cycles(motions, left)
+    errors = (*outcome.errors, *_of_two_speeds(midway, sources), *led)
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
     path = out / files.MOTIONS
     write_table(
@@ -193,7 +194,7 @@ def run(
         extra=sources_record(list(sources.values()), out)
         | {OTHER_SPEEDS: other_speeds, TWO_SPEEDS: sorted({run for run, _ in midway})},
     )
-    notes = (*_unlike(motions, rule), *_elsewhere(motions, parts, references))
+    notes = (*_unlike(motions, rule), *elsewhere)
     return IdentifyOutcome(path, motions, errors, notes, other_speeds)
 
 
@@ -239,24 +240,51 @@ def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:
     ]
 
 
-def _elsewhere(
+def _leading_elsewhere(
     motions: pa.Table, parts: Sequence[Axis], references: Mapping[int, Reference]
-) -> Iterator[str]:
-    """Say of which recordings the motions lead elsewhere than those of the reference cycle."""
+) -> tuple[pa.Array, list[OpamcError], list[str]]:
+    """Find motions that lead elsewhere than the reference's, whatever the position's zero.
+
+    Where half lead as they should, the others are no motions of the program: their rows, and an
+    error for each axis of a run. Else all are told all the same, with a note.
+    """
     runs, axes, numbers = (np.asarray(motions[name]) for name in ("run", "axis", "motion"))
+    left = np.zeros(motions.num_rows, dtype=bool)
+    errors: list[OpamcError] = []
+    notes = []
     for part in parts:
-        reference = references.get(part.axis)
-        if reference is None or reference.features.places_rad is None:
+        known = references[part.axis].features if part.axis in references else None
+        rows = np.flatnonzero((runs == part.source.name) & (axes == part.axis))
+        told = np.flatnonzero(numbers[rows] > UNIDENTIFIED)
+        places = part.features.places_rad
+        if known is None or known.places_rad is None or places is None or not told.size:
             continue
-        motion = numbers[(runs == part.source.name) & (axes == part.axis)]
-        told = np.flatnonzero(motion > UNIDENTIFIED)
-        same = part.features.take(told).lead_as(reference.features)
-        if told.size and np.mean(same[np.arange(told.size), motion[told]]) < MOSTLY:
-            yield (
+        motion = numbers[rows[told]]
+        own, row = part.features.take(told), np.arange(told.size)
+        zero = np.nanmedian(places[told] - known.places_rad[motion])
+        same = replace(own, places_rad=places[told] - zero).lead_as(known)[row, motion]
+        if np.mean(same) < AT_PLACES:
+            notes.append(
                 f"{part.source.path}: the motions of axis {part.axis} lead elsewhere than the "
                 "reference's and were told by duration, speed and direction: was the program "
-                "edited, or the position's zero set anew?"
+                "edited?"
             )
+            continue
+        if not own.lead_as(known)[row, motion].any():
+            notes.append(
+                f"{part.source.path}: the position of axis {part.axis} has another zero than the "
+                "reference's: was it set anew?"
+            )
+        if not same.all():
+            left[rows[told[~same]]] = True
+            errors.append(
+                InputError(
+                    f"{part.source.path}: {np.sum(~same)} of {told.size} motions of axis "
+                    f"{part.axis} lead elsewhere than the reference's and are not compared: was "
+                    "the program edited?"
+                )
+            )
+    return pa.array(left), errors, notes
 
 
 def _identified(
