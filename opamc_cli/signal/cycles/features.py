@@ -21,6 +21,11 @@ Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
+LINGERS = 1.0
+"""Of its duration, by which a motion may last longer where a joint creeps to its place: a cold
+night's strokes of a second ended 0.8 s late."""
+
+
 @dataclass(frozen=True)
 class SegmentFeatures:
     """What identification knows of a series of segments, in time order; each of shape (n,)."""
@@ -110,10 +115,16 @@ class MatchRule:
     """Whether known directions must agree."""
     middle_tolerance: float | None = None
     """Within which half of the segments have to be."""
+    lingers: float = 0.0
+    """Relative difference by which segments may last longer still."""
 
     def by_lead(self) -> "MatchRule":
         """Return the rule for places of a joint so faulty that it no longer follows its speed."""
         return replace(self, min_similarity=0.0, f_max_tolerance=np.inf)
+
+    def lingering(self) -> "MatchRule":
+        """Return the rule for a joint that creeps to some of its places, as a cold one does."""
+        return replace(self, lingers=LINGERS, middle_tolerance=SAME_PROGRAM)
 
     def by_motion(self) -> "MatchRule":
         """Return the rule for a current that is like nothing: a gross fault changes every one."""

@@ -170,11 +170,12 @@ def _agreeing(
 ) -> npt.NDArray[np.bool_]:
     """Tell which segments each by itself could be which motion of the reference; (m, n)."""
     agree = segments.lead_as(reference)
-    for have, want, tolerance in (
-        (segments.duration_s, reference.duration_s, rule.duration_tolerance),
-        (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance),
+    for have, want, tolerance, more in (
+        (segments.duration_s, reference.duration_s, rule.duration_tolerance, rule.lingers),
+        (segments.f_max_hz, reference.f_max_hz, rule.f_max_tolerance, 0.0),
     ):
-        agree &= np.abs(have[:, np.newaxis] - want) <= tolerance * want
+        away = have[:, np.newaxis] - want
+        agree &= (-tolerance * want <= away) & (away <= (tolerance + more) * want)
     if rule.use_direction:
         agree &= segments.direction[:, np.newaxis] * reference.direction >= 0
     return agree

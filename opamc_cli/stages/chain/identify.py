@@ -320,6 +320,9 @@ def _identify_part(job: _Job) -> pa.Table:
         ]
         if own.leads_by == reference.features.leads_by == "places_rad":
             others.insert(0, (identify_anywhere, own, rule.by_lead()))
+        slower = _identified(reference.features, own, rule.lingering())
+        if slower.cycle.max() > found.cycle.max():  # some of its motions end late, in the cold say
+            found = slower
         for look, features, within in others if job.judged else ():
             if found.cycle.max() == UNIDENTIFIED:
                 found = look(reference.features, features, within)

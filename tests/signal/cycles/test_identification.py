@@ -116,6 +116,21 @@ def test_by_their_motion_alone_cycles_are_told_whatever_the_current():
     assert identify(reference, series(slower), RULE.by_motion()).cycle.max() == -1
 
 
+def test_a_motion_that_creeps_to_its_place_is_told_where_the_others_last_as_ever():
+    reference = series(CYCLE, noise=0)
+
+    def told(*longer):
+        rows = [(v, d * t, *rest) for (v, d, *rest), t in zip(CYCLE, longer, strict=True)]
+        return identify(reference, series(rows, noise=0), RULE.lingering()).cycle.max() == 0
+
+    assert identify(reference, series(CYCLE, noise=0), RULE.lingering()).cycle.max() == 0
+    assert told(1, 1, 1.8, 1)
+    assert not told(1.8, 1, 1.8, 1), "half of them are another program's"
+    assert not told(1, 1, 2.5, 1)
+    assert not told(1, 1, 0.6, 1), "what an emergency stop has cut is no motion"
+    assert not told(1.2, 1.2, 1.2, 1), "nor is another speed another creep"
+
+
 def test_wrong_direction_alone_prevents_a_match():
     reference = series(CYCLE, noise=0)
     turned = [(v, d, f, -s, p) for v, d, f, s, p in CYCLE]
