@@ -3,6 +3,7 @@
 Messages name the file, the column, the value and the limit, and say what to do.
 """
 
+from collections.abc import Iterable
 from enum import IntEnum
 
 
@@ -20,9 +21,21 @@ class ExitCode(IntEnum):
 
 
 class OpamcError(Exception):
-    """Root of the errors that end in one sentence and an exit code."""
+    """Root of the errors that end in one sentence and an exit code.
+
+    Parameters
+    ----------
+    *args
+        The sentence, and what a subclass keeps beside it.
+    axes
+        Joints that it is about; empty: all of a recording, or of none.
+    """
 
     exit_code: ExitCode = ExitCode.BUG
+
+    def __init__(self, *args: object, axes: Iterable[int] = ()) -> None:
+        super().__init__(*args)
+        self.axes = tuple(axes)
 
 
 class UsageError(OpamcError):

@@ -66,6 +66,8 @@ class DiagnoseOutcome:
     """What is worth knowing besides."""
     n_of_baseline: int = 0
     """How many of the errors, the first ones, are the baseline's."""
+    in_part: frozenset[int] = frozenset()
+    """Axes of which not all of the target's recordings could be used."""
     warnings: tuple[str, ...] = ()
     """Those of the notes that nobody may miss: what differs between the recordings of both sides,
     and which faults would not be told."""
@@ -229,7 +231,13 @@ def _diagnose(
         named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
-    of_baseline = (*normal.errors, *decided.odd_ones())
+    of_baseline = (*normal.errors, *unjudged.of_baseline, *decided.odd_ones())
+    of_target = (
+        *(*repeats.errors, *other.errors, *unjudged.errors),
+        *unjudged.sessions_at_rest(sides),
+        *([InputError(stranger)] if stranger else []),
+    )
+    in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
     findings.write_findings(out, findings.Findings(causes, unjudged.axes))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
@@ -241,12 +249,9 @@ def _diagnose(
         report_path=page.path,
         exit_code=written.exit_code or (ExitCode.NOT_ENOUGH_DATA if stranger else ExitCode.DONE),
         n_runs=len(normal.runs_done) + len(other.runs_done),
-        errors=(
-            *(*of_baseline, *repeats.errors, *other.errors, *unjudged.errors),
-            *unjudged.sessions_at_rest(sides),
-            *([InputError(stranger)] if stranger else []),
-        ),
+        errors=(*of_baseline, *of_target),
         n_of_baseline=len(of_baseline),
+        in_part=in_part,
         warnings=(*check_comparable(sides.baseline.sources, sides.target.sources), *blind),
         notes=every_note,
     )

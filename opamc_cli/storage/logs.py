@@ -16,6 +16,7 @@ import uuid
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass, replace
 from datetime import date
+from itertools import islice
 from pathlib import Path
 
 import pyarrow as pa
@@ -38,6 +39,12 @@ NAMELESS = "its name holds control characters or is not UTF-8; rename it"
 
 A_NIGHT = r"\d{4}[-_.]?\d{1,2}[-_.]?\d{1,2}"
 """What stands for {night}, or is meant to; files of other names are strays, and no logs."""
+
+MOST_UNNAMED = 100
+"""Robots that nobody has named that are found: of thousands each costs a millisecond a start."""
+
+MOST_LOOKED_AT = 100
+"""Files of a robot that nobody has named that are looked at for a recording."""
 
 A_NAME = r"[^/.][^/]*?"
 """What stands for {night} in a stray's path."""
@@ -154,6 +161,46 @@ def find_logs_and_strays(
             if robots is None or robot in robots:
                 strays.add((robot, path))
     return _sorted(listed, pattern, robots), sorted(strays)
+
+
+def find_unnamed(pattern: str, robots: tuple[str, ...]) -> list[tuple[str, str]]:
+    """List the robots that have recordings beside some, and where.
+
+    Parameters
+    ----------
+    pattern
+        With {robot}; the folders of its place are listed, and of others than these robots' a file
+        is looked for.
+    robots
+        Names.
+    """
+    head = pattern[: (f"{pattern}/").index("/", pattern.index("{robot}"))]
+    places = _expression(head)
+    found: dict[str, str] = {}
+    looked = set(robots)
+    if "://" in pattern:
+        listed: Iterable[str] = (path for path, _, _ in _remote(pattern, robots))
+    else:
+        listed = glob.iglob(_wild(head), recursive=True)  # noqa: PTH207
+    for at in sorted(listed):
+        if len(found) == MOST_UNNAMED:
+            break
+        of_file = _expression(pattern).fullmatch(at)
+        place = of_file or places.fullmatch(at)
+        if place is None or place["robot"] in looked:
+            continue
+        robot = place["robot"]
+        inside = [at]
+        if of_file is None:
+            looked.add(robot)
+            below = glob.escape(at) + _wild(pattern[len(head) :], robot)
+            inside = [*islice(glob.iglob(below, recursive=True), MOST_LOOKED_AT)]  # noqa: PTH207
+        if any(fits(pattern, path) for path in inside):
+            found[NOT_IN_A_LINE.sub(NO_TEXT, robot)] = NOT_IN_A_LINE.sub(
+                NO_TEXT, at[: place.end("robot")]
+            )
+            looked.add(robot)
+    return sorted(found.items())
 
 
 def _sorted(
@@ -297,6 +344,12 @@ def _closed(pattern: str, robots: tuple[str, ...] | None) -> Iterator[tuple[str,
     for path in _fitting(pattern, robots):
         if not os.access(path, os.R_OK | os.X_OK) and os.path.isdir(path):  # noqa: PTH112
             yield path, 0, 0
+
+
+def _wild(pattern: str, robot: str = "*") -> str:
+    return pattern.replace("{night}", "*").replace(
+        "{robot}", robot if robot == "*" else glob.escape(robot)
+    )
 
 
 def _fitting(pattern: str, robots: tuple[str, ...] | None) -> Iterator[str]:

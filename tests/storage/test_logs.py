@@ -13,6 +13,7 @@ from opamc_cli.storage.logs import (
     fetch,
     find_logs,
     find_logs_and_strays,
+    find_unnamed,
     read_facts,
 )
 from opamc_cli.storage.runs.metadata import RunInfo
@@ -139,3 +140,27 @@ def test_a_recording_is_fetched_once_and_whole(tmp_path):
     with pytest.raises(InputError, match=r"cannot be fetched .*; check address and credentials"):
         fetch(LogFile(log.path, "r", None, 4, 2), copy.parent)
     assert len(list(copy.parent.iterdir())) == 2
+
+
+@pytest.mark.parametrize(
+    ("pattern", "places"),
+    [
+        ("{robot}/{night}/*.parquet", "r{}/2026-03-01/x.parquet"),
+        ("{night}/{robot}/*.parquet", "2026-03-01/r{}/x.parquet"),
+        ("**/{robot}/log/*.parquet", "a/r{}/log/x.parquet"),
+        ("{robot}_{night}.parquet", "r{}_2026-03-01.parquet"),
+        ("{robot}/{robot}_{night}.parquet", "r{0}/r{0}_2026-03-01.parquet"),
+    ],
+)
+def test_robots_that_nobody_named_are_found_if_they_have_recordings(tmp_path, pattern, places):
+    for robot in "123":
+        path = tmp_path / places.format(robot)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("")
+    (tmp_path / "lost+found").mkdir()
+    (tmp_path / "old" / "mar-01").mkdir(parents=True)
+    (tmp_path / "old" / "mar-01" / "x.parquet").write_text("")
+    found = find_unnamed(f"{tmp_path}/{pattern}", ("r2",))
+    assert [robot for robot, _ in found] == ["r1", "r3"]
+    assert all(at.endswith(robot) for robot, at in found)
+    assert find_unnamed(f"{tmp_path}/{pattern}", ("r1", "r2", "r3")) == []

@@ -13,6 +13,12 @@ from opamc_cli.errors import InputError, UsageError
 if TYPE_CHECKING:
     from opamc_cli.storage.history.history import History
 
+WITH_REASON = (
+    "*, coalesce((SELECT reason FROM measure AS m WHERE (m.robot, m.program, m.axis, m.night) = "
+    "(verdict.robot, verdict.program, verdict.axis, verdict.night)), '') AS reason"
+)
+"""Columns of a verdict, and why it is as it is."""
+
 SHOWN = ("robot", "axis", "night", "state", "health_index", "p_value", "cause", "alarm", "n_runs")
 
 
@@ -39,6 +45,7 @@ def history(
     from opamc_cli.config.cell import load_cell
     from opamc_cli.stages.nightly.inputs.recordings import some
     from opamc_cli.stages.nightly.start.run import open_history
+    from opamc_cli.storage.history.rows import told_by
 
     if out is not None and out.suffix not in (".csv", ".parquet", ".json"):
         msg = f"--out {out}: the ending tells the format: .csv, .parquet or .json"
@@ -68,10 +75,15 @@ def history(
             has = some([str(one) for one in sorted(axes)]) or "none yet"
             msg = f"--axis {axis}: nothing is known of it; there are {has}"
             raise InputError(msg)
+        # of the verdicts what lies beside them as well
+        columns = "*" if events else WITH_REASON
         rows = opened.rows(
-            f"SELECT * FROM {table} WHERE {' AND '.join(where)} ORDER BY robot, {column}, axis",
+            f"SELECT {columns} FROM {table} WHERE {' AND '.join(where)} "
+            f"ORDER BY robot, {column}, axis",
             values,
         )
+    for row in () if events else rows:
+        row["excused"], row["in_part"], row["reason"] = told_by(row["reason"])
     if out is not None:
         _export(out, rows, table)
         output.result({"written": str(out), "rows": len(rows)}, f"{out}: {len(rows)} rows")

@@ -116,7 +116,7 @@ def run(
         now: list[Event] = []
         no_more: list[Event] = []
         if wanted == Wanted():
-            now = [*outcome.thinned, *outcome.strays]
+            now = [*outcome.thinned, *outcome.strays, *outcome.unnamed]
             now += silent(history, _today(), loaded.alarm.remind_after)
             now += [one for said in outcome.gathering.values() for one in said]
             untold += history.untold(now)
@@ -140,6 +140,7 @@ def run(
                 **morning.values,
                 "absent": outcome.absent,
                 "strays": [stray.time for stray in outcome.strays],
+                "unnamed": [one.robot for one in outcome.unnamed],
                 "page": str(page),
             },
             *morning.lines,
@@ -171,9 +172,11 @@ def _print_plan(output: Output, outcome: Any) -> None:
             "done": len(outcome.planned) - len(todo),
             "absent": outcome.absent,
             "strays": [stray.time for stray in outcome.strays],
+            "unnamed": [one.robot for one in outcome.unnamed],
         },
         *outcome.absent,
         *(f"{stray.robot} {stray.text}" for stray in outcome.strays),
+        *(one.text for one in outcome.unnamed),
         *(
             f"{night.robot} {night.night}: {night.why}"
             + (", part of the baseline" if night.in_baseline else "")

@@ -19,6 +19,13 @@ step of 0.6, nights of a spread of 0.13, 10 % seemed to grow for sure with fewer
 NORMAL_90 = 1.6449
 """Two-sided 90 % of the normal distribution."""
 
+NORMAL_999 = 3.2905
+"""Two-sided 99.9 %."""
+
+
+STEP = 2.0
+"""Standard deviations of nights that a step has at least."""
+
 
 @dataclass(frozen=True)
 class Slope:
@@ -27,7 +34,7 @@ class Slope:
     per_night: float
     low: float
     high: float
-    """With `per_night`, `low`: change per night with its 90 % interval."""
+    """With `per_night`, `low`: change per night with its interval."""
     middle: float
     """Level in the middle of the nights, where it hardly depends on the slope."""
     age: float
@@ -44,7 +51,7 @@ class Slope:
         return self.low > 0
 
 
-def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
+def robust_slope(nights: FloatArray, values: FloatArray, sure: float = NORMAL_90) -> Slope | None:
     """Return the median of the slopes between all pairs of nights.
 
     Parameters
@@ -53,6 +60,8 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
         Times in nights, ascending.
     values : ndarray, shape (T,)
         Finite.
+    sure : float
+        Half width of the interval, in standard deviations of the normal distribution.
 
     Returns
     -------
@@ -70,7 +79,7 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
     first, second = np.triu_indices(n, 1)
     slopes = np.sort((values[second] - values[first]) / (nights[second] - nights[first]))
     slope, middle = median(slopes), median(nights)
-    reach = NORMAL_90 * np.sqrt(n * (n - 1) * (2 * n + 5) / 18)
+    reach = sure * np.sqrt(n * (n - 1) * (2 * n + 5) / 18)
     low = int(np.floor((len(slopes) - reach) / 2))
     high = int(np.ceil((len(slopes) + reach) / 2))
     return Slope(
@@ -82,7 +91,9 @@ def robust_slope(nights: FloatArray, values: FloatArray) -> Slope | None:
     )
 
 
-def slope_of_spread(nights: FloatArray, values: FloatArray, spread: float) -> Slope | None:
+def slope_of_spread(
+    nights: FloatArray, values: FloatArray, spread: float, sure: float = NORMAL_90
+) -> Slope | None:
     """Return the slope of few nights, of which it is known how much nights differ.
 
     Parameters
@@ -93,6 +104,8 @@ def slope_of_spread(nights: FloatArray, values: FloatArray, spread: float) -> Sl
         Finite.
     spread : float
         Standard deviation of nights that do not grow.
+    sure : float
+        As of `robust_slope`.
 
     Returns
     -------
@@ -104,7 +117,7 @@ def slope_of_spread(nights: FloatArray, values: FloatArray, spread: float) -> Sl
     middle = float(nights.mean())
     square = float(((nights - middle) ** 2).sum())
     slope = float((nights - middle) @ values) / square
-    reach = NORMAL_90 * spread / np.sqrt(square)
+    reach = sure * spread / np.sqrt(square)
     return Slope(
         slope,
         slope - reach,
@@ -112,6 +125,25 @@ def slope_of_spread(nights: FloatArray, values: FloatArray, spread: float) -> Sl
         float(values.mean()),
         float(nights[-1] - middle),
     )
+
+
+def is_step(slope: Slope, before: float, spread: float, span: float) -> bool:
+    """Whether more came at once, before the first of some nights, than in all of them since.
+
+    Then a level since that night describes them better than a rise that begins there, and nights
+    that rise a little by chance must not be taken for its course.
+
+    Parameters
+    ----------
+    slope : Slope
+        Of the nights since.
+    before, spread : float
+        Level before, and standard deviation of nights: what is less than `STEP` of them is none.
+    span : float
+        From the first of the nights since to the last.
+    """
+    grown = slope.per_night * span
+    return slope.level - grown - before > max(grown, STEP * spread)
 
 
 def nights_until(slope: Slope, limit: float) -> tuple[float, float] | None:

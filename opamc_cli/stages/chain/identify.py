@@ -213,7 +213,8 @@ def _of_two_speeds(
         InputError(
             f"{sources[run].path}: {len(cycles)} cycle{'s' * (len(cycles) > 1)} of axis {axis} "
             f"last{'s' * (len(cycles) == 1)} {median(cycles.values()):.2f} times as long as the "
-            "others and are not compared: was the speed changed midway?"
+            "others and are not compared: was the speed changed midway?",
+            axes=[axis],
         )
         for (run, axis), cycles in odd.items()
     ]
@@ -281,7 +282,8 @@ def _leading_elsewhere(
                 InputError(
                     f"{part.source.path}: {np.sum(~same)} of {told.size} motions of axis "
                     f"{part.axis} lead elsewhere than the reference's and are not compared: was "
-                    "the program edited?"
+                    "the program edited?",
+                    axes=[part.axis],
                 )
             )
     return pa.array(left), errors, notes

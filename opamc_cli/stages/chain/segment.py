@@ -122,8 +122,11 @@ def run(
     notes = [note for result in results for note in result.notes]
     errors += _runs_without_motion(sources, results, outcome.errors)
     path_of = {source.name: source.path for source in sources}
-    lost = [(path_of[each.run], each.lost) for each in results if each.lost]
-    errors += [InputError(f"{path}: {what}") for path, what in lost]
+    errors += [
+        InputError(f"{path_of[each.run]}: {each.lost}", axes={row["axis"] for row in each.rows})
+        for each in results
+        if each.lost
+    ]
     table = pa.Table.from_pylist(
         [row for result in results for row in result.rows], schema=SEGMENTS
     )
@@ -144,11 +147,15 @@ def run(
 
 
 def _segment_axis(job: _Job) -> AxisSegments:
-    with Run(job.path, job.name) as recording:
-        channels = recording.channels(job.axis)
-        if channels.phases:
-            return carrier_segments(recording, channels, job.config.segment)
-        return joint_segments(recording, channels, job.config.segment, job.config.joint)
+    try:
+        with Run(job.path, job.name) as recording:
+            channels = recording.channels(job.axis)
+            if channels.phases:
+                return carrier_segments(recording, channels, job.config.segment)
+            return joint_segments(recording, channels, job.config.segment, job.config.joint)
+    except OpamcError as error:
+        error.axes = (job.axis,)
+        raise
 
 
 def _check_rate(recording: Run, config: Config) -> None:

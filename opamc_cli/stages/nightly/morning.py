@@ -9,7 +9,7 @@ from typing import Any
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, some
+from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, said_of_unnamed, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history.history import History
@@ -28,7 +28,7 @@ OVER = {
 """Kinds of event that are a line of their own, in the order in which they are said."""
 
 
-NO_ROBOTS = ("lost", "silent", "ended", "stray")
+NO_ROBOTS = ("lost", "silent", "ended", "stray", "unnamed")
 """Kinds of event that may be of none of the cell's robots."""
 
 MOST_STANDING = 20
@@ -156,19 +156,23 @@ def tell(
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
     strays: dict[str, list[str]] = {}
+    unnamed: dict[str, str] = {}
     others: dict[str, list[str]] = {}
     for event in news:
         if event.kind == "judged-anew":
             others.setdefault(event.robot, []).append(event.text)
         elif event.kind == "stray":
             strays.setdefault(event.robot, []).append(event.time)
+        elif event.kind == "unnamed":
+            unnamed[event.robot] = event.time
     for name, texts in sorted(others.items()):
         lines.append(f"{name} judged anew: {some(sorted(texts), MOST_OTHERS)}")
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
+    lines += [said_of_unnamed(unnamed)] if unnamed else []
     alarms = any(robot.alarms for robot in summary.robots)
     unwatched = any(robot.unwatched for robot in summary.robots)
     # nothing stays of these
-    once = any(event.kind in ("lost", "ended", "stray") for event in news)
+    once = any(event.kind in ("lost", "ended", "stray", "unnamed") for event in news)
     failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
     doubtful = failed or unwatched or once
     code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE
@@ -200,6 +204,7 @@ def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
         robots[robot.name] = {
             "state": robot.shown,
             "missing_since": robot.missing or None,
+            "reasons": list(robot.reasons),
             "done": sorted(night for name, night in outcome.done if name == robot.name),
             "skipped": sorted(
                 night.night

@@ -1,13 +1,13 @@
 """How a cell stands: robots and joints with their alarms, for terminal, page and metrics."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from opamc_cli.stages.nightly.inputs.recordings import some
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, AlarmRow, NightRow, begun_anew
+from opamc_cli.storage.history.rows import UNJUDGED, AlarmRow, NightRow, begun_anew, told_by
 
 SEVERITY = (
     "alarm",
@@ -52,6 +52,12 @@ class JointSummary:
     """The alarm that stands, or None."""
     excused: bool = False
     """Whether it differs, but no more than conditions may move it."""
+    in_part: bool = False
+    """Whether not all of that night's recordings could be used for it."""
+    reason: str = ""
+    """Of its state, in words."""
+    cause: str | None = None
+    """What the change looks like."""
 
     @property
     def shown(self) -> str:
@@ -156,13 +162,49 @@ class RobotSummary:
         """Return a joint's state, or what became of the last night if that is worse."""
         if self.gone and joint.shown != "alarm":
             return "gone"
-        return min(joint.shown, self.of_last_night or "healthy", key=SEVERITY.index)
+        of_night = self.of_last_night
+        if of_night == "partial" and joint not in self._in_part:
+            of_night = ""
+        return min(joint.shown, of_night or "healthy", key=SEVERITY.index)
+
+    @property
+    def _in_part(self) -> Sequence[JointSummary]:
+        """Joints that the last night's recordings did not tell of in full; all if nobody knows."""
+        own = [one for one in self.joints if one.in_part or one.night < self.last_night]
+        return own or self.joints
 
     @property
     def shown(self) -> str:
         """The worst of its joints, or what became of its last night."""
         shown = [self.shown_of(joint) for joint in self.joints]
         return min(shown, key=SEVERITY.index, default=self.of_last_night or "failed")
+
+    @property
+    def reasons(self) -> Iterator[dict[str, Any]]:
+        """Why it is not healthy, but for its alarms, whose words are their own: for programs."""
+        of_night = self.of_last_night
+        why = self.failure.why if self.failure else self.last.why if self.last else ""
+        if of_night == "missing":
+            why = f"no file since {self.missing}"
+        elif of_night == "gathering":
+            why = "its last night is part of another condition's baseline"
+        elif of_night == "failed" and not why:
+            why = "no recording"
+        if of_night == "gone":
+            why = "no recordings, acknowledged"
+        if of_night and (why or of_night != "baseline"):
+            night = self.failure.night if self.failure else self.last_night
+            yield {"kind": of_night, "axis": None, "program": None, "night": night, "text": why}
+        for one in self.joints:
+            if one.alarm is None and one.shown not in ("healthy", "baseline"):
+                yield {
+                    "kind": one.shown,
+                    "axis": one.axis,
+                    "program": one.program,
+                    "night": one.night,
+                    "text": one.reason,
+                    "cause": one.cause,
+                }
 
 
 @dataclass(frozen=True)
@@ -273,7 +315,8 @@ def summarise(
             complete[row["robot"]] = min(row["night"], complete.get(row["robot"], "9999"))
     joints: dict[str, list[JointSummary]] = {}
     query = (
-        "SELECT robot, program, axis, state, max(night) AS night, report, health_index, reason "
+        "SELECT robot, program, axis, state, max(night) AS night, report, health_index, reason, "
+        "cause "
         "FROM verdict JOIN measure USING (robot, program, axis, night) "
         "GROUP BY robot, program, axis"
     )
@@ -282,7 +325,7 @@ def summarise(
         since = begun.get(row["robot"], "")
         if alarm is None and row["night"] < since:
             # against a baseline that somebody has replaced
-            row |= {"state": "baseline", "health_index": None, "reason": ""}
+            row |= {"state": "baseline", "health_index": None, "reason": "", "cause": None}
         joints.setdefault(row["robot"], []).append(_joint(row, alarm))
     names = sorted({*last, *joints, *robots})
     return Summary(
@@ -304,6 +347,7 @@ def summarise(
 
 
 def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
+    excused, in_part, reason = told_by(row["reason"])
     return JointSummary(
         row["axis"],
         row["program"],
@@ -312,7 +356,10 @@ def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
         row["report"] or "",
         row["health_index"],
         alarm,
-        row["reason"].startswith(EXCUSED),
+        excused,
+        in_part,
+        reason,
+        row["cause"],
     )
 
 

@@ -13,7 +13,7 @@ OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "excused", "outside", 
 OF_NIGHT = ("judged-anew", "lacking")
 """Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
 
-OF_START = ("thinned", "stray", "silent", "gathering")
+OF_START = ("thinned", "stray", "unnamed", "silent", "gathering")
 """Kinds of event that each start finds anew."""
 
 STANDING = ("stands", "known")
@@ -28,6 +28,10 @@ UNJUDGED = ("failed", "broken")
 EXCUSED = "excused: "
 """What the reason begins with of a joint that is healthy, but differs, if no more than conditions
 may move it; a column of its own would be another layout of the file."""
+
+IN_PART = "in part: "
+"""What the reason begins with, behind `EXCUSED`, of a joint for which not all of its night's
+recordings could be used: of another joint of the same night they may have been."""
 
 DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
 """Kinds of event that follow from the nights; the others were declared by a user."""
@@ -74,7 +78,7 @@ class MeasureRow:
     harmless: int
     """Whether the change has a cause outside the joint."""
     reason: str
-    """First reason of the verdict, for what could not be judged or is `EXCUSED`."""
+    """First reason of the verdict, behind its marks: see `told_by`."""
 
 
 @dataclass(frozen=True)
@@ -157,6 +161,19 @@ class AlarmSpan:
     """Later than any night while it stands."""
     baseline: str
     """Name of the baseline whose nights raised it."""
+
+
+def told_by(reason: str) -> tuple[bool, bool, str]:
+    """Return whether a joint is excused, whether it was judged in part, and its reason in words.
+
+    Examples
+    --------
+    >>> told_by("excused: in part: It differs.")
+    (True, True, 'It differs.')
+    """
+    rest = reason.removeprefix(EXCUSED)
+    text = rest.removeprefix(IN_PART)
+    return rest != reason, text != rest, text
 
 
 def begun_anew(declared: Iterable[Declared]) -> list[tuple[str, str]]:

@@ -6,6 +6,8 @@ from scipy.stats import theilslopes
 
 from opamc_cli.decision.trend.slope import (
     LEAST_NIGHTS,
+    NORMAL_999,
+    is_step,
     nights_until,
     robust_slope,
     slope_of_spread,
@@ -83,3 +85,19 @@ def test_few_nights_have_a_slope_where_it_is_known_how_much_nights_differ():
         inside += found.low <= 0.1 <= found.high
     assert 0.86 <= inside / 400 <= 0.94
     assert slope_of_spread(nights[:2], nights[:2], 0.05) is None
+
+
+def test_what_came_at_once_is_a_step_until_more_has_come_since():
+    nights = np.arange(12.0)
+    for leap, grown, step in ((1.0, 0.2, True), (1.0, 1.2, False), (0.2, 0.0, False)):
+        slope = robust_slope(nights, leap + grown * nights / 11)
+        assert slope is not None
+        assert is_step(slope, before=0.0, spread=0.13, span=11.0) is step
+
+
+def test_a_surer_interval_is_wider():
+    values = np.arange(20.0) + np.random.default_rng(1).normal(0, 3, 20)
+    usual, sure = (robust_slope(np.arange(20.0), values, of) for of in (1.6449, NORMAL_999))
+    assert usual is not None
+    assert sure is not None
+    assert sure.low < usual.low < usual.per_night == sure.per_night < usual.high < sure.high

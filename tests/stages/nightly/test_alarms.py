@@ -332,6 +332,26 @@ def test_a_step_is_no_growth_and_what_is_reached_is_not_forecast():
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4, reached=True) == now
 
 
+def test_a_sensors_step_is_forecast_no_more_than_nights_that_stay():
+    """A gain of a current sensor, one tenth more from one night on, called friction: nights that
+    rose by chance were told to reach the fault level in "8 to 46 nights"."""
+    before = [0.02, -0.05, 0.1, -0.08, 0.04, 0.02]
+    since = [0.91, 0.88, 0.97, 1.17, 1.06, 1.02, 0.93, 1.08, 1.08]
+    effects = [0.1] * 6 + [0.09, 0.115, 0.11, 0.202, 0.132, 0.168, 0.148, 0.171, 0.296]
+    series = nights_of(["healthy"] * 7 + ["fault"] * 8, before + since)
+    for row, effect in zip(series, effects, strict=True):
+        row["effect"] = effect
+    (alarm,) = settled(series).alarms
+    assert alarm.text == "at fault, effect 0.30; a step, no trend since"
+    assert json.loads(alarm.trend)["reach"] is None
+    # back again it is at fault level no more, whatever level its nights had
+    for row in series[7:]:
+        row["effect"] = 0.8
+    series[-1]["effect"] = 0.02
+    (alarm,) = settled(series).alarms
+    assert alarm.text == "at fault, effect 0.02; was at fault level (0.4) before, not in this night"
+
+
 def test_temperature_is_taken_off_the_trend_where_it_is_logged():
     rng = np.random.default_rng(4)
     distances = 0.1 * np.clip(np.arange(30) - 10, 0, None)

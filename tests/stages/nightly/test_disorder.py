@@ -16,6 +16,7 @@ from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.morning import silent
 from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.stages.nightly.start import run as stage
+from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
 from opamc_cli.storage.logs import LogFile, read_facts
@@ -72,8 +73,9 @@ def test_hundreds_of_broken_files_are_one_short_line(cell, logs, opamc):
     for index in range(200):
         (logs / "r1" / night(4) / f"{index:03d}.parquet").write_text("half a file")
     (line,) = (one for one in opamc("nightly", cell, "--quiet").out.splitlines() if "r1" in one)
-    assert "199.parquet: cannot be opened" in line
-    assert line.endswith("; and 197 more files")
+    names = ", ".join(f"{night(4)}/00{index}.parquet" for index in range(3))
+    assert f": 200 recordings ({names} and 197 more): cannot be opened" in line
+    assert len(line) < 400
 
 
 @pytest.mark.long
@@ -273,6 +275,62 @@ def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc
     assert states(cell) == ["baseline"] * 3 + ["done"] * 2
 
 
+@pytest.mark.usefixtures("here", "undrawn")
+def test_a_joint_s_baseline_that_lacks_one_night_is_said_once_and_no_night_is_partial(cell, opamc):
+    """Each night of a healthy robot was judged in part, exit code 4, for as long as it lasted."""
+    logs = cell.parent / "logs"
+    for robot in ("r2", "r3"):
+        shutil.rmtree(logs / robot)
+    _freeze(logs / "r1" / night(1) / "cycle.parquet")
+    last = cell.parent / "aside"
+    (logs / "r1" / night(4)).rename(last)
+    first = opamc("nightly", cell, "--quiet")
+    last.rename(logs / "r1" / night(4))
+    second = opamc("nightly", cell, "--quiet")
+    assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
+    assert first.out.count("Only axis 2 of this recording is left out") == 1
+    assert first.out.startswith("r1 its baseline: ")
+    assert f"{night(1)}/cycle.parquet: axis2_b keeps one value" in first.out
+    assert states(cell) == ["baseline"] * 3 + ["done"] * 2
+
+
+@pytest.mark.usefixtures("here", "undrawn")
+def test_joints_that_a_lost_part_is_not_of_are_healthy(cell, opamc):
+    logs = cell.parent / "logs"
+    for robot in ("r2", "r3"):
+        shutil.rmtree(logs / robot)
+    place = logs / "r1" / night(4)
+    shutil.copy(place / "cycle.parquet", place / "more.parquet")
+    set_clock(place / "more.parquet", f"{night(4)}T23:00:00+00:00", scale=1.001)
+    _freeze(place / "more.parquet")
+    broken = shutil.copy(place / "cycle.parquet", place / "none.parquet")
+    set_clock(broken, f"{night(4)}T23:10:00+00:00", scale=1.002)
+    with Run(broken) as run:
+        info, columns = run.info, run.read(run.columns)
+    save_run(broken, info, columns | {"axis2_a": np.full_like(columns["axis2_a"], 0.5)})
+    robot = json.loads(opamc("nightly", cell, "--json").out)["robots"]["r1"]
+    (reason,) = robot["reasons"]
+    assert "axis2_a is constant" in reason["text"]
+    assert (robot["state"], reason["kind"], reason["night"]) == ("partial", "partial", night(4))
+    assert "Only axis 2 of this recording is left out" in reason["text"]
+    with History(cell.parent / "nightly" / "history.sqlite") as history:
+        (found,) = summarise(history).robots
+    assert [found.shown_of(joint) for joint in found.joints] == ["healthy", "partial"]
+    of_night = ("history", "--cell", cell, "--since", night(4), "--json")
+    rows = json.loads(opamc(*of_night).out)["verdict"]
+    assert [(row["excused"], row["in_part"]) for row in rows] == [(False, False), (False, True)]
+    assert all("healthy sessions" in row["reason"] or "too" in row["reason"] for row in rows)
+
+
+def _freeze(path):
+    """Have one current of axis 2 stand still half way."""
+    with Run(path) as run:
+        info, columns = run.info, run.read(run.columns)
+    values = columns["axis2_b"].copy()
+    values[len(values) // 2 :] = values[len(values) // 2]
+    save_run(path, info, columns | {"axis2_b": values})
+
+
 @pytest.mark.long
 def test_verdicts_that_change_afterwards_are_said(cell, logs, opamc):
     opamc("nightly", cell)
@@ -344,6 +402,25 @@ def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opa
     (logs / "r1" / night(5)).mkdir()
     (logs / "r1" / night(5) / "cycle.parquet").write_text("half a file")
     assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
+
+
+def test_a_robot_that_the_cell_does_not_name_is_said_once(cell, logs, opamc):
+    """Its recordings lay there for ever, and nobody said that nothing watches it."""
+    cell.write_text(cell.read_text() + "robots: {r1: {}}\n")
+    (logs / "lost+found").mkdir()
+    planned = opamc("nightly", cell, "--dry-run")
+    said = f"r3 not named by the cell's file: recordings in {logs / 'r3'} are not judged; name"
+    assert said in planned.out
+    assert json.loads(opamc("nightly", cell, "--dry-run", "--json").out)["unnamed"] == ["r3"]
+    first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
+    assert (first.code, second.code, second.out) == (ExitCode.PARTIAL, ExitCode.DONE, "")
+    assert first.out.startswith(said)
+    # another one is news, and one line
+    for robot in ("r4", "r5"):
+        shutil.copytree(logs / "r3", logs / robot)
+    third = opamc("nightly", cell, "--quiet")
+    assert (third.code, third.out.count("\n")) == (ExitCode.PARTIAL, 1)
+    assert third.out.startswith(f"r4, r5 not named by the cell's file: recordings in {logs / 'r4'}")
 
 
 @pytest.mark.long

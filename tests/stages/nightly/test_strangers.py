@@ -237,7 +237,7 @@ def test_a_file_that_tells_no_night_costs_no_report(small, opamc):
     assert f"r2 {logs / 'r2' / 'a.parquet'}: cannot be opened" in first.out
     assert second.out == ""
     (logs / "r2" / "b.parquet").write_text("x")
-    assert "b.parquet: cannot be opened" in opamc("nightly", small, "--quiet").out
+    assert "r2/b.parquet): cannot be opened" in opamc("nightly", small, "--quiet").out
 
 
 def test_a_night_that_fails_for_another_reason_is_told_anew(tmp_path):

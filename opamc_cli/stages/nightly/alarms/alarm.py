@@ -10,7 +10,7 @@ from opamc_cli.decision.trend.alarm import Episode
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
-from opamc_cli.stages.nightly.alarms.trend import trend_of, trend_phrase
+from opamc_cli.stages.nightly.alarms.trend import FALLEN, trend_of, trend_phrase
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, begun_anew
 
 MOST_NIGHTS = 365
@@ -49,8 +49,9 @@ def alarm_of(
         """Return the trend by what was known in a night, and the words of it."""
         lately = measured(rows[max(0, night + 1 - MOST_NIGHTS) : night + 1])
         trend = trend_of(lately, since, joint.fault_effect, joint.baseline_nights)
-        reached = (rows[night]["effect"] or 0.0) >= joint.fault_effect
-        words = trend_phrase(trend, joint.fault_effect, reached)
+        limit, effect = joint.fault_effect, rows[night]["effect"] or 0.0
+        judged_low = rows[night]["state"] in JUDGED and effect < FALLEN * limit
+        words = trend_phrase(trend, limit, effect >= limit, judged_low)
         differed = any(row["state"] in ("changed", "fault") for row in rows[signal:night])
         return trend, f"{_state_phrase(rows[night], differed)}; {words}"
 

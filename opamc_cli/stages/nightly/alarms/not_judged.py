@@ -1,12 +1,12 @@
 """What to say of nights that were not judged, or not for sure: not every night the same."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
+from opamc_cli.stages.nightly.alarms.together import kind
 from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
 
 
@@ -73,8 +73,8 @@ def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterato
     dated = [row for row in nights if row.night]
     for failing, part in groupby(dated, key=lambda row: bool(row.why)):
         streak = list(part) if failing else []
-        for kind in ("partial", "failed"):
-            rows = [row for row in streak if (row.status in UNJUDGED) == (kind == "failed")]
+        for of in ("partial", "failed"):
+            rows = [row for row in streak if (row.status in UNJUDGED) == (of == "failed")]
             if not rows:
                 continue
             dates, reasons = [row.night for row in rows], [row.why for row in rows]
@@ -82,12 +82,12 @@ def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterato
             if len(dates) > 1:
                 in_a_row = " in a row" if len(rows) == len(streak) else ""
                 span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights{in_a_row})"
-            if kind == "partial":
+            if of == "partial":
                 judged = any(row.status != "baseline" for row in rows)
                 span += f": in part not {'judged' if judged else 'used'}"
             text = f"{span}: {_in_one(dates, reasons)}"
             for index in said_in(dates, reasons, remind_after):
-                yield Event(dates[index], robot, None, kind, text)
+                yield Event(dates[index], robot, None, of, text)
 
 
 def said_in(nights: Sequence[str], reasons: Sequence[str], remind_after: int) -> list[int]:
@@ -106,22 +106,20 @@ def said_in(nights: Sequence[str], reasons: Sequence[str], remind_after: int) ->
 
 
 def _in_one(nights: Sequence[str], reasons: Sequence[str]) -> str:
-    """Return the last night's reason, and since when there were others.
+    """Return the last night's reason, and what else was said of the others, each sentence once.
 
     It is the same whenever it is said: who hears of it late hears it once.
     """
     text = reasons[-1]
     known = _kinds(text)
     for night, reason in zip(nights, reasons, strict=True):
-        if not _kinds(reason) <= known:
-            text += f"; {night}: {reason}"
-            known |= _kinds(reason)
+        new = {kind(one): one for one in reason.split("; ") if kind(one) not in known}
+        if new:
+            text += f"; {night}: {'; '.join(new.values())}"
+            known |= new.keys()
     return text
 
 
 def _kinds(reason: str) -> set[str]:
-    """Return a reason's sentences without what differs from night to night: paths and numbers."""
-    return {
-        " ".join(word for word in one.split() if not re.search(r"[\d/]", word))
-        for one in reason.split("; ")
-    }
+    """Return what kinds of sentence a reason has."""
+    return {kind(one) for one in reason.split("; ")}

@@ -1,6 +1,6 @@
 """What is recorded of a cell: every file with its hash and facts, read once in its life."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cached_property
@@ -18,6 +18,7 @@ from opamc_cli.storage.logs import (
     find_closed,
     find_logs,
     find_logs_and_strays,
+    find_unnamed,
     fits,
     read_facts,
 )
@@ -82,6 +83,8 @@ class CellRecordings:
     """What is known of the recordings of robots that are not asked for."""
     strays: list[tuple[str, str]]
     """Robot and path of recordings that lie in the place of a night and are called otherwise."""
+    unnamed: list[tuple[str, str]]
+    """Robots with recordings that the cell's file does not name, and where these lie."""
 
 
 def find_recordings(
@@ -107,6 +110,7 @@ def find_recordings(
     """
     named = None if cell.robots == "auto" else tuple(cell.robots)
     logs, strays = find_logs_and_strays(cell.runs, named)
+    unnamed = find_unnamed(cell.runs, named) if named and only is None else []
     judged = {robot for robot, _ in history.nights()}
     # a robot whose logs were cleared away, or are out of reach, keeps its alarm
     robots = sorted(named or {log.robot for log in logs} | judged)
@@ -137,6 +141,7 @@ def find_recordings(
         {robot: [] for robot in wanted},
         {},
         [one for one in strays if only is None or one[0] in only],
+        [one for one in unnamed if not Path(one[1]).is_relative_to(cell.out)],
     )
     for log in logs:
         if log.robot in result.by_robot:
@@ -251,4 +256,14 @@ def said_of_strays(paths: Sequence[str]) -> str:
     return (
         f"{some(paths, 3)}: no night by name, nothing of it is judged; call it YYYY-MM-DD, or keep "
         "it where `runs` does not look"
+    )
+
+
+def said_of_unnamed(places: Mapping[str, str]) -> str:
+    """Say of robots with recordings that the cell's file does not name them; by name, where."""
+    them = "this robot" if len(places) == 1 else "these robots"
+    return (
+        f"{some([*places])} not named by the cell's file: recordings in "
+        f"{some([*places.values()], 3)} are not judged; name {them} under `robots`, or keep them "
+        "where `runs` does not look"
     )

@@ -10,6 +10,7 @@ from opamc_cli.stages.nightly.inputs.recordings import (
     Recording,
     find_recordings,
     said_of_strays,
+    said_of_unnamed,
     some,
 )
 from opamc_cli.stages.nightly.inputs.strangers import said_of_baselines, without_strangers
@@ -61,6 +62,10 @@ def arrive(
     outcome = CellOutcome(robots=tuple(sorted(own)))
     outcome.strays = [
         Event(path, robot, None, "stray", said_of_strays([path])) for robot, path in found.strays
+    ]
+    outcome.unnamed = [
+        Event(path, robot, None, "unnamed", said_of_unnamed({robot: path}))
+        for robot, path in found.unnamed
     ]
     outcome.thinned = [
         Event(

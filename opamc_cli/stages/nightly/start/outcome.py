@@ -42,6 +42,8 @@ class CellOutcome:
     """Conditions of which no night is judged yet, by robot."""
     strays: list[Event] = field(default_factory=list)
     """Recordings that lie in the place of a night and are called otherwise."""
+    unnamed: list[Event] = field(default_factory=list)
+    """Robots with recordings that the cell's file does not name."""
     ended: str = ""
     """Why the start came to an end before all was done; empty if it did not."""
     robots: tuple[str, ...] = ()

@@ -6,6 +6,7 @@ from pathlib import Path
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import UsageError
+from opamc_cli.stages.nightly.alarms.together import together
 from opamc_cli.stages.nightly.inputs.strangers import several_named
 from opamc_cli.stages.nightly.plan.planned import PlannedNight
 from opamc_cli.stages.nightly.settle import OF_NIGHT
@@ -14,11 +15,20 @@ from opamc_cli.stages.nightly.workers.night import AxisResult, NightJob, Program
 from opamc_cli.stages.nightly.workers.workers import Broken
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import Event, MeasureRow, NightRow, VerdictRow, as_notes
+from opamc_cli.storage.history.rows import (
+    EXCUSED,
+    IN_PART,
+    Event,
+    MeasureRow,
+    NightRow,
+    VerdictRow,
+    as_notes,
+    told_by,
+)
 from opamc_cli.storage.schemas import files
 
 MOST_REASONS = 3
-"""Files of a night that are named when they cannot be used."""
+"""Reasons why files of a night cannot be used that are told."""
 
 
 def record_unjudged(
@@ -79,10 +89,12 @@ def record_judged(
     _replace_results(cell.out, night, judged, places)
     row = _night_row(night, answer, judged)
     programs = {one.program: one for one in job.programs}
+    # of the recordings that are lost nobody knows which joints they were of
+    whole = bool(night.broken) or any(any(one.lacking) for one in night.comparisons)
     rows = [
         (
             _verdict(night, programs[result.program], axis, place, job.config.digest()),
-            _measure(night, programs[result.program], axis),
+            _measure(night, programs[result.program], axis, whole),
         )
         for result, place in zip(judged, places, strict=True)
         for axis in result.axes
@@ -130,7 +142,7 @@ def _night_row(
     why = list(_first([one.facts.error for one in night.broken]))
     if not why:
         why = list(dict.fromkeys(said for one in night.comparisons for said in one.lacking))
-    why += [sentence for result in answer for sentence in result.failures]
+    why += together([sentence for result in answer for sentence in result.failures])
     notes = [*night.notes, *(note for result in answer for note in result.notes)]
     status = "failed" if not judged else "partial" if why else "done"
     return NightRow(night.robot, night.night, night.key, status, 0, "; ".join(why), as_notes(notes))
@@ -159,7 +171,9 @@ def _verdict(
     )
 
 
-def _measure(night: PlannedNight, program: ProgramJob, axis: AxisResult) -> MeasureRow:
+def _measure(night: PlannedNight, program: ProgramJob, axis: AxisResult, whole: bool) -> MeasureRow:
+    in_part = (whole or axis.in_part) and axis.state != "insufficient-data"
+    excused, _, text = told_by(axis.reason)
     return MeasureRow(
         robot=night.robot,
         program=program.program,
@@ -170,7 +184,7 @@ def _measure(night: PlannedNight, program: ProgramJob, axis: AxisResult) -> Meas
         common=axis.log_common,
         effect=axis.effect,
         harmless=int(axis.harmless),
-        reason=axis.reason,
+        reason=EXCUSED * excused + IN_PART * in_part + text,
     )
 
 
@@ -206,10 +220,11 @@ def _of_baselines(night: PlannedNight, judged: Sequence[ProgramResult]) -> Itera
 
 
 def _first(reasons: Sequence[str]) -> Iterator[str]:
-    """Yield some of the reasons: hundreds of broken files are one line."""
-    yield from reasons[-MOST_REASONS:]  # paths go with the nights
-    if len(reasons) > MOST_REASONS:
-        yield f"and {len(reasons) - MOST_REASONS} more files"
+    """Yield some of the reasons, each once: hundreds of broken files are one line."""
+    found = together(reasons)
+    yield from found[-MOST_REASONS:]  # paths go with the nights
+    if len(found) > MOST_REASONS:
+        yield f"and {len(found) - MOST_REASONS} more reasons"
 
 
 def _safe(program: str) -> str:

@@ -4,7 +4,7 @@ import math
 import re
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -119,7 +119,7 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
             f"were {axes_phrase(there)} (robots.{job.robot}.axes)"
         )
     axes = tuple(
-        _axis(entry, temperatures.get(entry["axis"]))
+        _axis(entry, temperatures.get(entry["axis"]), outcome.in_part)
         for entry in outcome.verdict["axes"]
         if job.axes is None or entry["axis"] in job.axes
     )
@@ -161,7 +161,9 @@ def _temperatures(patterns: Path) -> dict[int, float]:
     }
 
 
-def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
+def _axis(
+    entry: Mapping[str, Any], temperature_c: float | None, in_part: Collection[int] = ()
+) -> AxisResult:
     cause = entry.get("cause") or {}
     if cause and lies_outside(cause) and excuses_little(cause):
         cause = {}  # beside it stands what nobody should look away from
@@ -179,6 +181,7 @@ def _axis(entry: Mapping[str, Any], temperature_c: float | None) -> AxisResult:
         effect=distance.get("effect"),
         temperature_c=temperature_c,
         reason=EXCUSED * bool(entry.get("excused")) + str(reasons[0]),
+        in_part=entry["axis"] in in_part,
     )
 
 

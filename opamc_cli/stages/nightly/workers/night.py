@@ -78,6 +78,8 @@ class AxisResult:
     effect: float | None
     temperature_c: float | None
     reason: str
+    in_part: bool = False
+    """Whether not all of the night's recordings could be used for this joint."""
 
 
 @dataclass(frozen=True)

@@ -1,5 +1,6 @@
 """Which axes cannot be judged, and the true reason: what no verdict may be silent about."""
 
+import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -60,7 +61,9 @@ class Unjudged:
     axes: Mapping[int, tuple[str, ...]]
     """Sentences for each axis of which nothing is left on one side."""
     errors: tuple[OpamcError, ...]
-    """One for each axis of a run that was left out while others serve."""
+    """One for each run of the target of which axes were left out while others serve."""
+    of_baseline: tuple[OpamcError, ...] = ()
+    """The same of the baseline's runs: the target is judged by the others."""
     at_rest: Mapping[int, Mapping[str, InputError]] = field(default_factory=dict)
     """By axis and run of the target, why it has none, which is usual where axes move in turn."""
 
@@ -84,7 +87,7 @@ class Unjudged:
 def unjudged(baseline: Side, target: Side) -> Unjudged:
     """Find the axes that move on either side but cannot be compared."""
     axes: dict[int, tuple[str, ...]] = {}
-    dropped: dict[tuple[Path, str], list[int]] = {}
+    dropped: dict[tuple[Path, str], dict[int, str]] = {}
     n_lost: Counter[Path] = Counter()
     at_rest: dict[int, dict[str, InputError]] = {}
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
@@ -94,21 +97,36 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
             paths = {own.run: own.path for own in side.measured}
             n_lost.update(paths[run] for run in lost)
             if paths.keys() <= lost.keys() | idle.keys():
-                whys = dict.fromkeys([*lost.values(), *({} if lost else idle).values()])
-                axes[axis] = axes.get(axis, ()) + tuple(sentence(side.role, why) for why in whys)
+                whys = {_but_numbers(why): why for why in (lost or idle).values()}
+                said = tuple(sentence(side.role, why) for why in whys.values())
+                axes[axis] = axes.get(axis, ()) + said
                 continue
             for run, why in lost.items():
-                dropped.setdefault((paths[run], why), []).append(axis)
+                # what is wrong with all of a recording is said once
+                dropped.setdefault((paths[run], _but_numbers(why)), {})[axis] = why
             if side is target:
-                at_rest[axis] = {run: InputError(f"{paths[run]}: {idle[run]}") for run in idle}
+                at_rest[axis] = {
+                    run: InputError(f"{paths[run]}: {idle[run]}", axes=[axis]) for run in idle
+                }
     n_axes = Counter(own.path for side in (baseline, target) for own in side.measured)
-    errors: list[OpamcError] = []
-    for (path, why), lacking in dropped.items():
+    of_side: dict[str, list[OpamcError]] = {}
+    roles = {own.path: side.role for side in (target, baseline) for own in side.measured}
+    for (path, _), lacking in dropped.items():
+        (first, why), *others = lacking.items()
         which = "Only axis" if n_lost[path] == 1 < n_axes[path] else "Axis"
-        left_out = f" {which} {lacking[0]} of this recording is left out"
-        # what is wrong with all of a recording is said once
-        errors.append(InputError(f"{path}: {_ended(why)}{left_out * (len(lacking) == 1)}"))
-    return Unjudged(axes, tuple(errors), at_rest)
+        left_out = f" {which} {first} of this recording is left out"
+        if others and len(set(lacking.values())) > 1:
+            rest = ", ".join(str(axis) for axis, _ in others)
+            why += f" (ax{'i' if len(others) == 1 else 'e'}s {rest} likewise)"
+        error = InputError(f"{path}: {_ended(why)}{left_out * (not others)}", axes=lacking)
+        of_side.setdefault(roles[path], []).append(error)
+    errors, of_baseline = (tuple(of_side.get(side.role, ())) for side in (target, baseline))
+    return Unjudged(axes, errors, of_baseline, at_rest)
+
+
+def _but_numbers(why: str) -> str:
+    """Return a reason without what differs from one axis or recording to the next."""
+    return re.sub(r"\d[\d.]*", "#", why)
 
 
 def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:

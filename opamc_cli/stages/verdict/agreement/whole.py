@@ -58,12 +58,12 @@ def not_whole(baseline: Side, target: Side) -> list[InputError]:
             and axes[axis].unknown > 2 * median([own.unknown for own in others] or [0.0])
         ]
         if odd:
-            why = _of_another_program(axes, odd)
+            why, of = _of_another_program(axes, odd), odd
         elif all(_far_fewer(axes[axis].cycles, others) for axis, others in known.items()):
-            why = _cut(axes, known)
+            why, of = _cut(axes, known), [*axes]
         else:
             continue
-        errors.append(InputError(f"{paths[run]}: {why}"))
+        errors.append(InputError(f"{paths[run]}: {why}", axes=of))
     return errors
 
 
