@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -93,6 +94,9 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     other = _other(lines[0], track, resolution)
     if other.kind in OF_A_SENSOR:
         return other
+    poles, comb = _comb(lines, track, resolution)
+    if comb and track.angle_kind == "electrical":
+        return _wave_generator(comb, track, resolution, poles)
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
         passages = [line for line in wave if _passage(line, poles, track, resolution)]
@@ -133,6 +137,22 @@ def _turns(track: Track, line: Line) -> list[float]:
         # The first line is the strongest: once or twice it is two per turn of the motor.
         return [float(p) for p in USUAL_POLE_PAIRS if 1.9 < line.order * p < 2.1]
     return []
+
+
+def _comb(lines: list[Line], track: Track, resolution: float) -> tuple[float, list[Line]]:
+    """Pole pairs and comb, of the strongest and two more, whose line at 2 need not show."""
+    best: tuple[float, list[Line]] = (1.0, [])
+    slack = 0.25 * resolution
+    for k, poles in product(range(1, HARMONICS // 2 + 1), USUAL_POLE_PAIRS):
+        first, held = lines[0].order / k, dict[int, Line]()
+        for line in lines:
+            times = round(line.order / first)
+            if times and abs(line.order - times * first) < slack * max(times / k, 1.0):
+                held.setdefault(times, line)
+        twice = 2 - slack * poles < first * poles < 2 * (1 + 1 / SMALLEST_RATIO) + slack
+        if twice and len(held) >= max(len(best[1]) + 1, SHORTEST_COMB) and math.gcd(*held) == 1:
+            best = float(poles), list(held.values())
+    return best
 
 
 def _corrected(line: Line, poles: float) -> float:

@@ -44,6 +44,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
         "tooth and payload": 1.5 * noise * np.cos(tooth * q)
         + 1.5 * np.std(made.current) * (np.sin(q + 0.3) + 0.3 * a / a.std()),
         "friction and knocks": 0.5 * v / top + 20 * noise * knocking(a, made.time),
+        "calmer tooth": noise * np.cos(tooth * q),
         "hum": 1.5 * noise * np.cos(2 * np.pi * 50.0 * made.time),
     }[kind]
     edges = np.linspace(0, v.size, count + 1).astype(int)
@@ -55,6 +56,8 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
         new = k >= (BASELINE if sessions else 1)
         current = made.current[rows] + new * shape[rows]
         current += 0.05 * (rng.normal() * np.sign(v[rows]) + rng.normal() * v[rows] / top)
+        if kind.startswith("calmer") and not new:
+            current += 3 * noise * np.cos(7 * made.gear_ratio * q[rows])
         if wander:
             current += wander * rng.normal() * np.sin(5 * q[rows])
         recordings.append(
@@ -116,6 +119,14 @@ def test_tooth_damage_is_a_ripple_and_a_fault(seed, sessions):
     if cause.evidence["order_resolution"] > 0.05:
         assert "kinematic error" in cause.ties[0]
     assert not change.harmless
+
+
+def test_a_ripple_that_no_more_than_doubled_is_no_cause_where_less_is_left(monkeypatch):
+    assert "ripple" in {cause.effect for cause in change_of("calmer tooth").causes}
+    monkeypatch.setattr(explain, "GROWTH", 1e6)
+    monkeypatch.setattr(explain, "CLEAR_GROWTH", 1e6)
+    assert "ripple" in {cause.effect for cause in change_of("tooth").causes}
+    assert "ripple" not in {cause.effect for cause in change_of("calmer tooth").causes}
 
 
 @pytest.mark.long
