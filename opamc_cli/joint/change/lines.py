@@ -23,9 +23,10 @@ SIDE_LOBES = 4.0
 NEIGHBOURHOOD = 12
 """Resolutions to either side over which the growth of the neighbours is taken."""
 FLOOR = 3.0
-"""Of the surroundings' power, added to all: noise's scatter is no measure of what lies above."""
-MAIN_LOBE = 2.5
-"""Resolutions to either side that a tapered stroke's line takes, and what a lag makes of it."""
+"""Of the surroundings' power, added to all of a tapered spectrum: without it noise's scatter would
+be the measure of what lies far above it."""
+MAIN_LOBES = 1.5, 2.5
+"""Resolutions to either side that a line takes, with what a lag makes of it; of tapered strokes."""
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class OrderSpectra:
     (units, k)."""
     resolution: float
     """Smallest difference of orders that the usual stroke can tell apart."""
+    tapered: bool = False
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,11 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     return found
 
 
-def order_spectra(compared: Compared, residual: Floats, tapered: bool = True) -> OrderSpectra:
+def order_spectra(compared: Compared, residual: Floats, tapered: bool = False) -> OrderSpectra:
     """Spectra of all units on one grid of orders; of none where too few strokes are long enough.
 
-    Untapered, jumps at a stroke's ends leak over all orders, far above worn teeth.
+    Untapered, jumps at a stroke's ends leak over all orders, far above worn teeth; tapered, what is
+    too faint to explain a change is seen as well.
     """
     track, after = compared.track, compared.after
     pieces = strokes(track, residual != 0)
@@ -129,7 +132,7 @@ def order_spectra(compared: Compared, residual: Floats, tapered: bool = True) ->
     before, later = rows[~after & (samples > 0)], rows[after & (samples > 0)]
     if len(before) < 2 or not len(later):
         return none
-    return OrderSpectra(bins.orders[first:], before, later, resolution)
+    return OrderSpectra(bins.orders[first:], before, later, resolution, tapered)
 
 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
@@ -143,7 +146,9 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         return []
     spacing = float(orders[1] - orders[0])
     around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
-    floor = FLOOR * median_filter(spectra.before.mean(axis=0), around) + 1e-300
+    usual = spectra.before.mean(axis=0)
+    floor = FLOOR * median_filter(usual, around) if spectra.tapered else 1e-12 * usual.mean()
+    floor = floor + 1e-300
     sides = [uniform_filter1d(one, OVERSAMPLING, axis=1) for one in (spectra.before, spectra.after)]
     before, after = (np.log(side + floor) for side in sides)
     shares = np.mean(
@@ -163,7 +168,7 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         away = np.abs(orders - orders[peak]) / spectra.resolution
         # a finite stroke smears a line: its side lobes are no lines of their own
         lobes = excess[peak] * SIDE_LOBES / (np.pi * np.maximum(away, 1.0)) ** 2
-        possible &= (away > MAIN_LOBE) & (excess > lobes)
+        possible &= (away > MAIN_LOBES[spectra.tapered]) & (excess > lobes)
         found.append(_line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak]))
     return found
 

@@ -14,29 +14,47 @@ STANDING = 0.7
 phase picks up has as much in that frame as in either of its two lines over the motor angle."""
 
 
-def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Reading | None:
-    """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
-    spectra = order_spectra(compared, residual)
+def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> list[Reading]:
+    """Read the lines that grew; two readings of one change where the first sees fainter ones.
+
+    Only the gear may be blamed for what is that faint: what excuses a joint has to stand out of
+    the whole of its strokes, and so has what nobody can name.
+    """
+    plain = _read(compared, residual, between, tapered=False)
+    if plain is not None and plain.effect != "ripple":
+        return [plain]
+    found = [_read(compared, residual, between, tapered=True), plain]
+    if plain is None and found[0] is not None and found[0].kind != "mesh":
+        return []
+    return [one for one in found if one is not None and one.effect == "ripple"]
+
+
+def _read(compared: Compared, residual: Floats, between: float, tapered: bool) -> Reading | None:
+    """None where no line grew, or one keeps a frequency that is not the mains'."""
+    whole = order_spectra(compared, residual)
+    spectra = order_spectra(compared, residual, tapered) if tapered else whole
     lines = grown_lines(spectra, between)
     if not lines:
         return None
+    if tapered:
+        # How much has grown, and whether an order or a frequency is kept, is asked of strokes with
+        # their ends: there the speed changes, and beside them cold lets faint harmonics of a
+        # healthy mesh grow tenfold.
+        powers = [power_at(whole, line.order) for line in lines]
+        pairs = zip(lines, powers, strict=True)
+        lines = [replace(line, excess=more, growth=growth) for line, (more, growth) in pairs]
     timed = clocked(compared)
-    hum, standing = _picked_up(timed, residual, lines[0], between)
+    hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
-    # What has grown, and what keeps an order, is asked of strokes with their ends: there the speed
-    # changes, and beside them cold lets faint harmonics of a healthy mesh grow tenfold.
-    whole = order_spectra(compared, residual, tapered=False)
-    lines = [replace(line, growth=power_at(whole, line.order)[1]) for line in lines]
-    reading = read_lines(lines, compared.track, spectra.resolution)
+    reading = replace(read_lines(lines, compared.track, spectra.resolution), faint=tapered)
     if reading.kind == "unknown":
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)
         beats = grown_lines(clock, between)
-        ends = order_spectra(timed, residual, tapered=False)
-        if beats and power_at(ends, beats[0].order)[0] > power_at(whole, lines[0].order)[0]:
+        if beats and beats[0].excess > lines[0].excess:
             at = read_frequency(beats[0], clock.resolution)
-            return None if at is None or standing else _with_power(at, timed, residual)
+            return None if at is None else _with_power(at, timed, residual)
     return _with_power(reading, compared, residual)
 
 
@@ -47,19 +65,19 @@ def _with_power(reading: Reading, compared: Compared, *residuals: Floats) -> Rea
 
 def _picked_up(
     timed: Compared, residual: Floats, strongest: Line, between: float
-) -> tuple[Reading | None, bool]:
-    """Mains hum of a phase, which turns against the field, and whether any frequency does."""
+) -> Reading | None:
+    """Mains hum of a phase, which turns against the field in the torque current."""
     sides = dict(standing_views(timed.track, residual)).get(True)
     if sides is None:
-        return None, False
+        return None
     one, other = (order_spectra(timed, side) for side in sides)
     spectra = replace(one, before=one.before + other.before, after=one.after + other.after)
     beats = grown_lines(spectra, between)
     if not beats or beats[0].excess < STANDING * strongest.excess:
-        return None, False
+        return None
     reading = read_frequency(beats[0], spectra.resolution)
     if reading is None:
-        return None, True
+        return None
     # Half of it is there; the other half turns twice as fast as the field.
     held = _with_power(reading, timed, *sides)
-    return replace(held, power=2 * held.power), True
+    return replace(held, power=2 * held.power)
