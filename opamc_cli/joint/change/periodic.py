@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from opamc_cli.joint.change.energy import comb_energy
 from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra, power_at
-from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
+from opamc_cli.joint.change.reading import Reading, read_frequency, read_line, read_lines
 from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import standing_views
@@ -15,18 +15,23 @@ phase picks up has as much in that frame as in either of its two lines over the 
 
 
 def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> list[Reading]:
-    """Read the lines that grew; two readings of one change where the first sees fainter ones.
+    """Read the lines that grew; of two readings of one change the first names it best.
 
-    Only the gear may be blamed for what is that faint: what excuses a joint has to stand out of
-    the whole of its strokes, and so has what nobody can name.
+    Only a mesh may be blamed for what no more than tapered strokes show: what excuses a joint, and
+    what nobody can name, has to stand out of whole ones.
     """
     plain = _read(compared, residual, between, tapered=False)
     if plain is not None and plain.effect != "ripple":
         return [plain]
-    found = [_read(compared, residual, between, tapered=True), plain]
-    if plain is None and found[0] is not None and found[0].kind != "mesh":
-        return []
-    return [one for one in found if one is not None and one.effect == "ripple"]
+    faint = _read(compared, residual, between, tapered=True)
+    if faint is not None and faint.kind == "mesh":
+        return [faint] if plain is None else [faint, plain]
+    if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
+        # One line is at the mesh's order for some number of pole pairs: of lost stiffness, too.
+        resolution = plain.evidence["order_resolution"]
+        other = read_line(plain.lines[0], compared.track, resolution)
+        return [replace(other, power=plain.power), plain]
+    return [] if plain is None else [plain]
 
 
 def _read(compared: Compared, residual: Floats, between: float, tapered: bool) -> Reading | None:

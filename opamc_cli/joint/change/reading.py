@@ -93,7 +93,7 @@ class Reading(Cause):
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
-    other = _other(lines[0], track, resolution)
+    other = read_line(lines[0], track, resolution)
     if other.kind in OF_A_SENSOR:
         return other
     poles, comb = _comb(lines, track, resolution)
@@ -277,7 +277,8 @@ def _meant(order: float, track: Track, resolution: float) -> float:
     return nearest if abs(nearest - order) < 0.75 * resolution else order
 
 
-def _other(line: Line, track: Track, resolution: float) -> Reading:
+def read_line(line: Line, track: Track, resolution: float) -> Reading:
+    """Read a line by itself, which is not taken for the mesh's."""
     meaning = read_order(_meant(line.order, track, resolution), track)
     effect, text = "ripple", meaning.text
     if meaning.kind in OF_A_SENSOR and "phases" in track.channels:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from sessions import units_of, with_track
 
+from opamc_cli.joint.change import periodic
 from opamc_cli.joint.change.lines import grown_lines, order_spectra
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.motion.track import Joint
@@ -40,19 +41,19 @@ def test_noise_and_what_the_baseline_has_as_well_are_nothing(units):
 
 def test_a_tooth_of_the_flexspline_is_a_ripple_of_its_power(units):
     order = 2 * (RATIO + 1) / RATIO
-    periodic = found(units, lambda track: np.cos(order * track.machine_angle_rad))
-    assert periodic.effect == "ripple"
-    assert periodic.kind == "mesh"
-    assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
+    one = found(units, lambda track: np.cos(order * track.machine_angle_rad))
+    assert one.effect == "ripple"
+    assert one.kind == "mesh"
+    assert one.power == pytest.approx(SIZE**2 / 2, rel=0.15)
     # With an allowance for what sessions differ by it is there, too, if it is large.
     assert found(units, lambda track: np.cos(order * track.machine_angle_rad), 0.09) is not None
 
 
 def test_a_line_that_no_part_has_is_a_ripple_without_a_meaning(units):
-    periodic = found(units, lambda track: np.cos(3.37 * track.machine_angle_rad))
-    assert (periodic.effect, periodic.kind) == ("ripple", "unknown")
-    assert periodic.parameters["order"] == pytest.approx(3.37, abs=0.05)
-    assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
+    one = found(units, lambda track: np.cos(3.37 * track.machine_angle_rad))
+    assert (one.effect, one.kind) == ("ripple", "unknown")
+    assert one.parameters["order"] == pytest.approx(3.37, abs=0.05)
+    assert one.power == pytest.approx(SIZE**2 / 2, rel=0.15)
 
 
 @pytest.mark.parametrize(
@@ -68,10 +69,10 @@ def test_a_line_that_no_part_has_is_a_ripple_without_a_meaning(units):
     ],
 )
 def test_a_line_that_keeps_its_frequency_is_hum(units, mains_hz):
-    periodic = found(units, lambda track: np.cos(2 * np.pi * mains_hz * track.run_time_s))
-    assert periodic.effect == "mains_hum"
-    assert periodic.parameters == {"frequency_hz": mains_hz}
-    assert periodic.power == pytest.approx(SIZE**2 / 2, rel=0.15)
+    one = found(units, lambda track: np.cos(2 * np.pi * mains_hz * track.run_time_s))
+    assert one.effect == "mains_hum"
+    assert one.parameters == {"frequency_hz": mains_hz}
+    assert one.power == pytest.approx(SIZE**2 / 2, rel=0.15)
 
 
 def test_any_other_frequency_is_nobody_s(units):
@@ -89,11 +90,11 @@ def test_hum_of_one_phase_stands_still_in_the_phases_frame(units):
         field = POLES * RATIO * track.position_rad
         return np.cos(2 * np.pi * 50.0 * track.run_time_s) * np.cos(field)
 
-    periodic = found(from_phases(units), picked_up)
-    assert periodic.effect == "mains_hum"
-    assert periodic.parameters == {"frequency_hz": 50.0}
+    one = found(from_phases(units), picked_up)
+    assert one.effect == "mains_hum"
+    assert one.parameters == {"frequency_hz": 50.0}
     # Half of the square of one cosine, and half of the other's.
-    assert periodic.power == pytest.approx(SIZE**2 / 4, rel=0.3)
+    assert one.power == pytest.approx(SIZE**2 / 4, rel=0.3)
     # Where the phases are not logged, nobody can turn it back.
     alone = found(units, picked_up)
     assert alone is None or alone.effect != "mains_hum"
@@ -175,3 +176,20 @@ def test_what_excuses_a_joint_has_to_stand_out_of_whole_strokes(units, poles):
 
 def test_where_whole_strokes_show_nothing_a_faint_line_without_a_meaning_is_none(units):
     assert faint(units, 6.63) == []
+
+
+def test_over_the_electrical_angle_a_line_alone_is_not_named_the_mesh_s(units, monkeypatch):
+    """Some number of pole pairs always fits one line: a joint's lost stiffness was called teeth."""
+    angle = POLES * units.track.machine_angle_rad
+    track = {"machine_angle_rad": angle, "angle_kind": "electrical", "joint": Joint()}
+    electrical = with_track(units, **track)
+    wave = lambda track: np.cos(2 * (RATIO + 1) / RATIO / POLES * track.machine_angle_rad)  # noqa: E731
+
+    def seen(compared, residual, between, *, tapered):
+        return None if tapered else read(compared, residual, between, tapered=tapered)
+
+    read = periodic._read
+    monkeypatch.setattr(periodic, "_read", seen)
+    first, second = find_periodic(electrical, residual(electrical, wave))
+    assert (first.kind, second.kind) == ("unknown", "mesh")
+    assert first.power == second.power
