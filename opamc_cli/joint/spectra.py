@@ -5,7 +5,7 @@ from scipy.fft import next_fast_len, rfft
 from scipy.ndimage import uniform_filter1d
 
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins
+from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins, vertex
 
 FEWEST_SAMPLES = 50
 MOST_TIME = 8
@@ -100,28 +100,15 @@ def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float,
     peaks: list[tuple[float, float]] = []
     for weighed in (power.copy(), power / np.maximum(around, 1e-300)):
         for order, _ in peaks:
-            _mask(weighed, round(order / spacing), guard)
+            place = round(order / spacing)
+            weighed[max(place - guard, 0) : place + guard + 1] = 0
         for _ in range(count):
             best = int(np.argmax(np.where(power >= threshold, weighed, 0.0)))
             if power[best] < threshold or weighed[best] <= 0:
                 break
             peaks.append((vertex(orders, power, best), float(power[best])))
-            _mask(weighed, best, guard)
+            weighed[max(best - guard, 0) : best + guard + 1] = 0
     return peaks
-
-
-def _mask(power: Floats, place: int, guard: int) -> None:
-    power[max(place - guard, 0) : place + guard + 1] = 0
-
-
-def vertex(orders: Floats, power: Floats, best: int) -> float:
-    """Place of a peak by the parabola through it and its neighbours."""
-    shift = 0.0
-    if 0 < best < power.size - 1:
-        left, middle, right = power[best - 1 : best + 2]
-        curvature = left - 2 * middle + right
-        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
-    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))
 
 
 def standing_views(track: Track, residual: Floats) -> list[tuple[bool, list[Floats]]]:

@@ -13,7 +13,6 @@ from opamc_cli.joint.spectra import (
     order_lines,
     order_spectrum,
     standing_views,
-    vertex,
 )
 
 
@@ -67,14 +66,6 @@ def test_a_line_of_either_direction_alone_is_seen():
     assert peaks[0][0] == pytest.approx(7.0, abs=0.1 * track.order_resolution)
     apart = [abs(a - b) for i, (a, _) in enumerate(peaks) for b, _ in peaks[:i]]
     assert not apart or min(apart) >= 1.4 * track.order_resolution
-
-
-def test_the_vertex_of_a_parabola_lies_between_the_samples():
-    orders = np.array([1.0, 1.5, 2.0, 2.5])
-    assert vertex(orders, -((orders - 1.6) ** 2), 1) == pytest.approx(1.6)
-    # No peak, or none with two neighbours: the sample itself.
-    assert vertex(orders, np.array([1.0, 1.0, 1.0, 1.0]), 1) == 1.5
-    assert vertex(orders, np.array([3.0, 2.0, 1.0, 0.0]), 0) == 1.0
 
 
 def test_frequency_is_that_of_the_clock_through_what_was_left_out():

@@ -10,7 +10,9 @@ PRIOR_WEIGHT = 4.0
 """Degrees of freedom that the borrowed variance is worth."""
 
 
-def moderated_t(before: Floats, after: Floats, between: float = 0.0) -> tuple[Floats, Floats]:
+def moderated_t(
+    before: Floats, after: Floats, between: float | Floats = 0.0
+) -> tuple[Floats, Floats]:
     """One-sided t and p values, (k,), of k features at once; larger after is positive.
 
     Of the baseline's units, (n, k) with n at least 2, and of the target's, (m, k). The variance of

@@ -7,7 +7,7 @@ import numpy as np
 from opamc_cli.joint.change.energy import energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
-from opamc_cli.joint.change.reading import Cause
+from opamc_cli.joint.change.reading import Cause, Reading
 from opamc_cli.joint.change.search import find_slow_causes
 from opamc_cli.joint.change.slow import learn, shift_power, with_model
 from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
@@ -110,8 +110,19 @@ def explain_change(
 
     slow = find_slow_causes(compared, population, library)
     residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
+    rows = residual != 0
+    squares = np.bincount(compared.track.group[rows], residual[rows] ** 2, late.size)
+    left = squares / compared.dataset.fine.parts.counts
+    risen = bool(np.median(left[late]) > np.median(left[~late]))
     periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)
-    held = 0.0 if periodic is None else periodic.power
+    # Where less is left in all, faint harmonics grow by themselves, as in the cold, and a share
+    # would be one of nothing that the decision saw.
+    periodic = [
+        one
+        for one in periodic
+        if risen or _doubled(one) or (one.effect == "ripple" and not one.faint)
+    ]
+    held = max((one.power for one in periodic), default=0.0)
 
     spread, fast = energy_of(compared, population)
     # What each slow cause takes from the change's mean square, in their order.
@@ -130,16 +141,22 @@ def explain_change(
         _weighed(found, gain / whole, library, serious=gain >= FAULT_SHARE * whole)
         for found, gain in zip(slow, gains, strict=True)
     ]
-    if periodic is not None and periodic.effect in library:
-        carries = held >= SMALLEST_LINE_SHARE * max(fast, held)
-        if periodic.kind != "unknown" or carries:
-            ratio, share = periodic.evidence["power_ratio"], held / whole
-            grown, doubled = ratio >= CLEAR_GROWTH, periodic.kind == "mesh" and ratio >= GROWTH
-            loaded = any(cause.origin == "load" for cause in causes)
-            clear = periodic.kind == "mesh" and grown
+    loaded = any(cause.origin == "load" for cause in causes)
+    named = []
+    for one in periodic:
+        carries = one.kind != "unknown" or one.power >= SMALLEST_LINE_SHARE * max(fast, held)
+        if one.effect in library and carries:
+            grown = one.evidence["power_ratio"] >= CLEAR_GROWTH
+            clear, share = one.kind == "mesh" and grown, one.power / whole
             enough = share >= FAULT_SHARE and (grown or not loaded)
-            serious = clear or enough or (doubled and not loaded)
-            causes.append(_weighed(periodic, share, library, serious, clear))
+            serious = clear or enough or (_doubled(one) and not loaded)
+            named.append(_weighed(one, share, library, serious, clear))
+    if named:
+        # Of two readings of one change the first tells what it is, and neither makes it less.
+        share, serious, clear = (
+            max(getattr(one, name) for one in named) for name in ("share", "serious", "clear")
+        )
+        causes.append(replace(named[0], share=share, serious=serious, clear=clear))
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -160,6 +177,10 @@ def explain_change(
         sessions=not cycles,
         angle=compared.track.angle_kind,
     )
+
+
+def _doubled(ripple: Reading) -> bool:
+    return ripple.kind == "mesh" and ripple.evidence["power_ratio"] >= GROWTH
 
 
 def _weighed(

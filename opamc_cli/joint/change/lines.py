@@ -10,8 +10,8 @@ from opamc_cli.joint.change.slow import Shift, shift_current
 from opamc_cli.joint.change.units import Compared, own_fit, stretches
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.track import Bools, Floats, Track
-from opamc_cli.joint.spectra import FEWEST_SAMPLES, LOWEST_ORDER, highest_order, vertex
-from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins
+from opamc_cli.joint.spectra import FEWEST_SAMPLES, LOWEST_ORDER, highest_order
+from opamc_cli.signal.transform.angle_bins import OVERSAMPLING, AngleBins, vertex
 
 SHORTEST_STROKE = 0.4
 """Cycles of the lowest order that is looked for: a turn of the motor."""
@@ -22,6 +22,11 @@ SMALLEST_RATIO = 2.0
 SIDE_LOBES = 4.0
 NEIGHBOURHOOD = 12
 """Resolutions to either side over which the growth of the neighbours is taken."""
+FLOOR = 3.0
+"""Of the surroundings' power, added to all of a tapered spectrum: without it noise's scatter would
+be the measure of what lies far above it."""
+MAIN_LOBES = 1.5, 2.5
+"""Resolutions to either side that a line takes, with what a lag makes of it; of tapered strokes."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +42,7 @@ class OrderSpectra:
     (units, k)."""
     resolution: float
     """Smallest difference of orders that the usual stroke can tell apart."""
+    tapered: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,8 +105,12 @@ def strokes(track: Track, rows: Bools) -> list[tuple[int, int]]:
     return found
 
 
-def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra:
-    """Spectra of all units on one grid of orders; of none where too few strokes are long enough."""
+def order_spectra(compared: Compared, residual: Floats, tapered: bool = False) -> OrderSpectra:
+    """Spectra of all units on one grid of orders; of none where too few strokes are long enough.
+
+    Untapered, jumps at a stroke's ends leak over all orders, far above worn teeth; tapered, what is
+    too faint to explain a change is seen as well.
+    """
     track, after = compared.track, compared.after
     pieces = strokes(track, residual != 0)
     travels = [float(np.ptp(track.machine_angle_rad[start:stop])) for start, stop in pieces]
@@ -116,13 +126,13 @@ def order_spectra(compared: Compared, residual: Floats) -> OrderSpectra:
     power, samples = np.zeros((after.size, bins.orders.size)), np.zeros(after.size)
     for start, stop in pieces:
         unit, angle = track.group[start], track.machine_angle_rad[start:stop]
-        power[unit] += bins.power(angle - angle.min(), residual[start:stop])
+        power[unit] += bins.power(angle - angle.min(), residual[start:stop], tapered)
         samples[unit] += np.count_nonzero(residual[start:stop])
     rows = power[:, first:] / np.maximum(samples, 1.0)[:, None]
     before, later = rows[~after & (samples > 0)], rows[after & (samples > 0)]
     if len(before) < 2 or not len(later):
         return none
-    return OrderSpectra(bins.orders[first:], before, later, resolution)
+    return OrderSpectra(bins.orders[first:], before, later, resolution, tapered)
 
 
 def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> list[Line]:
@@ -134,16 +144,21 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
     orders = spectra.orders
     if orders.size < 2 * NEIGHBOURHOOD:
         return []
-    floor = 1e-12 * float(spectra.before.mean())
-    before = np.log(uniform_filter1d(spectra.before, OVERSAMPLING, axis=1) + floor)
-    after = np.log(uniform_filter1d(spectra.after, OVERSAMPLING, axis=1) + floor)
-    _, p_values = moderated_t(before, after, between)
+    spacing = float(orders[1] - orders[0])
+    around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
+    usual = spectra.before.mean(axis=0)
+    floor = FLOOR * median_filter(usual, around) if spectra.tapered else 1e-12 * usual.mean()
+    floor = floor + 1e-300
+    sides = [uniform_filter1d(one, OVERSAMPLING, axis=1) for one in (spectra.before, spectra.after)]
+    before, after = (np.log(side + floor) for side in sides)
+    shares = np.mean(
+        [(one.mean(axis=0) / (one.mean(axis=0) + floor)) ** 2 for one in sides], axis=0
+    )
+    _, p_values = moderated_t(before, after, between * shares)
     trials = max((orders[-1] - orders[0]) / spectra.resolution, 1.0)
     p_values = np.minimum(p_values * trials, 1.0)
     growth = after.mean(axis=0) - before.mean(axis=0)
-    spacing = float(orders[1] - orders[0])
     guard = max(int(1.5 * spectra.resolution / spacing), OVERSAMPLING)
-    around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
     excess = np.exp(after.mean(axis=0)) - np.exp(before.mean(axis=0))
     doubled = np.minimum(growth, growth - median_filter(growth, around)) > np.log(SMALLEST_RATIO)
     possible = (p_values < LARGEST_P) & doubled
@@ -153,9 +168,18 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         away = np.abs(orders - orders[peak]) / spectra.resolution
         # a finite stroke smears a line: its side lobes are no lines of their own
         lobes = excess[peak] * SIDE_LOBES / (np.pi * np.maximum(away, 1.0)) ** 2
-        possible &= (away > 1.5) & (excess > lobes)
+        possible &= (away > MAIN_LOBES[spectra.tapered]) & (excess > lobes)
         found.append(_line(spectra, peak, guard, growth[peak], excess[peak], p_values[peak]))
     return found
+
+
+def power_at(spectra: OrderSpectra, order: float) -> tuple[float, float]:
+    """Excess and growth of the power next to an order, where the excess is largest."""
+    near = np.abs(spectra.orders - order) <= spectra.resolution
+    sides = (spectra.before[:, near], spectra.after[:, near])
+    before, after = (np.exp(np.log(side + 1e-300).mean(axis=0)) for side in sides)
+    most = int(np.argmax(after - before))
+    return float((after - before)[most]), float((after / before)[most])
 
 
 def _line(

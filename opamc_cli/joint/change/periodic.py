@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from opamc_cli.joint.change.energy import comb_energy
-from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra
-from opamc_cli.joint.change.reading import Reading, read_frequency, read_lines
+from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra, power_at
+from opamc_cli.joint.change.reading import Reading, read_frequency, read_line, read_lines
 from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import standing_views
@@ -14,17 +14,45 @@ STANDING = 0.7
 phase picks up has as much in that frame as in either of its two lines over the motor angle."""
 
 
-def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> Reading | None:
-    """Read the lines that grew; None where none did, or one keeps a frequency not the mains'."""
-    spectra = order_spectra(compared, residual)
+def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) -> list[Reading]:
+    """Read the lines that grew; of two readings of one change the first names it best.
+
+    Only a mesh may be blamed for what no more than tapered strokes show: what excuses a joint, and
+    what nobody can name, has to stand out of whole ones.
+    """
+    plain = _read(compared, residual, between, tapered=False)
+    if plain is not None and plain.effect != "ripple":
+        return [plain]
+    faint = _read(compared, residual, between, tapered=True)
+    if faint is not None and faint.kind == "mesh":
+        return [faint] if plain is None else [faint, plain]
+    if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
+        # One line is at the mesh's order for some number of pole pairs: of lost stiffness, too.
+        resolution = plain.evidence["order_resolution"]
+        other = read_line(plain.lines[0], compared.track, resolution)
+        return [replace(other, power=plain.power), plain]
+    return [] if plain is None else [plain]
+
+
+def _read(compared: Compared, residual: Floats, between: float, tapered: bool) -> Reading | None:
+    """None where no line grew, or one keeps a frequency that is not the mains'."""
+    whole = order_spectra(compared, residual)
+    spectra = order_spectra(compared, residual, tapered) if tapered else whole
     lines = grown_lines(spectra, between)
     if not lines:
         return None
+    if tapered:
+        # How much has grown, and whether an order or a frequency is kept, is asked of strokes with
+        # their ends: there the speed changes, and beside them cold lets faint harmonics of a
+        # healthy mesh grow tenfold.
+        powers = [power_at(whole, line.order) for line in lines]
+        pairs = zip(lines, powers, strict=True)
+        lines = [replace(line, excess=more, growth=growth) for line, (more, growth) in pairs]
     timed = clocked(compared)
     hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
-    reading = read_lines(lines, compared.track, spectra.resolution)
+    reading = replace(read_lines(lines, compared.track, spectra.resolution), faint=tapered)
     if reading.kind == "unknown":
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -86,13 +87,18 @@ class Reading(Cause):
     "mains"."""
     power: float = 0.0
     """Mean square that it holds more in the target than in the baseline, A^2."""
+    faint: bool = False
+    """Whether it was seen in tapered strokes, which show what whole ones hide."""
 
 
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
-    other = _other(lines[0], track, resolution)
+    other = read_line(lines[0], track, resolution)
     if other.kind in OF_A_SENSOR:
         return other
+    poles, comb = _comb(lines, track, resolution)
+    if comb and track.angle_kind == "electrical":
+        return _wave_generator(comb, track, resolution, poles)
     for poles in _turns(track, lines[0]):
         wave = [line for line in lines if _family(line, poles, track, resolution)]
         passages = [line for line in wave if _passage(line, poles, track, resolution)]
@@ -133,6 +139,22 @@ def _turns(track: Track, line: Line) -> list[float]:
         # The first line is the strongest: once or twice it is two per turn of the motor.
         return [float(p) for p in USUAL_POLE_PAIRS if 1.9 < line.order * p < 2.1]
     return []
+
+
+def _comb(lines: list[Line], track: Track, resolution: float) -> tuple[float, list[Line]]:
+    """Pole pairs and comb, of the strongest and two more, whose line at 2 need not show."""
+    best: tuple[float, list[Line]] = (1.0, [])
+    slack = 0.25 * resolution
+    for k, poles in product(range(1, HARMONICS // 2 + 1), USUAL_POLE_PAIRS):
+        first, held = lines[0].order / k, dict[int, Line]()
+        for line in lines:
+            times = round(line.order / first)
+            if times and abs(line.order - times * first) < slack * max(times / k, 1.0):
+                held.setdefault(times, line)
+        twice = 2 - slack * poles < first * poles < 2 * (1 + 1 / SMALLEST_RATIO) + slack
+        if twice and len(held) >= max(len(best[1]) + 1, SHORTEST_COMB) and math.gcd(*held) == 1:
+            best = float(poles), list(held.values())
+    return best
 
 
 def _corrected(line: Line, poles: float) -> float:
@@ -255,7 +277,8 @@ def _meant(order: float, track: Track, resolution: float) -> float:
     return nearest if abs(nearest - order) < 0.75 * resolution else order
 
 
-def _other(line: Line, track: Track, resolution: float) -> Reading:
+def read_line(line: Line, track: Track, resolution: float) -> Reading:
+    """Read a line by itself, which is not taken for the mesh's."""
     meaning = read_order(_meant(line.order, track, resolution), track)
     effect, text = "ripple", meaning.text
     if meaning.kind in OF_A_SENSOR and "phases" in track.channels:

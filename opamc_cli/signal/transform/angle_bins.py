@@ -41,9 +41,25 @@ class AngleBins:
         count = int(np.ceil(travel_rad / width_rad)) + 1
         return int(next_fast_len(OVERSAMPLING * count, real=True))
 
-    def power(self, angle_rad: Floats, values: Floats) -> Floats:
-        """Power over the orders, (k,), of samples at angles from zero on, both (n,)."""
+    def power(self, angle_rad: Floats, values: Floats, tapered: bool = False) -> Floats:
+        """Power over the orders, (k,), of samples at angles from zero on, both (n,).
+
+        Tapered by Hann's window over the angle, with the same mean for noise: otherwise jumps at
+        both ends leak over all orders, far above a faint line.
+        """
+        if tapered:
+            values = np.sqrt(8 / 3) * np.sin(np.pi * angle_rad / angle_rad.max()) ** 2 * values
         places = (angle_rad % self.travel_rad / self.width_rad).astype(np.int64)
         length = self._length(self.travel_rad, self.width_rad)
         power: Floats = np.abs(rfft(np.bincount(places, values), length)[: self.orders.size]) ** 2
         return power
+
+
+def vertex(orders: Floats, power: Floats, best: int) -> float:
+    """Place of a peak by the parabola through it and its neighbours."""
+    shift = 0.0
+    if 0 < best < power.size - 1:
+        left, middle, right = power[best - 1 : best + 2]
+        curvature = left - 2 * middle + right
+        shift = 0.5 * (left - right) / curvature if curvature < 0 else 0.0
+    return float(orders[best] + np.clip(shift, -1, 1) * (orders[1] - orders[0]))

@@ -14,6 +14,7 @@ from opamc_cli.joint.change.lines import (
     fast_residuals,
     grown_lines,
     order_spectra,
+    power_at,
     strokes,
 )
 from opamc_cli.joint.change.slow import Shift
@@ -45,10 +46,11 @@ def counted(units):
     return units.dataset.fine.fit
 
 
-def test_binned_transform_is_the_plain_sum_over_the_angle(units, counted):
+@pytest.mark.parametrize("tapered", [False, True])
+def test_binned_transform_is_the_plain_sum_over_the_angle(units, counted, tapered):
     rng = np.random.default_rng(0)
     residual = np.where(counted, rng.normal(size=counted.size), 0.0)
-    spectra = order_spectra(units, residual)
+    spectra = order_spectra(units, residual, tapered)
     track = units.track
     pieces = [piece for piece in strokes(track, counted) if track.group[piece[0]] == 0]
     samples = sum(np.count_nonzero(residual[start:stop]) for start, stop in pieces)
@@ -58,12 +60,15 @@ def test_binned_transform_is_the_plain_sum_over_the_angle(units, counted):
         for start, stop in pieces:
             angle = track.machine_angle_rad[start:stop]
             turned = np.exp(-1j * spectra.orders[k] * angle)
+            if tapered:
+                place = (angle - angle.min()) / np.ptp(angle)
+                turned *= np.sqrt(8 / 3) * 0.5 * (1 - np.cos(2 * np.pi * place))
             plain += abs(np.sum(residual[start:stop] * turned)) ** 2
         errors.append(abs(spectra.before[0, k] - plain / samples) / max(plain / samples, 0.5))
     # At the highest orders a bin is a sixteenth of a wave: single ones may be off by more.
     assert np.mean(errors) < 0.05
     assert np.max(errors[:20]) < 0.1
-    assert spectra.before.mean() == pytest.approx(1.0, abs=0.1)
+    assert tapered or spectra.before.mean() == pytest.approx(1.0, abs=0.1)
 
 
 def test_samples_that_do_not_count_end_no_stroke_where_the_angle_is_logged(units, counted):
@@ -164,6 +169,34 @@ def test_more_orders_that_are_looked_at_make_a_line_less_sure():
         for width in (0.04, 0.02)
     )
     assert many == pytest.approx(2 * few, rel=1e-6)
+
+
+def test_of_a_tapered_spectrum_the_surroundings_are_a_part_of_each_order():
+    spectra = replace(spectra_of((2.5, 50.0)), tapered=True)
+    (found,) = grown_lines(spectra)
+    # Their power, 1, is added to both sides thrice.
+    assert found.growth == pytest.approx((found.excess + 4) / 4, rel=0.1)
+    quiet = replace(spectra_of((2.5, 3.0)), tapered=True)
+    assert (len(grown_lines(quiet)), len(grown_lines(replace(quiet, tapered=False)))) == (0, 1)
+
+
+def test_jumps_at_the_ends_of_strokes_hide_no_tapered_line(units, counted):
+    """A step of forty times the line, as friction leaves where a stroke begins and ends."""
+    track = units.track
+    step = np.where(counted, 4.0 * track.direction, 0.0)
+    new = np.append(units.after, False)[track.group] * np.cos(2.5 * track.machine_angle_rad)
+    residual = step + np.where(counted, 0.1 * new, 0.0)
+    (found, *_), hidden = (
+        grown_lines(order_spectra(units, residual, tapered)) for tapered in (True, False)
+    )
+    assert found.order == pytest.approx(2.5, abs=0.02)
+    assert not any(abs(line.order - 2.5) < 0.1 for line in hidden)
+
+
+def test_power_at_an_order_is_that_of_its_highest_excess():
+    excess, growth = power_at(spectra_of((2.51, 50.0), (2.5, 20.0)), 2.5)
+    assert 20 < excess < 40
+    assert growth == pytest.approx(51 / 21, rel=0.3)
 
 
 def test_over_time_a_line_s_order_is_its_frequency(units, counted):

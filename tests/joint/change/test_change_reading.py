@@ -171,6 +171,32 @@ def test_an_order_is_read_as_the_nearest_that_has_a_meaning(order, says):
     assert reading.parameters == {"order": order}
 
 
+@pytest.mark.parametrize(
+    ("poles", "twice", "multiples", "says"),
+    [
+        (5, 2.02, (2, 3, 4, 5), "inspect the flexspline (order 2.02 per motor turn if it has 5"),
+        (6, 2.0125, (4, 5, 6, 7, 8), "2.013 per motor turn if it has 6 pole pairs"),
+        (5, 2.0, (3, 4, 5), "(order 2 per motor turn if it has 5 pole pairs)"),
+    ],
+)
+def test_over_the_electrical_angle_a_comb_need_not_show_its_first_line(
+    poles, twice, multiples, says
+):
+    found = [line(k * twice / poles) for k in multiples]
+    reading = read_lines([*found, line(0.13)], track_of("electrical", poles=None), 0.02)
+    assert (reading.kind, len(reading.lines)) == ("mesh", len(multiples))
+    assert says in reading.interpretation
+    assert reading.evidence["measured_order"] == pytest.approx(twice / poles, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "orders", [(0.8, 1.2), (0.8, 1.6, 2.4), (2.08, 4.16, 0.09), (0.8, 1.3, 1.7)]
+)
+def test_two_lines_even_multiples_or_a_bearing_s_are_no_comb(orders):
+    found = [line(order) for order in orders]
+    assert read_lines(found, track_of("electrical", poles=None), 0.02).kind != "mesh"
+
+
 def test_a_joint_s_or_an_electrical_order_is_told_as_it_is():
     text = read_lines([line(2.02)], track_of("joint"), 0.02).interpretation
     assert "order 2.02 per joint" in text

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.signal.transform import angle_bins
-from opamc_cli.signal.transform.angle_bins import AngleBins
+from opamc_cli.signal.transform.angle_bins import AngleBins, vertex
 
 
 def slow_power(orders, angle, values):
@@ -31,3 +31,11 @@ def test_a_long_travel_is_wound_up_by_whole_turns(monkeypatch):
     assert wound.travel_rad / (2 * np.pi) == pytest.approx(round(wound.travel_rad / (2 * np.pi)))
     power = wound.power(angle, np.cos(3 * angle))
     assert wound.orders[np.argmax(power)] == pytest.approx(3.0, abs=wound.orders[1])
+
+
+def test_the_vertex_of_a_parabola_lies_between_the_samples():
+    orders = np.array([1.0, 1.5, 2.0, 2.5])
+    assert vertex(orders, -((orders - 1.6) ** 2), 1) == pytest.approx(1.6)
+    # No peak, or none with two neighbours: the sample itself.
+    assert vertex(orders, np.array([1.0, 1.0, 1.0, 1.0]), 1) == 1.5
+    assert vertex(orders, np.array([3.0, 2.0, 1.0, 0.0]), 0) == 1.0

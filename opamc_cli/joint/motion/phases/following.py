@@ -19,14 +19,14 @@ from opamc_cli.joint.motion.phases.angle_filter import (
 )
 from opamc_cli.joint.motion.phases.half_turns import bridged
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
-from opamc_cli.joint.motion.phases.sensor_errors import (
+from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.signal.motion.smoothing import derivatives
+from opamc_cli.signal.plausible.sensor_errors import (
     FEWEST_FAST_SAMPLES,
     current_vector,
     rounded,
     without_sensor_errors,
 )
-from opamc_cli.joint.motion.track import Bools, Floats
-from opamc_cli.signal.motion.smoothing import derivatives
 
 STRONG = 5.0
 """A current vector counts where it is longer than this many times its noise."""

@@ -4,8 +4,8 @@ import numpy as np
 
 from opamc_cli.joint.motion.phases.half_turns import stretches
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
-from opamc_cli.joint.motion.phases.sensor_errors import current_vector
 from opamc_cli.joint.motion.track import Floats
+from opamc_cli.signal.plausible.sensor_errors import current_vector
 from opamc_cli.signal.transform.least_squares import solve
 
 SIDE_ROUNDS = 8

@@ -5,7 +5,7 @@ import pytest
 from simulator import simulate
 
 from opamc_cli.joint.motion.phases.following import _followed, averaged_angle, follow_phases
-from opamc_cli.joint.motion.phases.sensor_errors import FEWEST_FAST_SAMPLES
+from opamc_cli.signal.plausible.sensor_errors import FEWEST_FAST_SAMPLES
 
 
 def test_speed_is_the_electrical_one():

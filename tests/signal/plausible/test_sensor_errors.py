@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.joint.motion.phases.sensor_errors import rounded, without_sensor_errors
+from opamc_cli.signal.plausible.sensor_errors import rounded, without_sensor_errors
 
 
 def test_zero_errors_and_unequal_gains_are_taken_out_of_the_vector():

@@ -3,8 +3,10 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.joint.motion.track import Bools, Floats
 from opamc_cli.signal.transform.least_squares import solve
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 FEWEST_FAST_SAMPLES = 200
 """Fewer that turn faster than the follower tell nothing of the sensors."""
