@@ -1,6 +1,6 @@
 """Stage `identify`: segments in, cycles and motions out (thesis 3.3 and 4.1.1)."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
@@ -177,7 +177,8 @@ def run(
     motions = _without_cycles(motions, _of_cycles(motions, midway))
     left, led, elsewhere = _leading_elsewhere(motions, parts, references)
     motions = _without_cycles(motions, left)
-    errors = (*outcome.errors, *_of_two_speeds(midway, sources), *led)
+    late = _ending_late(motions, known, sources, rule) if reference is not None else ()
+    errors = (*outcome.errors, *_of_two_speeds(midway, sources), *led, *late)
     inputs = [table_input(segments)] + ([table_input(reference)] if reference else [])
     path = out / files.MOTIONS
     write_table(
@@ -239,6 +240,33 @@ def _unlike(motions: pa.Table, rule: MatchRule) -> list[str]:
         f"({rule.min_similarity:.2g} asked); the motions were told by duration, speed and direction"
         for axis, similarity in sorted(least.items())
     ]
+
+
+def _ending_late(
+    motions: pa.Table, known: pa.Table, sources: Mapping[str, RunSource], rule: MatchRule
+) -> Iterator[OpamcError]:
+    """Say which joints creep to a place as they do in no recording of the baseline."""
+    usual = {axis for _, axis in _late(known, rule)}
+    for (run, axis), times in _late(motions, rule).items():
+        if axis not in usual:
+            yield InputError(
+                f"{sources[run].path}: {len(times)} motion{'s' * (len(times) > 1)} of axis {axis} "
+                f"end{'s' * (len(times) == 1)} late, {max(times):.2f} times as long as usual at "
+                "most, and what is behind the usual end is not compared: a cold joint that creeps "
+                "to its place, a brake that drags?",
+                axes=[axis],
+            )
+
+
+def _late(motions: pa.Table, rule: MatchRule) -> dict[tuple[str, int], list[float]]:
+    """Return, by run and axis, how many times as long as usual its motions last that end late."""
+    found: dict[tuple[str, int], list[float]] = {}
+    names = ["run", "axis", "motion", "start", "stop", "reference_samples"]
+    for row in motions.select(names).to_pylist():
+        length, usual = row["stop"] - row["start"], row["reference_samples"]
+        if row["motion"] != UNIDENTIFIED and length > (1 + rule.duration_tolerance) * usual:
+            found.setdefault((row["run"], row["axis"]), []).append(length / usual)
+    return found
 
 
 def _leading_elsewhere(

@@ -15,11 +15,13 @@ from opamc_cli.storage.runs.writing import save_run
 PICK = 0.7
 PALLET = (-0.61, -0.65, -0.70)
 """Places to which the joint moves in turn, and from each back, rad."""
+PLACES = (-0.6, 0.0, 0.3)
+"""As a pallet's, but that no stroke is like another."""
 ELECTRICAL = 200
 """Turns of the current vector per turn of the joint."""
 
 
-def save(path, places, seed, first=0, moved=0.0, phases=False, swings=0.0):
+def save(path, places, seed, first=0, moved=0.0, phases=False, swings=0.0, late=0):
     """Strokes from the pick to one place after another and back, from a stroke on; their ends.
 
     A reported current with the position, or phase currents alone. A swinging joint is the faster.
@@ -36,6 +38,9 @@ def save(path, places, seed, first=0, moved=0.0, phases=False, swings=0.0):
         way = 0.5 - 0.5 * np.cos(np.pi * time)
         way += swings * np.sin(np.pi * time) ** 2 * np.sin(4 * np.pi * time)
         pieces += [at + (to - at) * way]
+        if late and to == PLACES[0]:
+            pieces[-1] -= 0.05 * (to - at) * np.arange(n) / n
+            pieces += [to - 0.05 * (to - at) * (1 - np.arange(late) / late)]
         pieces += [np.full(rng.integers(60, 140) * scale, to)]
     position = np.concatenate(pieces)
     speed = np.gradient(position) * rate_hz
@@ -87,7 +92,7 @@ def test_a_joint_with_another_zero_is_told_all_the_same(tmp_path):
 def test_motions_that_lead_elsewhere_are_not_compared_and_said(tmp_path):
     """One place of an edited program: a gear was called faulty by the strokes to and from it."""
     for number in range(2):
-        save(tmp_path / "base" / f"{number}.parquet", (-0.6, 0.0, 0.3) * 5, seed=number)
+        save(tmp_path / "base" / f"{number}.parquet", PLACES * 5, seed=number)
     save(tmp_path / "target" / "t.parquet", (-0.6, -0.1, 0.3) * 5, 7, moved=0.3)
     chain = [load_config(), tmp_path / "out"]
     done = run_chain([tmp_path / "base"], *chain)
@@ -96,6 +101,21 @@ def test_motions_that_lead_elsewhere_are_not_compared_and_said(tmp_path):
     assert motions == [0, 1, -1, -1, 4, 5] * 5
     [error] = done.errors
     assert "10 of 30 motions of axis 1 lead elsewhere" in str(error)
+
+
+def test_a_stroke_that_ends_late_is_told_and_said_unless_the_baseline_knows_it(tmp_path):
+    """What follows its usual end is not compared, so that nothing would tell of it."""
+    for number, late in enumerate((0, 0, 150)):
+        save(tmp_path / f"{number}.parquet", PLACES * 5, seed=number, late=late)
+    one, other, creeps = (tmp_path / f"{number}.parquet" for number in range(3))
+    for baseline, said in (([one, other], 1), ([one, other, creeps], 0)):
+        out = tmp_path / str(said)
+        done = run_chain(baseline, load_config(), out / "b")
+        target = run_chain([creeps], load_config(), out / "t", reference=done.motions)
+        assert sum("5 motions of axis 1 end late" in str(one) for one in target.errors) == said
+        assert not done.errors
+        motions = pq.read_table(target.motions)["motion"].to_pylist()
+        assert motions == [0, 1, 2, 3, 4, 5] * 5
 
 
 @pytest.mark.parametrize("phases", [False, True])
