@@ -3,7 +3,14 @@
 from dataclasses import replace
 
 from opamc_cli.joint.change.energy import comb_energy
-from opamc_cli.joint.change.lines import Line, clocked, grown_lines, order_spectra, power_at
+from opamc_cli.joint.change.lines import (
+    Line,
+    OrderSpectra,
+    clocked,
+    grown_lines,
+    order_spectra,
+    power_at,
+)
 from opamc_cli.joint.change.reading import Reading, read_frequency, read_line, read_lines
 from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
@@ -20,10 +27,11 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
     Only a mesh may be blamed for what no more than tapered strokes show: what excuses a joint, and
     what nobody can name, has to stand out of whole ones.
     """
-    plain = _read(compared, residual, between, tapered=False)
+    whole = order_spectra(compared, residual)
+    plain = _read(compared, residual, between, whole, whole)
     if plain is not None and plain.effect != "ripple":
         return [plain]
-    faint = _read(compared, residual, between, tapered=True)
+    faint = _read(compared, residual, between, whole, order_spectra(compared, residual, True))
     if faint is not None and faint.kind == "mesh":
         return [faint] if plain is None else [faint, plain]
     if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
@@ -34,25 +42,24 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
     return [] if plain is None else [plain]
 
 
-def _read(compared: Compared, residual: Floats, between: float, tapered: bool) -> Reading | None:
+def _read(
+    compared: Compared, residual: Floats, between: float, whole: OrderSpectra, spectra: OrderSpectra
+) -> Reading | None:
     """None where no line grew, or one keeps a frequency that is not the mains'."""
-    whole = order_spectra(compared, residual)
-    spectra = order_spectra(compared, residual, tapered) if tapered else whole
     lines = grown_lines(spectra, between)
     if not lines:
         return None
-    if tapered:
+    if spectra.tapered:
         # How much has grown, and whether an order or a frequency is kept, is asked of strokes with
         # their ends: there the speed changes, and beside them cold lets faint harmonics of a
         # healthy mesh grow tenfold.
-        powers = [power_at(whole, line.order) for line in lines]
-        pairs = zip(lines, powers, strict=True)
-        lines = [replace(line, excess=more, growth=growth) for line, (more, growth) in pairs]
+        powers = [(line, *power_at(whole, line.order)) for line in lines]
+        lines = [replace(line, excess=more, growth=growth) for line, more, growth in powers]
     timed = clocked(compared)
     hum = _picked_up(timed, residual, lines[0], between)
     if hum is not None:
         return hum
-    reading = replace(read_lines(lines, compared.track, spectra.resolution), faint=tapered)
+    reading = replace(read_lines(lines, compared.track, spectra.resolution), faint=spectra.tapered)
     if reading.kind == "unknown":
         # An order that means nothing may be a frequency: hum, or a structure that rings.
         clock = order_spectra(timed, residual)

@@ -265,14 +265,19 @@ def test_a_baseline_s_recording_of_which_a_part_is_lost_is_said_once(cell, opamc
     columns = {name: table[name].to_numpy().copy() for name in table.column_names}
     columns["axis1_a"][: len(table) // 5] = np.nan
     save_run(path, info, columns)
-    last = cell.parent / "aside"
-    (logs / "r1" / night(4)).rename(last)
-    first = opamc("nightly", cell, "--quiet")
-    last.rename(logs / "r1" / night(4))
-    second = opamc("nightly", cell, "--quiet")
+    first, second = _baseline_first(cell, opamc)
     assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
     assert f"r1 its baseline: {night(1)}/cycle.parquet: 20% of the current of axis 1" in first.out
     assert states(cell) == ["baseline"] * 3 + ["done"] * 2
+
+
+def _baseline_first(cell, opamc):
+    """Start once before the last night is there, and once with it."""
+    last, aside = cell.parent / "logs" / "r1" / night(4), cell.parent / "aside"
+    last.rename(aside)
+    first = opamc("nightly", cell, "--quiet")
+    aside.rename(last)
+    return first, opamc("nightly", cell, "--quiet")
 
 
 @pytest.mark.usefixtures("here", "undrawn")
@@ -282,11 +287,7 @@ def test_a_joint_s_baseline_that_lacks_one_night_is_said_once_and_no_night_is_pa
     for robot in ("r2", "r3"):
         shutil.rmtree(logs / robot)
     _freeze(logs / "r1" / night(1) / "cycle.parquet")
-    last = cell.parent / "aside"
-    (logs / "r1" / night(4)).rename(last)
-    first = opamc("nightly", cell, "--quiet")
-    last.rename(logs / "r1" / night(4))
-    second = opamc("nightly", cell, "--quiet")
+    first, second = _baseline_first(cell, opamc)
     assert (first.code, second.code, second.out) == (ExitCode.DONE, ExitCode.DONE, "")
     assert first.out.count("Only axis 2 of this recording is left out") == 1
     assert first.out.startswith("r1 its baseline: ")
