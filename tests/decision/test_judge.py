@@ -41,10 +41,9 @@ def p_values(plan, seeds=SEEDS):
     [
         Fleet(),
         Fleet(n_baseline=8, between_sessions=0.4, influences=2),
-        Fleet(n_baseline=5, n_target=5, n_axes=3),
         Fleet(n_baseline=4, n_target=3, n_axes=3, between_sessions=0.3),
     ],
-    ids=["six sessions", "wild sessions", "five and five", "four and three"],
+    ids=["six sessions", "wild sessions", "four and three"],
 )
 def test_p_values_of_healthy_joints_are_uniform(plan):
     p = p_values(plan).ravel()
@@ -54,7 +53,7 @@ def test_p_values_of_healthy_joints_are_uniform(plan):
 
 @pytest.mark.parametrize(
     ("n_baseline", "between_sessions"),
-    [(1, 0.3), long(1, 0.0), long(2, 0.3), long(3, 0.1), long(6, 0.0), long(6, 0.3)],
+    [(1, 0.3), long(2, 0.3), long(3, 0.1), long(6, 0.3)],
 )
 def test_healthy_joints_stay_healthy(n_baseline, between_sessions):
     plan = Fleet(n_baseline=n_baseline, between_sessions=between_sessions)
@@ -64,7 +63,7 @@ def test_healthy_joints_stay_healthy(n_baseline, between_sessions):
     assert len(states) - states.count("healthy") <= allowed
 
 
-@pytest.mark.parametrize("n_baseline", [long(1), 2, long(3), long(6)])
+@pytest.mark.parametrize("n_baseline", [long(1), 2, long(3)])
 def test_a_gross_fault_is_found_on_its_own_joint_only(n_baseline):
     plan = Fleet(n_baseline=n_baseline, severity=1.0)
     found, others = [], []

@@ -165,21 +165,12 @@ def test_two_missing_effects_are_both_found():
         assert any(effect in names for names in names_of(loop))
 
 
-@pytest.mark.long
-def test_two_runs_of_the_loop_are_equal():
-    _, first = close_on(2, ("stribeck",), rate=100.0)
-    _, second = close_on(2, ("stribeck",), rate=100.0)
-    assert first.steps
-    assert first.rmse_after_a == second.rmse_after_a
-    assert [s.trial.p_value for s in first.steps] == [s.trial.p_value for s in second.steps]
-
-
 def payload_of(made):
     """Return eight times the noise of a payload's current."""
     return 8 * made.noise_rms * np.sin(made.position + 0.5)
 
 
-@pytest.mark.parametrize("since", [long(0.4), 0.6, long(0.8)])
+@pytest.mark.parametrize("since", [0.6, long(0.8)])
 def test_a_payload_that_changes_once_is_found(since):
     # From 0.8 on the last of five cycles alone knows the new payload.
     made = simulate(3, (), rate=250.0, cycles=5)
@@ -192,7 +183,7 @@ def test_a_payload_that_changes_once_is_found(since):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("seed", "cycles"), [(3, 8), (6, 8), (9, 80)])
+@pytest.mark.parametrize(("seed", "cycles"), [(3, 8), (9, 80)])
 def test_a_payload_that_is_gripped_and_put_down_in_every_cycle_is_found(seed, cycles):
     made = simulate(seed, (), rate=250.0, cycles=cycles, kind="quintic")
     period = cycle_length(np.gradient(made.position))
@@ -211,7 +202,7 @@ def test_a_payload_that_is_gripped_and_put_down_in_every_cycle_is_found(seed, cy
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [3, 6, 9])
+@pytest.mark.parametrize("seed", [3, 9])
 def test_presliding_is_no_fault_and_has_no_name(seed):
     made = simulate(seed, (), rate=250.0, cycles=8, kind="quintic")
     builds_up = dahl_state(made.position, 3e-4)
@@ -284,13 +275,12 @@ HELD = pytest.mark.xfail(reason="a Stribeck curve and sublinear friction hold it
     ]
     + [pytest.param("quadratic_friction", marks=[HELD, pytest.mark.long])],
 )
-@pytest.mark.parametrize("strength", [5.0, long(10.0)])
-def test_an_effect_that_the_library_lacks_is_not_called_found(effect, strength):
+def test_an_effect_that_the_library_lacks_is_not_called_found(effect):
     shapes = SHAPES | {
         "offset": lambda q, v, a, t: np.ones(t.size),
         "asymmetric_friction": lambda q, v, a, t: (v > 0) * 1.0,
     }
-    loop = close(joint_of("cyclic", shapes[effect], strength=strength), without=(effect,))
+    loop = close(joint_of("cyclic", shapes[effect], strength=10.0), without=(effect,))
     if loop.verdict == "closed":
         assert names_of(loop)[0] & EXACT.get(effect, set())
     else:
@@ -365,12 +355,7 @@ def test_half_of_a_known_error_is_not_called_closed():
 
 @pytest.mark.parametrize(
     ("motion", "margin"),
-    [
-        (MOTIONS[1], 0.0),
-        long(MOTIONS[1], 0.25),
-        long(MOTIONS[2], 0.25),
-        long(MOTIONS[2], 0.0),
-    ],
+    [(MOTIONS[1], 0.0), long(MOTIONS[2], 0.25)],
 )
 def test_the_sealed_samples_have_no_say_in_what_is_added(motion, margin):
     recording = joint_of(motion, SHAPES["stribeck"], strength=3.0)
@@ -426,10 +411,9 @@ def test_a_wind_up_that_fails_at_the_corners_of_the_motion_is_dropped():
     assert beside.mean_square < 0.9 * chain_of(loop.after, 0).mean_square
 
 
-@pytest.mark.parametrize("seed", [45000019, 46000019])
-def test_an_inertia_that_one_stretch_of_a_single_stroke_shows_has_its_name(seed):
+def test_an_inertia_that_one_stretch_of_a_single_stroke_shows_has_its_name():
     """A function of the acceleration stood in its place: one of twelve stretches is no error's."""
-    made = servo_joint.record(seed, "inertia", 15.0, "single", 250.0)
+    made = servo_joint.record(46000019, "inertia", 15.0, "single", 250.0)
     recording = Recording("run", made.rate_hz, current_a=made.current, position_rad=made.position)
     loop = close(recording, made.declared)
     assert [step.term.effect.name for step in loop.steps if step.named] == ["inertia"]

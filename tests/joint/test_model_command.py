@@ -115,7 +115,7 @@ def test_what_nothing_explains_far_beyond_the_noise_is_said_also_if_quiet(slow_a
 
 @pytest.mark.parametrize("hidden", ["ripple", "quadratic_friction"])
 def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, monkeypatch):
-    made = simulate(3, (hidden,), 15.0, rate=2000.0, cycles=4)
+    made = simulate(3, (hidden,), 15.0, rate=1000.0, cycles=3)
     phases = {f"axis1_{name}": made.phases[:, k] for k, name in enumerate("abc")}
     write_run(tmp_path / "run.parquet", 2000.0, **phases)
     true = kinematics.without_slips
@@ -659,23 +659,8 @@ def test_effects_are_listed_and_shown(capsys):
 
 
 @pytest.mark.long
-def test_phases_alone_are_enough(tmp_path):
-    made = simulate(6, ("stribeck",), 1.0, rate=2048.0, cycles=4)
-    write_run(
-        tmp_path / "run.parquet",
-        2048.0,
-        axis1_a=made.phases[:, 0].astype("f4"),
-        axis1_b=made.phases[:, 1].astype("f4"),
-        axis1_c=made.phases[:, 2].astype("f4"),
-    )
-    assert close(tmp_path, model="effects: [inertia, coulomb, viscous]\n") == 0
-    loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
-    assert loop["after"]["rmse_a"] <= loop["before"]["rmse_a"]
-
-
-@pytest.mark.long
 def test_phase_currents_have_no_opposite_sign(tmp_path, monkeypatch, capsys):
-    made = simulate(6, (), 1.0, rate=500.0, cycles=3)
+    made = simulate(6, (), 1.0, rate=500.0, cycles=2)
     phases = {f"axis1_{p}": made.phases[:, k] for k, p in enumerate("abc")}
     beside = np.sin(0.01 * np.arange(len(made.position)))
     columns = {**phases, "axis1_position": made.position, "axis2_position": beside}
@@ -691,8 +676,8 @@ DATA = Path(__file__).parents[3] / "shared" / "data" / "kinova_gen3"
 @pytest.mark.long
 @pytest.mark.measured
 @pytest.mark.skipif(not DATA.is_dir(), reason="measured recordings are not at ../shared/data")
-@pytest.mark.parametrize(("joint", "after"), [(5, 0.035), (6, 0.032)])
-def test_a_measured_arm_s_ripple_is_found_without_its_gear_ratio(tmp_path, joint, after):
+def test_a_measured_arm_s_ripple_is_found_without_its_gear_ratio(tmp_path):
+    joint, after = 6, 0.032  # joint 5 is README's
     path = DATA / f"joint_{joint}_trapez.csv"
     with path.open() as file:
         names = file.readline().strip().split(",")

@@ -62,11 +62,8 @@ def test_samples_that_no_sensor_delivers(opamc, baseline, tmp_path, odd):
 @pytest.mark.parametrize(
     "text",
     [
-        "0001-01-01T00:00:00+00:00",
-        *map(
-            long,
-            ("0001-01-01T00:00:00", "0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-12:00"),
-        ),
+        "0001-01-01T00:00:00+14:00",
+        long("9999-12-31T23:59:59-12:00"),
     ],
 )
 def test_a_clock_that_was_never_set(opamc, baseline, tmp_path, text):

@@ -64,9 +64,7 @@ def wait_for(condition, seconds: float) -> bool:
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="processes are counted in /proc")
-@pytest.mark.parametrize(
-    "number", [signal.SIGKILL, long(signal.SIGTERM), long(signal.SIGINT), long(signal.SIGHUP)]
-)
+@pytest.mark.parametrize("number", [signal.SIGKILL, long(signal.SIGTERM), long(signal.SIGINT)])
 def test_nothing_outlives_a_command(tmp_path, number):
     """Two workers at work, and the command is killed or interrupted."""
     process = start(*LONG, "--jobs", 2, "--out", tmp_path / "out")
@@ -149,7 +147,7 @@ FULL = pytest.param(">/dev/full", marks=NO_FULL)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("shell", [FULL, ">&-", ">&- 2>&- <&-"])
+@pytest.mark.parametrize("shell", [FULL, ">&- 2>&- <&-"])
 def test_the_exit_code_is_the_verdicts_whatever_becomes_of_the_output(diagnosed, tmp_path, shell):
     out = shutil.copytree(diagnosed, tmp_path / "out", symlinks=True)
     before = (out / "verdict.json").stat().st_mtime_ns

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -47,6 +48,11 @@ class MotionBand:
         return scale_frequencies(self.f_min_hz, self.f_max_hz, self.voices_per_octave)
 
 
+@lru_cache(maxsize=4)  # Axes and recordings of one rate share it; a short one costs less.
+def _filter_bank(band: MotionBand, fs_hz: float, length: int, step: int) -> FilterBank:
+    return FilterBank(band.wavelet, band.frequencies_hz(), fs_hz, length, step)
+
+
 class MotionStream:
     """Motion signal of a temporal fine structure that arrives in pieces.
 
@@ -87,8 +93,7 @@ class MotionStream:
         if engine == "ssqueezepy":
             self._transform = _ssqueezepy_transform(band, fs_hz, step)
         else:
-            bank = FilterBank(band.wavelet, self._frequencies_hz, fs_hz, length, step)
-            self._transform = bank.transform
+            self._transform = _filter_bank(band, fs_hz, length, step).transform
 
     def push(self, tfs: NDArray[np.floating]) -> MotionFrames:
         """Take the samples that follow, give the frames that they complete."""
