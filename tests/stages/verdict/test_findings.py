@@ -5,7 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from opamc_cli.stages.verdict.agreement.findings import _coarser, _other_steps
+from opamc_cli.stages.verdict.agreement.findings import (
+    _all_scaled,
+    _coarser,
+    _other_steps,
+    _other_unit,
+)
 from opamc_cli.stages.verdict.agreement.measured import _changing, _steps
 
 
@@ -54,3 +59,48 @@ def test_a_current_in_other_steps_than_the_baselines_is_another_log(usual, tonig
     told = _other_steps(own, baseline)
     assert (said is None) == (told is None)
     assert said is None or said in told
+
+
+@pytest.mark.parametrize(
+    ("times", "said"),
+    [
+        ((3.0, 3.2, 2.9), "the currents of all its axes are 3 times the baseline's"),
+        ((0.1, 0.1, 0.11), "the currents of all its axes are 0.1 times the baseline's"),
+        ((3.0, 1.0, 3.0), None),  # one axis is as it was: the others may be at fault
+        ((1.3, 1.3, 1.3), None),  # warmth does so
+        ((3.0,), None),
+    ],
+)
+def test_currents_that_are_all_of_another_size_are_of_another_unit(times, said):
+    """Ten times as large on all axes was tooth damage on two of them, from a healthy robot."""
+    own = [
+        SimpleNamespace(run="r", axis=axis, size={"current": 0.5 * axis * one})
+        for axis, one in enumerate(times, start=1)
+    ]
+    usual = SimpleNamespace(size={(one.axis, "current"): 0.5 * one.axis for one in own})
+    found = _all_scaled(own, usual)
+    assert [one.axis for one in found] == ([one.axis for one in own] if said else [])
+    assert all(said in one.why for one in found)
+
+
+@pytest.mark.parametrize(
+    ("times", "noise", "refused"),
+    [
+        (10.0, 10.0, True),
+        (0.1, 0.1, True),
+        (6.0, 6.0, False),
+        (12.0, 3.0, False),
+        (25.0, 3.0, True),
+    ],
+)
+def test_a_current_that_is_scaled_down_to_its_noise_is_of_another_unit(times, noise, refused):
+    """A grinding gear may ask for twelve times as much, but not of the sensor's noise."""
+    own = SimpleNamespace(axis=2, size={"current": times}, steps=(0.0, 0.01 * noise))
+    usual = SimpleNamespace(size={(2, "current"): 1.0}, steps={2: (0.0, 0.01)})
+    assert (_other_unit(own, usual) is not None) == refused
+
+
+def test_a_speed_in_turns_a_minute_is_of_another_unit():
+    own = SimpleNamespace(axis=2, size={"velocity": 9.55}, steps=(0.0, 0.0))
+    usual = SimpleNamespace(size={(2, "velocity"): 1.0}, steps={2: (0.0, 0.0)})
+    assert "another unit (degrees or rpm)" in str(_other_unit(own, usual))

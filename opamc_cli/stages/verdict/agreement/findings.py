@@ -13,7 +13,15 @@ from opamc_cli.stages.verdict.agreement.measured import Measured
 
 LARGEST_RATIO = 20.0
 """Of the current's size to the baseline's: a healthy joint's load, warmth and wear change it by
-some tens of per cent, a seized gear by a few times; wrong units by 1000 (mA) or 57 (degrees)."""
+some tens of per cent, a seized gear by a few times, one that grinds by ten; wrong units by 1000
+(mA) or by ten to thirty (per cent)."""
+
+SCALED = 8.0
+"""Likewise of a position or a speed (9.5 times are rpm), and of a current whose smallest changes
+are of another size by the same factor: a fault that asks for so much more leaves its noise."""
+
+ALL_SCALED = 2.0
+"""Likewise where it is one factor for all axes of a recording: no payload, warmth or fault is."""
 
 ALIKE, UNLIKE = 1.2, 1.5
 """Two joints are exchanged if every channel of each is within 20 % of the other's size in the
@@ -120,6 +128,7 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
     """
     known = [own for own in measured if own.axis in reference.signal]
     found = _exchanged([own for own in known if own.moves], reference)
+    found += _all_scaled([own for own in known if own.moves], reference)
     told = {(finding.run, finding.axis) for finding in found}
     for own in known:
         if (own.run, own.axis) in told:
@@ -151,6 +160,25 @@ def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Findi
                 )
                 found += [Finding(each.run, each.axis, why) for each in (one, other)]
                 break
+    return found
+
+
+def _all_scaled(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
+    """Find recordings of two axes or more whose currents are all of one other size."""
+    found = []
+    for run in sorted({own.run for own in measured}):
+        axes = [own for own in measured if own.run == run and own.size["current"] > 0]
+        usual = [reference.size.get((own.axis, "current"), 0.0) for own in axes]
+        if len(axes) < 2 or min(usual) <= 0:
+            continue
+        times = np.array([own.size["current"] for own in axes]) / usual
+        if times.max() > ALIKE * times.min() or abs(np.log(np.median(times))) < np.log(ALL_SCALED):
+            continue
+        why = (
+            f"the currents of all its axes are {np.median(times):.3g} times the baseline's: "
+            "another unit (mA for A)? Check the map of `opamc ingest`, and the sensors"
+        )
+        found += [Finding(run, own.axis, why) for own in axes]
     return found
 
 
@@ -188,19 +216,27 @@ def _other_unit(own: Measured, reference: Reference) -> str | None:
         usual = reference.size.get((own.axis, kind))
         if usual is None or (usual == 0 and size == 0):
             continue
-        if not usual / LARGEST_RATIO <= size <= usual * LARGEST_RATIO:
+        times = size / usual if usual > 0 else math.inf
+        largest = SCALED if kind != "current" or _scaled(own, reference, times) else LARGEST_RATIO
+        if not 1 / largest <= times <= largest:
             if size == 0:
                 return (
                     f"the {kind} of axis {own.axis} never changes or is missing; check its sensor"
                 )
-            times = f"{size / usual:.3g}" if usual > 0 else "infinitely many"
+            many = f"{times:.3g}" if usual > 0 else "infinitely many"
             unit = {"current": "mA for A", "position": "degrees", "velocity": "degrees or rpm"}
             little = ", or hardly any of the program's motion" if size < usual else ""
             return (
-                f"the {kind} of axis {own.axis} is {times} times the baseline's: another unit "
+                f"the {kind} of axis {own.axis} is {many} times the baseline's: another unit "
                 f"({unit[kind]}){little}? Check the map of `opamc ingest`, and the sensor"
             )
     return None
+
+
+def _scaled(own: Measured, reference: Reference, times: float) -> bool:
+    """Whether the smallest changes of an axis' current are of another size by a factor, too."""
+    mine, usual = own.steps[1], reference.steps[own.axis][1]
+    return 0 < times < math.inf and _away_by(mine, usual * times) <= math.log(UNLIKE)
 
 
 def _far_too_large(own: Measured, reference: Reference) -> str | None:
