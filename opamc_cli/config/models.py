@@ -54,15 +54,22 @@ def _counts_as_number(value: Any, taken: Any) -> bool:
     return isinstance(value, bool) and isinstance(taken, int | float) and taken is not value
 
 
+# below, the ratio upside down; above, no gear of one joint's, but a comma lost
+Ratio = Annotated[float, Field(ge=0.1, le=10_000)]
+Poles = Annotated[int, Field(ge=1, le=1000)]
+Axis = Annotated[int, Field(ge=1)]
+
+
 class JointConfig(Section):
     """Constants of the joints, where known."""
 
-    # below, the ratio upside down; above, no gear of one joint's, but a comma lost
-    gear_ratio: Annotated[float, Field(ge=0.1, le=10_000)] | None = Field(
-        None, description="Motor revolutions per joint revolution; null if unknown."
+    gear_ratio: Ratio | dict[Axis, Ratio] | None = Field(
+        None,
+        description="Motor revolutions per joint revolution, of all joints or by axis "
+        "({1: 160, 2: 100}); null if unknown.",
     )
-    pole_pairs: Annotated[int, Field(ge=1, le=1000)] | None = Field(
-        None, description="Pole pairs of the motor; null if unknown."
+    pole_pairs: Poles | dict[Axis, Poles] | None = Field(
+        None, description="Pole pairs of the motor, likewise; null if unknown."
     )
     explain: bool = Field(
         True, description="Whether a diagnosis traces the change of an unhealthy joint to a cause."
@@ -75,6 +82,16 @@ class JointConfig(Section):
         description="Python files with effects of your own that may be a cause, too; their paths "
         "are absolute or count from the working directory.",
     )
+
+    def ratio_of(self, axis: int) -> float | None:
+        """Return an axis' gear ratio, None if unknown."""
+        given = self.gear_ratio
+        return given.get(axis) if isinstance(given, dict) else given
+
+    def poles_of(self, axis: int) -> int | None:
+        """Return an axis' pole pairs, None if unknown."""
+        given = self.pole_pairs
+        return given.get(axis) if isinstance(given, dict) else given
 
 
 class SegmentConfig(Section):

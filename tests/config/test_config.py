@@ -71,6 +71,14 @@ def test_a_number_is_not_yes_or_no(key):
     assert load_config(None, ["joint.explain=false"]).joint.explain is False
 
 
+def test_joints_have_gears_of_their_own():
+    joint = load_config(None, ["joint.gear_ratio={1: 160, 3: 100}", "joint.pole_pairs=5"]).joint
+    assert [joint.ratio_of(axis) for axis in (1, 2, 3)] == [160, None, 100]
+    assert [joint.poles_of(axis) for axis in (1, 2)] == [5, 5]
+    with pytest.raises(ConfigError, match="takes a number"):
+        load_config(None, ["joint.gear_ratio={1: 160, 3: yes}"])
+
+
 @pytest.mark.parametrize("entry", ["parameters: {order: yes}", "coefficients: [0.1, yes]"])
 def test_a_number_among_others_is_not_yes_or_no(tmp_path, entry):
     model = tmp_path / "model.yaml"

@@ -143,7 +143,9 @@ def _delays_in_words(motions: pa.Table, patterns: pa.Table, config: Config) -> l
             f"{lengths[0]} to {lengths[-1]}" if len(lengths) > 1 else f"{lengths[0]}"
             for lengths in [sorted({row["tau"] for row in own})]
         )
-        if own[0]["signal"] == "reported" and not (config.patterns.tau or config.joint.gear_ratio):
+        if own[0]["signal"] == "reported" and not (
+            config.patterns.tau or config.joint.ratio_of(axis)
+        ):
             notes.append(
                 f"axis {axis}: no carrier and no joint.gear_ratio tell the patterns' delay; it is "
                 f"chosen from the baseline's own current ({used} samples)"

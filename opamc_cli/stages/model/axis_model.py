@@ -123,7 +123,7 @@ def lay(
     declared = declared_effects(model, library)
     read = recordings_of(runs, axis, opposite)
     recordings = read.recordings
-    joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
+    joint = Joint(model.joint.ratio_of(axis), model.joint.poles_of(axis))
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
 
     def on(dataset: Dataset) -> Declared:

@@ -79,7 +79,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     if unit != closed.unit:
         msg = f"{runs[0].path}: is in {unit}, the model was closed in {closed.unit}; give such runs"
         raise InputError(msg)
-    joint = Joint(model.joint.gear_ratio, model.joint.pole_pairs)
+    joint = Joint(model.joint.ratio_of(axis), model.joint.poles_of(axis))
     track, _ = grouped_track(recordings, joint)
     if not is_moving(track):
         msg = f"{runs[0].path}: axis {axis} does not move; give runs in which it does"

@@ -298,7 +298,10 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
     track = after.dataset.fine.track
     warm = track.temperature_c is not None
     return {
-        "joint": {"gear_ratio": model.joint.gear_ratio, "pole_pairs": model.joint.pole_pairs},
+        "joint": {
+            "gear_ratio": model.joint.ratio_of(laid.axis),
+            "pole_pairs": model.joint.poles_of(laid.axis),
+        },
         "effects": effects,
         "library": [str(path) for path in model.library],
         "without": list(model.without),

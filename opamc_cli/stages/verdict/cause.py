@@ -157,7 +157,7 @@ def explain(
     lag = lag_behind(*along)
     if lag is not None:  # what else has changed is sought without it
         sides[1] = [_earlier(recording, lag.lag_s) for recording in sides[1]]
-    joint = Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs)
+    joint = Joint(config.ratio_of(axis), config.poles_of(axis))
     library = library_of(config)
     with users_effects_named():
         change = explain_change(sides[0], sides[1], joint, library=library, follow=following(kept))
@@ -192,7 +192,7 @@ def follow_baseline(
     recordings, *_ = _recordings(axis, baseline[-MAX_RUNS:], seconds, moving, {}, rate_hz)
     follow = following(kept)
     for recording in recordings:
-        follow(recording, Joint(gear_ratio=config.gear_ratio, pole_pairs=config.pole_pairs))
+        follow(recording, Joint(config.ratio_of(axis), config.poles_of(axis)))
 
 
 def library_of(config: JointConfig) -> Library:

@@ -23,7 +23,7 @@ from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.sources import RunSource
 
 SAMPLES = Path(__file__).parents[3] / "data" / "samples"
-KNOWN = JointConfig(gear_ratio=100, pole_pairs=5)
+KNOWN = JointConfig(gear_ratio={1: 100, 2: 100, 3: 100}, pole_pairs=5)
 
 
 def sources(side):

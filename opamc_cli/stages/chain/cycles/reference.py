@@ -219,7 +219,7 @@ def _executions(parts: Sequence[Axis], rule: MatchRule) -> bool:
 def with_carrier(reference: Reference, axis: int, config: Config) -> Reference:
     """Let the current's own fluctuations tell the delay where nothing else does."""
     with reference.source.open() as run:
-        if run.channels(axis).phases or config.joint.gear_ratio is not None:
+        if run.channels(axis).phases or config.joint.ratio_of(axis) is not None:
             return reference
         wanted = config.patterns.envelope
         found = [

@@ -96,7 +96,7 @@ def joint_segments(
             "as it is"
         )
         notes.append(f"{run.path}: column {name} keeps its sign though the joint reverses: {what}")
-    segments = _segments(run, current, motions, config, joint)
+    segments = _segments(run, channels, current, motions, config, joint)
     return AxisSegments(
         run.name,
         make_rows(run, channels, segments, "reported"),
@@ -109,14 +109,15 @@ def joint_segments(
 
 def _segments(
     run: Run,
+    channels: AxisChannels,
     current: npt.NDArray[np.floating],
     motions: list[JointMotion],
     config: SegmentConfig,
     joint: JointConfig,
 ) -> list[Segment]:
     def frequency(motion: JointMotion) -> float:
-        ratio = joint.gear_ratio or USUAL_GEAR_RATIO
-        return motor_frequency(motion.speed_rad_s, ratio, joint.pole_pairs)
+        ratio = joint.ratio_of(channels.axis) or USUAL_GEAR_RATIO
+        return motor_frequency(motion.speed_rad_s, ratio, joint.poles_of(channels.axis))
 
     never_stands = (
         len(motions) == 1
