@@ -21,6 +21,7 @@ from opamc_cli.storage.ingest.map.map_file import (
     IngestMap,
     RateMap,
     ValueMap,
+    count_doubts,
     for_axes,
     rate_hz,
 )
@@ -43,7 +44,7 @@ EARLIEST_S = 5e8
 """A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
 
 
-MAP_VERSION = 1
+MAP_VERSION = 2
 """Part of what a run remembers of its map: raised when the same map makes other runs."""
 
 
@@ -68,9 +69,10 @@ class Ingested:
     replaced: bool = False
     """The run was there already, made from another recording or by another map."""
     doubts: tuple[str, ...] = ()
-    """One sentence for each column whose numbers are larger than most robots'."""
+    """One sentence for each column whose numbers are larger than most robots', and for axes that
+    are missing between others."""
     lost: str | None = None
-    """One sentence if stamps say that a part of the recording is not in the run."""
+    """What of the recording is not in the run: times that stamps tell, joints."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,9 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             map_sha256=map_digest(task.channels),
         )
         written = _write(path, task.run, channels, info, blocks)
-        labels = {each.name: each.labels for each in source.channels() if each.labels}
+        listed = source.channels()
+        labels = {each.name: each.labels for each in listed if each.labels}
+        gaps, left = count_doubts(path, task.channels, channels, listed)
     account = clock.clock.account if clock and channels.time else None
     doubt = account.doubt() if account else None
     return Ingested(
@@ -210,8 +214,8 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         account,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
-        doubts=written.doubts,
-        lost=f"{path}: {doubt}" if doubt else None,
+        doubts=(*gaps, *written.doubts),
+        lost="; ".join([*left, *([f"{path}: {doubt}"] if doubt else [])]) or None,
     )
 
 

@@ -46,6 +46,8 @@ class Listed:
     """As the file declares it, None where it does not."""
     dates: bool = False
     """It holds dates and times."""
+    repeated: str | None = None
+    """The name that it shares with others, where it is called by its number for that."""
     labels: tuple[str, ...] = ()
     """What each column of a two-dimensional one is, such as the names of joints."""
 

@@ -366,3 +366,13 @@ def test_a_wrist_that_passes_half_a_turn_is_no_wonder(tmp_path):
         "  axis1_position: {source: 1, unit: rad}\n"
     )
     assert run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts == ()
+
+
+def test_joints_that_a_line_for_all_does_not_count_are_said(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("J0,J1,J3\n" + "1,2,3\n" * 4)
+    text = "sampling_rate_hz: 500\ncolumns:\n  axis{n}_current: {source: J{n}, unit: A}\n"
+    (item,) = run_map(tmp_path, text, [file]).results
+    assert list(item.sources) == ["axis1_current", "axis3_current"]
+    assert "no channel for axis 2, but for axis 3" in item.doubts[0]
+    assert "J0 is in no run" in item.lost

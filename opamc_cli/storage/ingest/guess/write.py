@@ -50,6 +50,8 @@ class _Look:
     time: Meant | None
     values: dict[Name | tuple[Name, int], Array]
     unused: list[str]
+    repeated: list[str]
+    """Names that several columns have."""
 
 
 @dataclass(frozen=True)
@@ -91,8 +93,12 @@ def guess_map(paths: Sequence[Path]) -> str:
     columns = _column_lines(look, rate)
     width = max(len(line.text) for line in columns)
     lines += [f"  {line.text:<{width}}  # {line.why}" for line in columns]
+    if look.repeated:
+        lines.append(f"# not used, for several columns have the name: {_shortened(look.repeated)}")
     if look.unused:
         lines.append(f"# not used: {_shortened(look.unused)}")
+    if _differ_by_axis(paths):
+        lines.append("# the files seem to hold one joint each: give each a map with its axis")
     lines += [
         "metadata:",
         "  robot:    # such as cell 7; runs of different robots are told apart",
@@ -121,11 +127,25 @@ def _look(path: Path) -> _Look:
             (c.source, c.index) if c.index is not None else c.source: _values(source, c)
             for c in [*chosen, *([time] if time else [])]
         }
-    used = {channel.pattern for channel in [*chosen, *([time] if time else [])]}
-    names = [channel.name for channel in listed if isinstance(channel.name, str)]
-    unused = [re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name) for name in names]
-    rest = [name for name in dict.fromkeys(unused) if name not in used and "/" not in name[1:]]
-    return _Look(path, layout, choices, time, values, rest)
+    taken = [*chosen, *([time] if time else [])]
+    used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
+    unused = []
+    for name in (each.name for each in listed if each.name not in used):
+        if isinstance(name, int):
+            continue
+        pattern = re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name)
+        # one of a family that is used is named itself
+        unused.append(name if pattern in patterns else pattern)
+    rest = [name for name in dict.fromkeys(unused) if "/" not in name[1:]]
+    repeated = [each.repeated for each in listed if each.repeated]
+    return _Look(path, layout, choices, time, values, rest, list(dict.fromkeys(repeated)))
+
+
+def _differ_by_axis(paths: Sequence[Path]) -> bool:
+    """Return whether names of files differ by the number of a joint alone, as `n06_axis2.csv`."""
+    number = re.compile(r"((?:axis|achse|joint|motor|(?<![a-z])[aj])[ _.\-]*)[0-9]+", re.I)
+    kinds = {number.sub(r"\1#", path.stem) for path in paths}
+    return len({path.stem for path in paths}) > 1 and len(kinds) == 1
 
 
 def _any_map(kind: str, layout: Layout | None) -> IngestMap:
@@ -307,7 +327,9 @@ def _lines_of(
     """Return one line for all axes where the sources count with them, else one for each."""
     shared: dict[tuple[str, int], list[int]] = {}
     for axis, channel in channels.items():
-        if channel.index is None and channel.number is not None and "#" in channel.pattern:
+        # a number with zeros before it is none that {n} stands for
+        counts = channel.pattern.replace("#", str(channel.number)) == channel.source
+        if channel.index is None and channel.number is not None and counts:
             shared.setdefault((channel.pattern, channel.number - axis), []).append(axis)
         elif channel.index is not None:
             shared.setdefault((f"{channel.source}@", channel.index - axis), []).append(axis)

@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
-from opamc_cli.storage.ingest.map.axes import expand, has_placeholder
+from opamc_cli.storage.ingest.map.axes import at_zero, expand, has_placeholder
 from opamc_cli.storage.ingest.map.units import conversion
 from opamc_cli.storage.ingest.source import Listed, Name
 
@@ -153,6 +153,43 @@ def for_axes(
         if exists(entry) or not entry.get("optional")
     }
     return channels.model_copy(update={"columns": columns})
+
+
+def count_doubts(
+    path: Path, channels: IngestMap, own: IngestMap, listed: Sequence[Listed]
+) -> tuple[list[str], list[str]]:
+    """Say where lines for all axes and the channels of a file do not count alike.
+
+    Parameters
+    ----------
+    path
+        The file, for the sentences.
+    channels, own
+        The map, and what `for_axes` made of it for this file.
+    listed
+        What the file offers.
+
+    Returns
+    -------
+    tuple
+        Sentences on axes that are missing between others, and on joints that are left out.
+    """
+    axes = {int(name[4 : name.index("_")]) for name in own.columns}
+    gap = sorted(set(range(min(axes), max(axes))) - axes)
+    gaps = (
+        f"{path}: has no channel for axis {', '.join(map(str, gap))}, but for axis {max(axes)}; "
+        "look for a name that differs, or write a line for each axis"
+    )
+    used = {column.source for column in own.columns.values()}
+    used |= {own.time.source} if own.time else set()
+    zero = {at_zero(column.source) for column in channels.columns.values()}
+    left = [str(each.name) for each in listed if each.name in zero - used]
+    lost = (
+        f"{path}: {', '.join(left)} is in no run: {{n}} counts from 1; write {{n-1}} if its joints "
+        "are counted from 0"
+    )
+    several = any(has_placeholder(name) for name in channels.columns)
+    return [gaps] if gap and several else [], [lost] if left else []
 
 
 def format_of(path: Path, channels: IngestMap) -> str:

@@ -74,8 +74,9 @@ class CsvSource:
             if kind is None or (self._map.header and not given):
                 continue
             name: Name = given if given and self._names.count(given) == 1 else position
+            repeated = f"{given} ({position})" if given and name == position else None
             unit = self._units[position].strip(" []()") if position < len(self._units) else ""
-            listed.append(Listed(name, unit=unit or None, dates=kind == "date"))
+            listed.append(Listed(name, None, unit or None, kind == "date", repeated))
         return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:

@@ -15,7 +15,7 @@ KNOWN = {
 }
 WANTED = (
     "target command commanded cmd cmptd computed desired des setpoint ref reference limit error "
-    "sm model std planned nominal"
+    "sm model std planned nominal set soll sollwert"
 )
 ELSEWHERE = "mm tcp tool gripper base cartesian flange io voltage"
 
