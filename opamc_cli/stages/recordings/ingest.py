@@ -25,7 +25,14 @@ from opamc_cli.storage.ingest.map.map_file import (
     for_axes,
     rate_hz,
 )
-from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque
+from opamc_cli.storage.ingest.map.units import (
+    ISO8601,
+    SAMPLES,
+    conversion,
+    date_s,
+    is_torque,
+    known_units,
+)
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.recordings import find_recordings, local_copy
 from opamc_cli.storage.ingest.source import Array, Block, Name, Selection, Source
@@ -36,13 +43,9 @@ from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.runs.metadata import METADATA_KEY, RunInfo
 from opamc_cli.storage.runs.run import LARGEST_SAMPLE, Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
-from opamc_cli.storage.schemas.channels import quantity_of, same_clock
+from opamc_cli.storage.schemas.channels import LEAST_HZ, MOST_HZ, quantity_of, same_clock
 
 _TIME = "time"
-
-EARLIEST_S = 5e8
-"""A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
-
 
 MAP_VERSION = 2
 """Part of what a run remembers of its map: raised when the same map makes other runs."""
@@ -275,6 +278,13 @@ def _clock(
         return _Stamped(times_s, examine(path, "rows", times_s, declared, 2.5, grid))
     times_s = _times(source, channels, declared)
     clock = examine(path, time.source, times_s, declared, time.max_gap_samples, grid)
+    if not LEAST_HZ <= clock.sampling_rate_hz <= MOST_HZ:
+        msg = (
+            f"{path}: time column {time.source!r} says {clock.sampling_rate_hz:.4g} Hz, a log has "
+            f"{LEAST_HZ:g} to {MOST_HZ:g}: it is not in {time.unit}; correct time.unit in the map, "
+            f"units: {known_units('time')}"
+        )
+        raise InputError(msg)
     return _Stamped(times_s, clock)
 
 
@@ -370,10 +380,8 @@ def _since_1970(value: object, given: object, channels: IngestMap) -> object:
     number = _number(value)
     if time is None or not isinstance(given, ValueMap) or given.source != time.source:
         return value
-    unit = conversion(time.unit, "time")
-    if unit is None or number is None or number * unit.factor < EARLIEST_S:
-        return value
-    return np.datetime64(round(number * unit.factor * 1e6), "us")
+    seconds = date_s(number, time.unit) if number is not None else None
+    return value if seconds is None else np.datetime64(round(seconds * 1e6), "us")
 
 
 def _number(value: object) -> float | None:

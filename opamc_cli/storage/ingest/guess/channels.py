@@ -98,7 +98,7 @@ def _first(families: dict[str, list[list[Meant]]]) -> int:
         for group in families[kind]:
             numbers = [channel.number for channel in group if channel.number is not None]
             if numbers and group[0].index is None:
-                return 1 if 0 < min(numbers) and max(numbers) <= MOST_AXES else min(numbers)
+                return 1 if min(numbers) > 0 and max(numbers) <= MOST_AXES else min(numbers)
     return 0
 
 

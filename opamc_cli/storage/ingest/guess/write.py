@@ -27,7 +27,7 @@ from opamc_cli.storage.ingest.guess.values import (
     wraps,
 )
 from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torque
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s, is_torque
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.source import Array, Name, Selection, Source
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
@@ -207,8 +207,11 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
     time = look.time
     stamps = look.values.get(time.source) if time is not None else None
     unit = _time_guess(time, stamps)
-    if time is None or stamps is None or unit is None:
+    if time is None or stamps is None:
         return None, ["sampling_rate_hz:  # no channel tells it: write the samples per second"]
+    if unit is None:
+        why = f"{time.source} goes back or fits no unit of time: write the samples per second"
+        return None, [f"sampling_rate_hz:  # {why}"]
     line = f"time: {{source: {_quoted(time.source)}, unit: {unit.unit}}}"
     if unit.unit == "samples":
         rate = rate_from_speed(*_angles(look))
@@ -376,7 +379,8 @@ def _started_at(look: _Look) -> list[str]:
     own = {"ros": "@started_at", "mdf": "@start_time"}.get(str(kind))
     stamps = look.values.get(look.time.source) if look.time else None
     if own is None and look.time is not None and stamps is not None and len(stamps):
+        unit = _time_guess(look.time, stamps)
         is_date = stamps.dtype.kind == "M"
-        if is_date or float(stamps[0]) > 1e8:
+        if is_date or (unit is not None and date_s(float(stamps[0]), unit.unit) is not None):
             own = str(look.time.source)
     return [f"  started_at: {{source: {_quoted(own)}}}"] if own else []

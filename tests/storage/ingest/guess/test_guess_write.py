@@ -12,7 +12,7 @@ from opamc_cli.storage.ingest.guess.write import guess_map
 def table(path, columns, head="", separator=","):
     """Write columns by their names."""
     rows = np.column_stack(list(columns.values()))
-    lines = [separator.join(f"{v:.10g}" for v in row) for row in rows]
+    lines = [separator.join(f"{v:.14g}" for v in row) for row in rows]
     path.write_text(head + "\n".join([separator.join(columns), *lines]) + "\n")
     return path
 
