@@ -203,6 +203,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             map_sha256=map_digest(task.channels),
         )
         written = _write(path, task.run, channels, info, blocks)
+        remarks = source.remarks
         listed = source.channels()
         labels = {each.name: each.labels for each in listed if each.labels}
         gaps, left = count_doubts(path, task.channels, channels, listed)
@@ -217,7 +218,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         account,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
-        doubts=(*gaps, *written.doubts),
+        doubts=(*gaps, *remarks, *written.doubts),
         lost="; ".join([*left, *([f"{path}: {doubt}"] if doubt else [])]) or None,
     )
 

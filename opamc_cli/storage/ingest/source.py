@@ -76,6 +76,11 @@ class Source(Protocol):
         """Return a single value: a channel's first, or an attribute."""
         ...
 
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences on what was left out while reading."""
+        ...
+
 
 def missing_channel(path: Path, source: Name, known: list[str]) -> InputError:
     """Return the error for a channel that is not in the file."""

@@ -14,7 +14,7 @@ WORDS = {
     "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
     "current": ("cur", "curr", "current", "currents", "i", "iq", "amp", "amps", "ampere", "strom"),
     **{name: channel.words for name, channel in LOGGED.items() if channel.vague},
-    "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit"),
+    "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit", "ts", "epoch"),
 }
 """Words of a name by quantity, in the order in which they decide."""
 

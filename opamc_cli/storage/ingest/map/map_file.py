@@ -38,7 +38,8 @@ class ColumnMap(_Strict):
     index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
     scale: Finite = 1.0
     offset: Finite = 0.0
-    unwrap: bool = False
+    unwrap: bool | Positive = False
+    """True: at half a turn, in `unit`; a number: where the source's own values wrap, before scale."""
     optional: bool = False
 
 
@@ -104,6 +105,8 @@ class IngestMap(_Strict):
     """Lines before the header (or before the data, without one)."""
     units_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
     """Lines between header and data."""
+    missing: tuple[str, ...] = ()
+    """Texts that stand for no number, beside "", "NaN", "N/A" and the like."""
     axes: Annotated[int, Field(ge=1, le=32)] | None = None
     """For how many axes a line with `{n}` stands; None: for as many as the file has."""
     columns: dict[str, ColumnMap] = Field(min_length=1)
