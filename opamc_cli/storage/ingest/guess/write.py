@@ -16,11 +16,13 @@ from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
 from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.guess.values import (
     MOST_TURNS,
+    UNSIGNED,
     Float,
     Guess,
     angle_units,
     are_phases,
     current_unit,
+    is_unsigned,
     rate_from_speed,
     time_unit,
     turns,
@@ -61,20 +63,22 @@ class _Line:
     why: str
 
 
-def guess_map(paths: Sequence[Path]) -> str:
+def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     """Return a map for recordings of one kind, as YAML with a comment for every line.
 
     Parameters
     ----------
     paths
         Recordings; channels are taken from the first, rates from all (the first twenty).
+    encoding
+        Of a text, None where the text is to tell it.
 
     Raises
     ------
     InputError
         If a recording cannot be read, or nothing in it looks like a current.
     """
-    look = _look(paths[0])
+    look = _look(paths[0], encoding)
     if not any(kind in look.choices for kind in CURRENTS):
         msg = (
             f"{paths[0]}: no channel looks like a motor current or torque "
@@ -108,12 +112,12 @@ def guess_map(paths: Sequence[Path]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path) -> _Look:
+def _look(path: Path, encoding: str | None = None) -> _Look:
     kind = format_by_ending(path)
     if kind is None:
         msg = f"{path}: its ending does not tell the format; known: {known_endings()}"
         raise InputError(msg)
-    layout = text_layout(path) if kind == "csv" else None
+    layout = text_layout(path, encoding) if kind == "csv" else None
     with open_source(path, _any_map(kind, layout)) as source:
         # a joint's name is safer than its place in a message
         listed = [c for c in source.channels() if kind != "ros" or c.width is None]
@@ -303,9 +307,12 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
                 guess = current_unit(largest)
+                if any(is_unsigned(look.values[_key(each)]) for each in channels.values()):
+                    guess = Guess(guess.unit, f"{guess.why}; {UNSIGNED}")
         declared = next(iter(channels.values())).unit
         if declared and _fits(declared, kind):
-            guess = Guess(declared, f"as the file says; largest {largest:.3g}")
+            unsigned = f"; {UNSIGNED}" if guess.why.endswith(UNSIGNED) else ""
+            guess = Guess(declared, f"as the file says; largest {largest:.3g}{unsigned}")
         why = guess.why
         if kind == "position" and turns(largest, guess.unit) > MOST_TURNS:
             count = turns(largest, guess.unit)

@@ -39,7 +39,7 @@ class ColumnMap(_Strict):
     scale: Finite = 1.0
     offset: Finite = 0.0
     unwrap: bool | Positive = False
-    """True: at half a turn, in `unit`; a number: where the source's own values wrap, before scale."""
+    """True: where a turn ends, in `unit`; a number: where the source's values do, before scale."""
     optional: bool = False
 
 

@@ -233,3 +233,26 @@ def test_a_position_of_many_turns_is_said_to_be_the_motors(tmp_path, scale, said
     (line,) = [line for line in lines if line.startswith("axis1_position")]
     assert line.endswith(" turns; a motor's needs scale: 1 / gear ratio") is said
     assert "unit: deg" in line
+
+
+def test_an_encoding_that_is_given_is_taken(tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{t:g},{i:.6f}\n" for t, i in zip(T, SPEED, strict=True))
+    path.write_text("t,電流1軸[A]\n" + rows + "4.0", encoding="shift_jis")
+    with pytest.raises(SystemExit) as stopped:
+        main(["ingest", str(path), "--guess", "--set", "encoding=shift_jis"])
+    assert not stopped.value.code
+    printed = capsys.readouterr().out
+    assert "encoding: shift_jis" in printed
+    assert 'axis1_current: {source: "電流1軸[A]", unit: A}' in printed
+    for wrong in ("encoding=klingon", "separator=;"):
+        with pytest.raises(SystemExit) as stopped:
+            main(["ingest", str(path), "--guess", "--set", wrong])
+        assert stopped.value.code == 2
+
+
+def test_currents_that_lost_their_sign_are_said(tmp_path):
+    path = table(tmp_path / "a.csv", {"t": T, "cur_1": np.mod(np.round(3000 * SPEED), 65536)})
+    assert lines_of(path)[0][5].endswith(
+        "negative numbers seem to be 65536 too large: log them as signed"
+    )
