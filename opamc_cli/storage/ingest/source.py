@@ -48,6 +48,8 @@ class Listed:
     """It holds dates and times."""
     repeated: str | None = None
     """The name that it shares with others, where it is called by its number for that."""
+    rows: int | None = None
+    """How many values it has, None where all channels have as many."""
     labels: tuple[str, ...] = ()
     """What each column of a two-dimensional one is, such as the names of joints."""
 

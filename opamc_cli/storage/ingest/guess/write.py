@@ -125,6 +125,13 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         if layout is not None and not layout.header:
             meant = _numbered_phases(source, [c.name for c in listed if isinstance(c.name, int)])
         choices = choose(meant)
+        rows = {each.name: each.rows for each in listed}
+        for kind in (kind for kind in CURRENTS if kind in choices and choices[kind].by_axis):
+            n = rows[next(iter(choices[kind].by_axis.values())).source]
+            # what was logged at another rate is no channel of this run
+            meant = [each for each in meant if rows[each.source] == n]
+            choices = choose(meant)
+            break
         time = time_channel(meant)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {
