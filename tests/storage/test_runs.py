@@ -76,11 +76,13 @@ def test_columns_of_an_axis(tmp_path):
     ("key", "good", "bad"),
     [
         ("sampling_rate_hz", 1e-3, 0.9e-3),
-        ("sampling_rate_hz", 1e8, 1.1e8),
+        ("sampling_rate_hz", 1e6, 1.1e6),
         ("speed_percent", 1e6, 1.1e6),
         ("payload_kg", -1e6, -1.1e6),
         ("robot", "x" * 1000, "x" * 1001),
         ("current_unit", "Nm", "V"),
+        ("started_at", "1970-01-01T00:00:00Z", "1969-12-31"),
+        ("started_at", "2079-12-31", "2080-01-01"),
     ],
 )
 def test_bounds_of_metadata(tmp_path, key, good, bad):

@@ -1,5 +1,6 @@
 """`opamc ingest`: recordings of other programs become runs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -53,7 +54,7 @@ def ingest(
     """
     output = Output(as_json=as_json, quiet=quiet)
     if guess:
-        _guess(files, output)
+        _guess(files, overrides or (), output)
         return
     from opamc_cli.stages.recordings import ingest as stage
     from opamc_cli.storage.ingest.map.load import load_map
@@ -92,15 +93,26 @@ def ingest(
         raise typer.Exit(code)
 
 
-def _guess(files: list[str], output: Output) -> None:
+def _guess(files: list[str], overrides: Sequence[str], output: Output) -> None:
+    import codecs
     from contextlib import ExitStack
 
     from opamc_cli.storage.ingest.guess.write import guess_map
     from opamc_cli.storage.ingest.recordings import find_recordings, local_copy
 
+    given = dict(each.partition("=")[::2] for each in overrides)
+    if given.keys() - {"encoding"}:
+        msg = "--guess takes --set encoding=NAME alone; change other keys in the map it prints"
+        raise UsageError(msg)
+    encoding = given.get("encoding")
+    try:
+        codecs.lookup(encoding or "utf-8")
+    except LookupError as error:
+        msg = f"--set encoding={encoding}: no such encoding; use utf-8, latin-1, cp1252, shift_jis"
+        raise UsageError(msg) from error
     with ExitStack() as stack:
         paths = [stack.enter_context(local_copy(each.source)) for each in find_recordings(files)]
-        text = guess_map(paths)
+        text = guess_map(paths, encoding)
     output.result({"map": text}, text.rstrip("\n"), urgent=True)
 
 

@@ -21,10 +21,18 @@ from opamc_cli.storage.ingest.map.map_file import (
     IngestMap,
     RateMap,
     ValueMap,
+    count_doubts,
     for_axes,
     rate_hz,
 )
-from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque
+from opamc_cli.storage.ingest.map.units import (
+    ISO8601,
+    SAMPLES,
+    conversion,
+    date_s,
+    is_torque,
+    known_units,
+)
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.recordings import find_recordings, local_copy
 from opamc_cli.storage.ingest.source import Array, Block, Name, Selection, Source
@@ -35,15 +43,11 @@ from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.runs.metadata import METADATA_KEY, RunInfo
 from opamc_cli.storage.runs.run import LARGEST_SAMPLE, Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
-from opamc_cli.storage.schemas.channels import quantity_of, same_clock
+from opamc_cli.storage.schemas.channels import LEAST_HZ, MOST_HZ, quantity_of, same_clock
 
 _TIME = "time"
 
-EARLIEST_S = 5e8
-"""A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
-
-
-MAP_VERSION = 1
+MAP_VERSION = 2
 """Part of what a run remembers of its map: raised when the same map makes other runs."""
 
 
@@ -68,9 +72,10 @@ class Ingested:
     replaced: bool = False
     """The run was there already, made from another recording or by another map."""
     doubts: tuple[str, ...] = ()
-    """One sentence for each column whose numbers are larger than most robots'."""
+    """One sentence for each column whose numbers are larger than most robots', and for axes that
+    are missing between others."""
     lost: str | None = None
-    """One sentence if stamps say that a part of the recording is not in the run."""
+    """What of the recording is not in the run: times that stamps tell, joints."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +203,10 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             map_sha256=map_digest(task.channels),
         )
         written = _write(path, task.run, channels, info, blocks)
-        labels = {each.name: each.labels for each in source.channels() if each.labels}
+        remarks = source.remarks
+        listed = source.channels()
+        labels = {each.name: each.labels for each in listed if each.labels}
+        gaps, left = count_doubts(path, task.channels, channels, listed)
     account = clock.clock.account if clock and channels.time else None
     doubt = account.doubt() if account else None
     return Ingested(
@@ -210,8 +218,8 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         account,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
-        doubts=written.doubts,
-        lost=f"{path}: {doubt}" if doubt else None,
+        doubts=(*gaps, *remarks, *written.doubts),
+        lost="; ".join([*left, *([f"{path}: {doubt}"] if doubt else [])]) or None,
     )
 
 
@@ -271,6 +279,13 @@ def _clock(
         return _Stamped(times_s, examine(path, "rows", times_s, declared, 2.5, grid))
     times_s = _times(source, channels, declared)
     clock = examine(path, time.source, times_s, declared, time.max_gap_samples, grid)
+    if not LEAST_HZ <= clock.sampling_rate_hz <= MOST_HZ:
+        msg = (
+            f"{path}: time column {time.source!r} says {clock.sampling_rate_hz:.4g} Hz, a log has "
+            f"{LEAST_HZ:g} to {MOST_HZ:g}: it is not in {time.unit}; correct time.unit in the map, "
+            f"units: {known_units('time')}"
+        )
+        raise InputError(msg)
     return _Stamped(times_s, clock)
 
 
@@ -366,10 +381,8 @@ def _since_1970(value: object, given: object, channels: IngestMap) -> object:
     number = _number(value)
     if time is None or not isinstance(given, ValueMap) or given.source != time.source:
         return value
-    unit = conversion(time.unit, "time")
-    if unit is None or number is None or number * unit.factor < EARLIEST_S:
-        return value
-    return np.datetime64(round(number * unit.factor * 1e6), "us")
+    seconds = date_s(number, time.unit) if number is not None else None
+    return value if seconds is None else np.datetime64(round(seconds * 1e6), "us")
 
 
 def _number(value: object) -> float | None:

@@ -134,7 +134,8 @@ def missing(run: Run, column: str) -> list[str]:
         msg = (
             f"{run.path}: column {column} leaps back by {wraps[0]:.4g} at {places} places, and no "
             f"joint does: an angle that wraps{f', in {units[0]}' if units else ''}? Name its unit "
-            "in the map of opamc ingest, or unwrap it"
+            "in the map of opamc ingest, or unwrap it (unwrap: 360 where the file's own values "
+            "wrap at 360, whatever their scale)"
         )
         raise InputError(msg)
     return [

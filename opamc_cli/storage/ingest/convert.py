@@ -16,14 +16,20 @@ Float = npt.NDArray[np.float64]
 
 def convert(blocks: Iterable[Block], channels: IngestMap) -> Iterator[Block]:
     """Yield the blocks in A, rad, rad/s and °C, positions unwrapped where the map says so."""
-    unwrapped = {name: _Turns() for name, column in channels.columns.items() if column.unwrap}
+    unwrapped = {
+        name: _Turns(2 * math.pi if column.unwrap is True else column.unwrap)
+        for name, column in channels.columns.items()
+        if column.unwrap
+    }
     for block in blocks:
         converted: Block = {}
         for name, values in block.items():
             column = channels.columns.get(name)
-            converted[name] = values if column is None else _scaled(values, name, column)
-        for name, turns in unwrapped.items():
-            converted[name] = turns.unwrap(converted[name])
+            turns = unwrapped.get(name)
+            before = turns is not None and column is not None and column.unwrap is not True
+            read = turns.unwrap(values) if turns is not None and before else values
+            scaled = read if column is None else _scaled(read, name, column)
+            converted[name] = scaled if turns is None or before else turns.unwrap(scaled)
         yield converted
 
 
@@ -37,24 +43,25 @@ def _scaled(values: Float, name: str, column: ColumnMap) -> Float:
 
 
 class _Turns:
-    """Unwraps an angle block by block: a jump of more than half a turn is a turn.
+    """Unwraps an angle block by block: a jump of more than half of where it wraps is one.
 
     Missing values stay missing; the jump is looked for between the values beside them.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, turn: float) -> None:
+        self._turn = turn
         self._last = math.nan
         self._turns = 0.0
 
-    def unwrap(self, angle_rad: Float) -> Float:
-        known = np.flatnonzero(np.isfinite(angle_rad))
+    def unwrap(self, wrapped: Float) -> Float:
+        known = np.flatnonzero(np.isfinite(wrapped))
         if known.size == 0:
-            return angle_rad
-        angle = angle_rad[known]
+            return wrapped
+        angle = wrapped[known]
         first = angle[0] if math.isnan(self._last) else self._last
-        jumps = -np.round(np.diff(angle, prepend=first) / (2 * math.pi))
+        jumps = -np.round(np.diff(angle, prepend=first) / self._turn)
         turns = self._turns + np.cumsum(jumps)
         self._last, self._turns = float(angle[-1]), float(turns[-1])
-        result = angle_rad.copy()
-        result[known] = angle + turns * (2 * math.pi)
+        result = wrapped.copy()
+        result[known] = angle + turns * self._turn
         return result

@@ -99,6 +99,11 @@ class _Guarded:
                 return
             yield block
 
+    @property
+    def remarks(self) -> list[str]:
+        # only a text can end within a line
+        return list(getattr(self._source, "remarks", []))
+
     def value(self, source: Name) -> object:
         with _readable(self._path):
             return self._source.value(source)

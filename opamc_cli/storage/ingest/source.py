@@ -46,6 +46,10 @@ class Listed:
     """As the file declares it, None where it does not."""
     dates: bool = False
     """It holds dates and times."""
+    repeated: str | None = None
+    """The name that it shares with others, where it is called by its number for that."""
+    rows: int | None = None
+    """How many values it has, None where all channels have as many."""
     labels: tuple[str, ...] = ()
     """What each column of a two-dimensional one is, such as the names of joints."""
 
@@ -72,6 +76,11 @@ class Source(Protocol):
 
     def value(self, source: Name) -> object:
         """Return a single value: a channel's first, or an attribute."""
+        ...
+
+    @property
+    def remarks(self) -> list[str]:
+        """Sentences on what was left out while reading."""
         ...
 
 

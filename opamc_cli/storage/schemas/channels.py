@@ -70,9 +70,10 @@ LOGGED = {
 """By name and quantity, in the order in which a map lists them."""
 
 CHANNELS = (*CURRENTS, *LOGGED)
-LEAST_HZ, MOST_HZ = 1e-3, 1e8
-"""A current that is sampled once in a quarter of an hour has a clock in another unit; no converter
-is faster than the other, but a time in nanoseconds that was taken for a rate is."""
+LEAST_HZ, MOST_HZ = 1e-3, 1e6
+"""A current that is sampled once in a quarter of an hour has a clock in another unit. So has one
+above the other: drives switch at some ten thousand times a second, and days that were taken for
+seconds are 86 400 times as fast."""
 
 SAME_CLOCK = 1e-3
 """Relative difference of rates that is a clock's drift, or how well it was measured, no other rate:

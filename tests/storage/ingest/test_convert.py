@@ -27,3 +27,12 @@ def test_unwrapping_in_blocks_is_numpys(steps, cut, missing):
     known = np.isfinite(wrapped)
     np.testing.assert_allclose(found[known], np.unwrap(wrapped[known]), atol=1e-9)
     assert np.isnan(found[~known]).all()
+
+
+def test_a_motors_single_turn_is_unwrapped_before_it_is_scaled():
+    counts = np.arange(0, 9000, 100) % 4096
+    column = {"source": 0, "unit": "deg", "unwrap": 4096, "scale": 360 / 4096 / 100, "offset": 5}
+    channels = IngestMap.model_validate({"columns": {"axis1_position": column}})
+    (block,) = convert([{"axis1_position": counts.astype(float)}], channels)
+    expected = np.radians(np.arange(0, 9000, 100) * 360 / 4096 / 100 + 5)
+    np.testing.assert_allclose(block["axis1_position"], expected)

@@ -366,3 +366,44 @@ def test_a_wrist_that_passes_half_a_turn_is_no_wonder(tmp_path):
         "  axis1_position: {source: 1, unit: rad}\n"
     )
     assert run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts == ()
+
+
+def test_joints_that_a_line_for_all_does_not_count_are_said(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("J0,J1,J3\n" + "1,2,3\n" * 4)
+    text = "sampling_rate_hz: 500\ncolumns:\n  axis{n}_current: {source: J{n}, unit: A}\n"
+    (item,) = run_map(tmp_path, text, [file]).results
+    assert list(item.sources) == ["axis1_current", "axis3_current"]
+    assert "no channel for axis 2, but for axis 3" in item.doubts[0]
+    assert "J0 is in no run" in item.lost
+
+
+def test_a_last_line_that_is_cut_off_is_left_out_aloud(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("a,b\n" + "1,2\n" * 5 + "3")
+    text = "sampling_rate_hz: 500\ncolumns: {axis1_a: {source: a, unit: A}}\n"
+    (item,) = run_map(tmp_path, text, [file]).results
+    assert item.n_samples == 5
+    assert item.doubts == (f"{file}: its last line is cut off and left out",)
+    for end in ("3\n", "3\n1,2", "3,4,5"):
+        file.write_text("a,b\n" + "1,2\n" * 5 + end)
+        assert "columns where the first has 2" in refusal(run_map(tmp_path, text, [file]))
+
+
+def test_texts_that_stand_for_no_number_are_named(tmp_path):
+    file = tmp_path / "r.csv"
+    file.write_text("a\n---\n1\nn. def.\n2\n")
+    text = "sampling_rate_hz: 500\ncolumns: {axis1_a: {source: a, unit: A}}\n"
+    refused = refusal(run_map(tmp_path, text, [file]))
+    assert "holds '---'" in refused
+    assert "name what stands for no number in missing" in refused
+    (item,) = run_map(tmp_path, text + 'missing: ["---", "n. def."]\n', [file]).results
+    assert item.missing == {"axis1_a": 2}
+
+
+def test_dates_that_are_none_of_iso_8601_are_refused_as_such(tmp_path):
+    file = tmp_path / "r.csv"
+    text = "time: {source: t, unit: iso8601}\ncolumns: {axis1_a: {source: a, unit: A}}\n"
+    for date in ("10/19/2026 1:00 PM", "19.10.2026 12:00:00", "12:00:00"):
+        file.write_text("t,a\n" + f"{date},1\n" * 5)
+        assert "is no ISO 8601 time such as" in refusal(run_map(tmp_path, text, [file]))

@@ -253,3 +253,17 @@ def test_maps_that_cannot_be(tmp_path, text, part):
     with pytest.raises(ConfigError) as refused:
         load_map(path)
     assert part in str(refused.value)
+
+
+def test_a_guess_leaves_channels_that_were_logged_at_another_rate(tmp_path):
+    from asammdf import MDF, Signal
+
+    recorded = foreign.recording()
+    file = foreign.mdf(tmp_path / "log.mf4", recorded)
+    slow = recorded.time_s[::50]
+    with MDF(file) as log:
+        log.append([Signal(30 + slow, slow, unit="degC", name="Axis1_Temp")])
+        log.save(tmp_path / "two.mf4", overwrite=True)
+    text = guess_map([tmp_path / "two.mf4"])
+    assert "# not used: Axis#_Temp" in text
+    check(only_run(by_map(tmp_path, text, [tmp_path / "two.mf4"])), recorded)

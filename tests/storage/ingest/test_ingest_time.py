@@ -30,6 +30,27 @@ def test_units_of_time(tmp_path, unit, factor):
     assert ingested(tmp_path, rows, f"{{source: t, unit: {unit}}}").sampling_rate_hz == 500
 
 
+@pytest.mark.parametrize(
+    ("unit", "start", "per_s"),
+    [
+        ("filetime", 134_051_106_000_000_000, 1e7),
+        ("ticks", 638_962_722_000_000_000, 1e7),
+        ("days", 45953.9166666667, 1 / 86_400),
+    ],
+)
+def test_counts_from_another_day_than_1970_tell_the_start(tmp_path, unit, start, per_s):
+    rows = [(f"{start + k / 4 * per_s:.10f}", k) for k in range(100)]
+    extra = "metadata: {started_at: {source: t}}\n"
+    item = ingested(tmp_path, rows, f"{{source: t, unit: {unit}}}", extra)
+    assert item.sampling_rate_hz == pytest.approx(4, rel=1e-6)
+    assert Run(item.run).info.started_at.startswith("2025-10-")
+    # in another unit they are another year's, or of no log's rate
+    with pytest.raises(
+        InputError, match=r"no log is of|is not in s; correct|must be a date and time"
+    ):
+        ingested(tmp_path, rows, f"{{source: t, unit: {'s' if unit == 'days' else 'us'}}}", extra)
+
+
 def test_dates_with_a_gap(tmp_path):
     seconds = [*range(20), *range(30, 50)]
     rows = [(f"2022-10-26T08:{17 + s // 60}:{s % 60:02}.5Z", s) for s in seconds]

@@ -204,8 +204,11 @@ def test_mdf(tmp_path):
         names = [f"Axis{k}_{kind}" for k in range(1, 7) for kind in ("Iq", "Angle")]
         units = {"Iq": "A", "Angle": "deg"}
         assert source.channels() == [
-            Listed("time", unit="s"),
-            *(Listed(name, unit=units[name.split("_")[1]]) for name in names),
+            Listed("time", unit="s", rows=len(recorded.time_s)),
+            *(
+                Listed(name, unit=units[name.split("_")[1]], rows=len(recorded.time_s))
+                for name in names
+            ),
         ]
         np.testing.assert_allclose(channel(source, "time"), recorded.time_s)
         np.testing.assert_allclose(channel(source, "Axis2_Iq"), recorded.current[:, 1])

@@ -3,7 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from opamc_cli.storage.ingest.guess.names import Meant
+from opamc_cli.storage.ingest.guess.names import Meant, says_actual
+from opamc_cli.storage.ingest.map.axes import MOST_AXES
 from opamc_cli.storage.schemas.channels import LOGGED, PHASES
 
 KINDS = ("current", *PHASES, *LOGGED)
@@ -22,8 +23,8 @@ class Choice:
 def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
     """Return the channels of each kind that a map takes.
 
-    The one measured family with the most axes wins. Axes are counted from the lowest number
-    among the currents, so that `J0` .. `J5` and `1` .. `6` both become axes 1 to 6; channels
+    The one measured family with the most axes wins. A joint keeps its number, `J4` is axis 4;
+    where currents count from 0, or beyond what an arm has axes, the lowest is axis 1. Channels
     without a number (as ROS names joints) are axes in their order.
     """
     families: dict[str, list[list[Meant]]] = {}
@@ -38,7 +39,7 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
         measured = [group for group in families[kind] if group[0].measured]
         if not measured and not any(families[phase] for phase in PHASES):
             families[kind] = families[stands]
-    lowest = _lowest(families)
+    lowest = _first(families)
     choices = {}
     for kind in KINDS:
         groups_of_kind = families[kind]
@@ -82,7 +83,7 @@ def _within(choice: Choice, axes: set[int]) -> Choice:
 
 def _worth(group: Sequence[Meant]) -> tuple[bool, bool, int, int]:
     pattern = group[0].pattern
-    return group[0].measured, "actual" in pattern.lower(), len(group), -len(pattern)
+    return group[0].measured, says_actual(pattern), len(group), -len(pattern)
 
 
 def _parent(channel: Meant) -> str:
@@ -91,12 +92,13 @@ def _parent(channel: Meant) -> str:
     return "/".join([*parts[:-2], "#", parts[-1]]) if len(parts) > 2 else channel.pattern
 
 
-def _lowest(families: dict[str, list[list[Meant]]]) -> int:
+def _first(families: dict[str, list[list[Meant]]]) -> int:
+    """Return the number in names that is axis 1."""
     for kind in KINDS:
         for group in families[kind]:
             numbers = [channel.number for channel in group if channel.number is not None]
             if numbers and group[0].index is None:
-                return min(numbers)
+                return 1 if min(numbers) > 0 and max(numbers) <= MOST_AXES else min(numbers)
     return 0
 
 

@@ -27,15 +27,22 @@ class Layout:
     encoding: str
 
 
-def text_layout(path: Path) -> Layout:
+def text_layout(path: Path, encoding: str | None = None) -> Layout:
     """Return the layout under which most cells of a text table are numbers.
+
+    Parameters
+    ----------
+    path
+        The file.
+    encoding
+        Of its text, None where the text is to tell it.
 
     Raises
     ------
     InputError
         If there is none.
     """
-    text, encoding = _top(path)
+    text, encoding = _top(path, encoding)
     lines = text.splitlines()
     best: tuple[float, Layout] | None = None
     for separator in SEPARATORS:
@@ -59,15 +66,17 @@ def text_layout(path: Path) -> Layout:
     )
 
 
-def _top(path: Path) -> tuple[str, str]:
+def _top(path: Path, encoding: str | None) -> tuple[str, str]:
     try:
         with pa.input_stream(str(path), compression="detect") as stream:
             raw = stream.read(LOOKED_AT_BYTES)
     except (pa.ArrowException, OSError) as error:
         msg = f"{path}: cannot be read ({str(error).splitlines()[0][:120]})"
         raise InputError(msg) from error
-    # the last line is cut off
-    whole = raw[: raw.rfind(b"\n") + 1] if len(raw) == LOOKED_AT_BYTES else raw
+    # the last line is cut off, here or where the logger was stopped
+    whole = raw[: raw.rfind(b"\n") + 1] if raw.count(b"\n") > 2 else raw
+    if encoding is not None:
+        return whole.decode(encoding, "replace"), encoding
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return whole.decode("utf-16", "replace"), "utf-16"
     try:

@@ -14,15 +14,19 @@ WORDS = {
     "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
     "current": ("cur", "curr", "current", "currents", "i", "iq", "amp", "amps", "ampere", "strom"),
     **{name: channel.words for name, channel in LOGGED.items() if channel.vague},
-    "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit"),
+    "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit", "ts", "epoch"),
 }
 """Words of a name by quantity, in the order in which they decide."""
 
 NOT_MEASURED = (
     *("target", "command", "commanded", "cmd", "cmptd", "computed", "desired", "des", "setpoint"),
     *("ref", "reference", "limit", "error", "sm", "model", "std", "planned", "nominal"),
+    *("set", "soll", "sollwert"),
 )
 """Words of what a controller wanted, not what was."""
+
+ACTUAL = ("act", "actual", "ist", "istwert", "meas", "measured", "fbk", "feedback")
+"""Words of what was, beside other names for the same."""
 
 ELSEWHERE = (
     "mm",
@@ -137,6 +141,17 @@ def _quantity(pattern: str, unit: str | None) -> str | None:
 
 def _is_measured(pattern: str) -> bool:
     return not any(word in NOT_MEASURED for word in _words(pattern))
+
+
+def says_actual(pattern: str) -> bool:
+    """Return whether a name says that it is of what was.
+
+    Examples
+    --------
+    >>> says_actual("Iq_act_#"), says_actual("Axis#.ActPos"), says_actual("Iq_#")
+    (True, True, False)
+    """
+    return any(word in ACTUAL for word in _words(pattern))
 
 
 def _words(pattern: str) -> list[str]:

@@ -16,18 +16,20 @@ from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
 from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.guess.values import (
     MOST_TURNS,
+    UNSIGNED,
     Float,
     Guess,
     angle_units,
     are_phases,
     current_unit,
+    is_unsigned,
     rate_from_speed,
     time_unit,
     turns,
     wraps,
 )
 from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torque
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s, is_torque
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.source import Array, Name, Selection, Source
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
@@ -50,6 +52,8 @@ class _Look:
     time: Meant | None
     values: dict[Name | tuple[Name, int], Array]
     unused: list[str]
+    repeated: list[str]
+    """Names that several columns have."""
 
 
 @dataclass(frozen=True)
@@ -59,20 +63,22 @@ class _Line:
     why: str
 
 
-def guess_map(paths: Sequence[Path]) -> str:
+def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     """Return a map for recordings of one kind, as YAML with a comment for every line.
 
     Parameters
     ----------
     paths
         Recordings; channels are taken from the first, rates from all (the first twenty).
+    encoding
+        Of a text, None where the text is to tell it.
 
     Raises
     ------
     InputError
         If a recording cannot be read, or nothing in it looks like a current.
     """
-    look = _look(paths[0])
+    look = _look(paths[0], encoding)
     if not any(kind in look.choices for kind in CURRENTS):
         msg = (
             f"{paths[0]}: no channel looks like a motor current or torque "
@@ -91,8 +97,12 @@ def guess_map(paths: Sequence[Path]) -> str:
     columns = _column_lines(look, rate)
     width = max(len(line.text) for line in columns)
     lines += [f"  {line.text:<{width}}  # {line.why}" for line in columns]
+    if look.repeated:
+        lines.append(f"# not used, for several columns have the name: {_shortened(look.repeated)}")
     if look.unused:
         lines.append(f"# not used: {_shortened(look.unused)}")
+    if _differ_by_axis(paths):
+        lines.append("# the files seem to hold one joint each: give each a map with its axis")
     lines += [
         "metadata:",
         "  robot:    # such as cell 7; runs of different robots are told apart",
@@ -102,12 +112,12 @@ def guess_map(paths: Sequence[Path]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path) -> _Look:
+def _look(path: Path, encoding: str | None = None) -> _Look:
     kind = format_by_ending(path)
     if kind is None:
         msg = f"{path}: its ending does not tell the format; known: {known_endings()}"
         raise InputError(msg)
-    layout = text_layout(path) if kind == "csv" else None
+    layout = text_layout(path, encoding) if kind == "csv" else None
     with open_source(path, _any_map(kind, layout)) as source:
         # a joint's name is safer than its place in a message
         listed = [c for c in source.channels() if kind != "ros" or c.width is None]
@@ -115,17 +125,38 @@ def _look(path: Path) -> _Look:
         if layout is not None and not layout.header:
             meant = _numbered_phases(source, [c.name for c in listed if isinstance(c.name, int)])
         choices = choose(meant)
+        rows = {each.name: each.rows for each in listed}
+        for kind in (kind for kind in CURRENTS if kind in choices and choices[kind].by_axis):
+            n = rows[next(iter(choices[kind].by_axis.values())).source]
+            # what was logged at another rate is no channel of this run
+            meant = [each for each in meant if rows[each.source] == n]
+            choices = choose(meant)
+            break
         time = time_channel(meant)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {
             (c.source, c.index) if c.index is not None else c.source: _values(source, c)
             for c in [*chosen, *([time] if time else [])]
         }
-    used = {channel.pattern for channel in [*chosen, *([time] if time else [])]}
-    names = [channel.name for channel in listed if isinstance(channel.name, str)]
-    unused = [re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name) for name in names]
-    rest = [name for name in dict.fromkeys(unused) if name not in used and "/" not in name[1:]]
-    return _Look(path, layout, choices, time, values, rest)
+    taken = [*chosen, *([time] if time else [])]
+    used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
+    unused = []
+    for name in (each.name for each in listed if each.name not in used):
+        if isinstance(name, int):
+            continue
+        pattern = re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name)
+        # one of a family that is used is named itself
+        unused.append(name if pattern in patterns else pattern)
+    rest = [name for name in dict.fromkeys(unused) if "/" not in name[1:]]
+    repeated = [each.repeated for each in listed if each.repeated]
+    return _Look(path, layout, choices, time, values, rest, list(dict.fromkeys(repeated)))
+
+
+def _differ_by_axis(paths: Sequence[Path]) -> bool:
+    """Return whether names of files differ by the number of a joint alone, as `n06_axis2.csv`."""
+    number = re.compile(r"((?:axis|achse|joint|motor|(?<![a-z])[aj])[ _.\-]*)[0-9]+", re.I)
+    kinds = {number.sub(r"\1#", path.stem) for path in paths}
+    return len({path.stem for path in paths}) > 1 and len(kinds) == 1
 
 
 def _any_map(kind: str, layout: Layout | None) -> IngestMap:
@@ -187,8 +218,11 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
     time = look.time
     stamps = look.values.get(time.source) if time is not None else None
     unit = _time_guess(time, stamps)
-    if time is None or stamps is None or unit is None:
+    if time is None or stamps is None:
         return None, ["sampling_rate_hz:  # no channel tells it: write the samples per second"]
+    if unit is None:
+        why = f"{time.source} goes back or fits no unit of time: write the samples per second"
+        return None, [f"sampling_rate_hz:  # {why}"]
     line = f"time: {{source: {_quoted(time.source)}, unit: {unit.unit}}}"
     if unit.unit == "samples":
         rate = rate_from_speed(*_angles(look))
@@ -280,9 +314,12 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
                 guess = current_unit(largest)
+                if any(is_unsigned(look.values[_key(each)]) for each in channels.values()):
+                    guess = Guess(guess.unit, f"{guess.why}; {UNSIGNED}")
         declared = next(iter(channels.values())).unit
         if declared and _fits(declared, kind):
-            guess = Guess(declared, f"as the file says; largest {largest:.3g}")
+            unsigned = f"; {UNSIGNED}" if guess.why.endswith(UNSIGNED) else ""
+            guess = Guess(declared, f"as the file says; largest {largest:.3g}{unsigned}")
         why = guess.why
         if kind == "position" and turns(largest, guess.unit) > MOST_TURNS:
             count = turns(largest, guess.unit)
@@ -307,7 +344,9 @@ def _lines_of(
     """Return one line for all axes where the sources count with them, else one for each."""
     shared: dict[tuple[str, int], list[int]] = {}
     for axis, channel in channels.items():
-        if channel.index is None and channel.number is not None and "#" in channel.pattern:
+        # a number with zeros before it is none that {n} stands for
+        counts = channel.pattern.replace("#", str(channel.number)) == channel.source
+        if channel.index is None and channel.number is not None and counts:
             shared.setdefault((channel.pattern, channel.number - axis), []).append(axis)
         elif channel.index is not None:
             shared.setdefault((f"{channel.source}@", channel.index - axis), []).append(axis)
@@ -354,7 +393,8 @@ def _started_at(look: _Look) -> list[str]:
     own = {"ros": "@started_at", "mdf": "@start_time"}.get(str(kind))
     stamps = look.values.get(look.time.source) if look.time else None
     if own is None and look.time is not None and stamps is not None and len(stamps):
+        unit = _time_guess(look.time, stamps)
         is_date = stamps.dtype.kind == "M"
-        if is_date or float(stamps[0]) > 1e8:
+        if is_date or (unit is not None and date_s(float(stamps[0]), unit.unit) is not None):
             own = str(look.time.source)
     return [f"  started_at: {{source: {_quoted(own)}}}"] if own else []

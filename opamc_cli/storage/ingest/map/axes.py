@@ -50,6 +50,20 @@ def filled(value: object, axis: int) -> object:
     return int(text) if _READ.fullmatch(value) else text
 
 
+def at_zero(value: object) -> str | None:
+    """Return the channel that a line which counts from 1 would have for an axis 0.
+
+    None for all others: `{n-1}` counts from 0, and `{n+3}` says that there are others below.
+
+    Examples
+    --------
+    >>> at_zero("cur_«n»"), at_zero("cur_«n-1»"), at_zero("«n»")
+    ('cur_0', None, None)
+    """
+    first = filled(value, 0)
+    return first if isinstance(first, str) and "«n»" in str(value) else None
+
+
 def expand(
     columns: Mapping[str, Mapping[str, Any]], axes: int | None, exists: Callable[[Any], bool]
 ) -> dict[str, dict[str, Any]]:
@@ -60,7 +74,8 @@ def expand(
     columns
         Entries by the run column's name, protected.
     axes
-        Number of axes; None: as long as the file has a channel for the next one.
+        Number of axes; None: every one that the file has a channel for, which may begin above 1
+        and have a gap: a joint keeps its number.
     exists
         Whether the file has the channel of a filled entry.
     """
@@ -69,13 +84,15 @@ def expand(
         if not has_placeholder(name):
             result[name] = dict(entry)
     templates = {name: entry for name, entry in columns.items() if has_placeholder(name)}
-    for axis in range(1, (axes or MOST_AXES) + 1):
-        own = {
+    by_axis = [
+        {
             str(filled(name, axis)): {key: filled(value, axis) for key, value in entry.items()}
             for name, entry in templates.items()
         }
-        if axes is None and axis > 1 and not any(exists(entry) for entry in own.values()):
-            break
+        for axis in range(1, (axes or MOST_AXES) + 1)
+    ]
+    there = [own for own in by_axis if axes or any(map(exists, own.values()))]
+    for own in there or by_axis[:1]:  # what is missing is told of axis 1
         for name, entry in own.items():
             result.setdefault(name, entry)  # a line for one axis goes before that for all
     return result

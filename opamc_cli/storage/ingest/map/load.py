@@ -17,7 +17,9 @@ from opamc_cli.storage.ingest.map.map_file import (
 from opamc_cli.storage.ingest.map.units import ISO8601, SAMPLES, conversion, is_torque, known_units
 from opamc_cli.storage.schemas.channels import CHANNELS, COLUMN, quantity_of
 
-CSV_KEYS = frozenset({"separator", "decimal", "header", "encoding", "skip_rows", "units_rows"})
+CSV_KEYS = frozenset(
+    {"separator", "decimal", "header", "encoding", "skip_rows", "units_rows", "missing"}
+)
 
 
 def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
-from opamc_cli.storage.ingest.map.axes import expand, has_placeholder
+from opamc_cli.storage.ingest.map.axes import at_zero, expand, has_placeholder
 from opamc_cli.storage.ingest.map.units import conversion
 from opamc_cli.storage.ingest.source import Listed, Name
 
@@ -38,7 +38,8 @@ class ColumnMap(_Strict):
     index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
     scale: Finite = 1.0
     offset: Finite = 0.0
-    unwrap: bool = False
+    unwrap: bool | Positive = False
+    """True: where a turn ends, in `unit`; a number: where the source's values do, before scale."""
     optional: bool = False
 
 
@@ -104,6 +105,8 @@ class IngestMap(_Strict):
     """Lines before the header (or before the data, without one)."""
     units_rows: Annotated[int, Field(ge=0, le=MOST_SKIPPED)] = 0
     """Lines between header and data."""
+    missing: tuple[str, ...] = ()
+    """Texts that stand for no number, beside "", "NaN", "N/A" and the like."""
     axes: Annotated[int, Field(ge=1, le=32)] | None = None
     """For how many axes a line with `{n}` stands; None: for as many as the file has."""
     columns: dict[str, ColumnMap] = Field(min_length=1)
@@ -153,6 +156,43 @@ def for_axes(
         if exists(entry) or not entry.get("optional")
     }
     return channels.model_copy(update={"columns": columns})
+
+
+def count_doubts(
+    path: Path, channels: IngestMap, own: IngestMap, listed: Sequence[Listed]
+) -> tuple[list[str], list[str]]:
+    """Say where lines for all axes and the channels of a file do not count alike.
+
+    Parameters
+    ----------
+    path
+        The file, for the sentences.
+    channels, own
+        The map, and what `for_axes` made of it for this file.
+    listed
+        What the file offers.
+
+    Returns
+    -------
+    tuple
+        Sentences on axes that are missing between others, and on joints that are left out.
+    """
+    axes = {int(name[4 : name.index("_")]) for name in own.columns}
+    gap = sorted(set(range(min(axes), max(axes))) - axes)
+    gaps = (
+        f"{path}: has no channel for axis {', '.join(map(str, gap))}, but for axis {max(axes)}; "
+        "look for a name that differs, or write a line for each axis"
+    )
+    used = {column.source for column in own.columns.values()}
+    used |= {own.time.source} if own.time else set()
+    zero = {at_zero(column.source) for column in channels.columns.values()}
+    left = [str(each.name) for each in listed if each.name in zero - used]
+    lost = (
+        f"{path}: {', '.join(left)} is in no run: {{n}} counts from 1; write {{n-1}} if its joints "
+        "are counted from 0"
+    )
+    several = any(has_placeholder(name) for name in channels.columns)
+    return [gaps] if gap and several else [], [lost] if left else []
 
 
 def format_of(path: Path, channels: IngestMap) -> str:

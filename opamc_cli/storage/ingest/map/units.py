@@ -24,10 +24,18 @@ CONVERSIONS: dict[str, Mapping[str, Conversion]] = {
         "ns": Conversion(1e-9),
         "min": Conversion(60.0),
         "h": Conversion(3600.0),
+        # counts from another day than 1970: of Windows (1601), .NET (year 1), spreadsheets (1899)
+        "filetime": Conversion(1e-7, -11_644_473_600.0),
+        "ticks": Conversion(1e-7, -62_135_596_800.0),
+        "days": Conversion(86_400.0, -2_209_161_600.0),
     },
     "rate": {"Hz": Conversion(1.0), "kHz": Conversion(1e3)},
 }
-"""Conversions to A (a torque: Nm), a logged channel's first unit, s and Hz, by quantity."""
+"""Conversions to A (a torque: Nm), a logged channel's first unit, s and Hz, by quantity. The offset
+of a time is that of a stamp which is a date."""
+
+EARLIEST_S = 5e8
+"""A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
 
 TORQUES = frozenset({"Nm", "mNm"})
 """Units in which a joint's torque stands for its motor's current; it stays a torque."""
@@ -64,6 +72,19 @@ def conversion(unit: str, quantity: str) -> Conversion | None:
     True
     """
     return CONVERSIONS[quantity].get(ALIASES.get(unit, unit))
+
+
+def date_s(stamp: float, unit: str) -> float | None:
+    """Return the seconds from 1970 to a time stamp; None where it counts from another start.
+
+    Examples
+    --------
+    >>> date_s(1.7e12, "ms"), date_s(12.5, "s"), round(date_s(46314.5, "days"))
+    (1700000000.0, None, 1792411200)
+    """
+    known = conversion(unit, "time")
+    seconds = stamp * known.factor + known.offset if known else 0.0
+    return seconds if seconds >= EARLIEST_S else None
 
 
 def is_torque(unit: str) -> bool:

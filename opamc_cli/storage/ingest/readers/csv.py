@@ -43,6 +43,9 @@ class CsvSource:
     def __init__(self, path: Path, channels: IngestMap) -> None:
         self.path = path
         self._map = channels
+        self._no_number = [*pacsv.ConvertOptions().null_values, *channels.missing]
+        self._dates: set[int] = set()
+        self.remarks: list[str] = []
         self._skipped = channels.skip_rows + channels.header + channels.units_rows * channels.header
         separator = {"tab": "\t", "\\t": "\t"}.get(channels.separator, channels.separator)
         self._pattern = r"[ \t]+" if separator == "whitespace" else re.escape(separator)
@@ -70,12 +73,14 @@ class CsvSource:
         listed = []
         for position, text in enumerate(self._first_row):
             given = self._names[position] if position < len(self._names) else ""
-            kind = _kind(text.strip(), self._map.decimal)
+            known = "" if text.strip() in self._no_number else text.strip()
+            kind = _kind(known, self._map.decimal)
             if kind is None or (self._map.header and not given):
                 continue
             name: Name = given if given and self._names.count(given) == 1 else position
+            repeated = f"{given} ({position})" if given and name == position else None
             unit = self._units[position].strip(" []()") if position < len(self._units) else ""
-            listed.append(Listed(name, unit=unit or None, dates=kind == "date"))
+            listed.append(Listed(name, None, unit or None, kind == "date", repeated))
         return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
@@ -85,6 +90,7 @@ class CsvSource:
             f"c{position[name]}": self._date_type(position[name]) if s.dates else pa.float64()
             for name, s in selections.items()
         }
+        self._dates = {position[name] for name, s in selections.items() if s.dates}
         for batch in self._batches(types):
             block: Block = {}
             for name, selection in selections.items():
@@ -168,11 +174,14 @@ class CsvSource:
                     encoding="utf8" if _is_utf8(self._map.encoding) else self._map.encoding,
                     use_threads=False,
                 ),
-                parse_options=pacsv.ParseOptions(delimiter=self._delimiter),
+                parse_options=pacsv.ParseOptions(
+                    delimiter=self._delimiter, invalid_row_handler=self._cut_off
+                ),
                 convert_options=pacsv.ConvertOptions(
                     include_columns=list(types),
                     column_types=dict(types),
                     decimal_point=self._map.decimal,
+                    null_values=self._no_number,
                 ),
             )
             yield from reader
@@ -181,14 +190,33 @@ class CsvSource:
         except (pa.ArrowException, OSError) as error:
             raise InputError(self._reason(str(error))) from error
 
+    def _cut_off(self, row: Any) -> str:
+        """Skip a last line that a logger was stopped in; all else of another width is an error."""
+        if row.actual_columns >= row.expected_columns:
+            return "error"
+        last = b""
+        with self._bytes() as stream:
+            while part := stream.read(BLOCK_BYTES):
+                last = (last + part)[-MOST_LINE:]
+        encoding = "utf-8" if _is_utf8(self._map.encoding) else self._map.encoding
+        ends = last.endswith(row.text.encode(encoding)) and not last.endswith((b"\n", b"\r"))
+        self.remarks = [f"{self.path}: its last line is cut off and left out"] if ends else []
+        return "skip" if ends else "error"
+
     def _reason(self, text: str) -> str:
         first_line = " ".join(text.split())[:200]
         if match := _CONVERSION.search(text):
             column, row, value = int(match[1]), int(match[2]), match[3]
             name = self._names[column] if column < len(self._names) else f"number {column}"
+            held = f"{self.path}: column {name} holds {value[:40]!r} in line {row}, which is"
+            if column in self._dates:
+                return (
+                    f"{held} no ISO 8601 time such as 2026-10-19T13:00:00.1; write it so, or give "
+                    "sampling_rate_hz instead of time"
+                )
             return (
-                f"{self.path}: column {name} holds {value[:40]!r} in line {row}, which is not "
-                f"a number with decimal {self._map.decimal!r}; check decimal and separator"
+                f"{held} not a number with decimal {self._map.decimal!r}; check decimal and "
+                "separator, or name what stands for no number in missing"
             )
         if match := _WIDTH.search(text):
             return (

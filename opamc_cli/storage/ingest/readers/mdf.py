@@ -83,7 +83,8 @@ class MdfSource:
             first = self._part(group, index, 0, 1)
             if first.dtype.kind in "fiu" and first.ndim == 1 and first.size:
                 unit = "s" if (group, index) in self._clocks else self._units[group, index]
-                listed.append(Listed(name, unit=unit))
+                rows = int(self._file.groups[group].channel_group.cycles_nr)
+                listed.append(Listed(name, unit=unit, rows=rows))
         return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:

@@ -19,13 +19,13 @@ def chosen(*names, counted=True, **wide):
     return axes, {kind: choice.passed_over for kind, choice in choices.items()}
 
 
-def test_axes_count_from_the_lowest_number_of_the_currents():
-    for first in (0, 1, 4):
+def test_joints_keep_their_number_but_those_from_0_and_beyond_any_arms():
+    for first, axis in ((0, 1), (1, 1), (4, 4), (30, 30), (31, 1)):
         numbers = range(first, first + 3)
-        axes, _ = chosen(*(f"i_cur_{n}" for n in numbers), *(f"q_{n}" for n in numbers), "q_9")
-        assert axes["current"] == {k + 1: f"i_cur_{n}" for k, n in enumerate(numbers)}
+        axes, _ = chosen(*(f"i_cur_{n}" for n in numbers), *(f"q_{n}" for n in numbers), "q_50")
+        assert axes["current"] == {axis + k: f"i_cur_{n}" for k, n in enumerate(numbers)}
         # a position of no axis with a current is left out
-        assert axes["position"] == {k + 1: f"q_{n}" for k, n in enumerate(numbers)}
+        assert axes["position"] == {axis + k: f"q_{n}" for k, n in enumerate(numbers)}
 
 
 def test_the_measured_family_with_most_axes_wins():
@@ -44,10 +44,22 @@ def test_axes_of_another_name_are_added():
     axes, over = chosen("cur_1", "cur_2", "ext_cur_3", "ext2_cur_2", "target_cur_4")
     assert axes["current"] == {1: "cur_1", 2: "cur_2", 3: "ext_cur_3"}
     assert over["current"] == ("ext2_cur_#", "target_cur_#")
-    # below the first there is no axis
     axes, over = chosen("cur_2", "cur_3", "ext_cur_1")
-    assert axes["current"] == {1: "cur_2", 2: "cur_3"}
+    assert axes["current"] == {1: "ext_cur_1", 2: "cur_2", 3: "cur_3"}
+    # below the first there is no axis
+    axes, over = chosen("cur_40", "cur_41", "ext_cur_2")
+    assert axes["current"] == {1: "cur_40", 2: "cur_41"}
     assert over["current"] == ("ext_cur_#",)
+
+
+def test_what_was_goes_before_what_was_wanted_and_other_names():
+    for actual, other in (("act", "set"), ("ist", "soll"), ("fbk", "cmd"), ("meas", "raw")):
+        for names in ((actual, other), (other, actual)):
+            kinds = {"current": "Iq", "position": "pos", "velocity": "vel"}
+            axes, _ = chosen(*(f"{k}_{w}_{n}" for k in kinds.values() for n in "12" for w in names))
+            assert axes == {
+                kind: {n: f"{short}_{actual}_{n}" for n in (1, 2)} for kind, short in kinds.items()
+            }
 
 
 def test_a_torque_stands_for_a_current_that_was_not_measured():

@@ -12,7 +12,7 @@ from opamc_cli.storage.ingest.guess.write import guess_map
 def table(path, columns, head="", separator=","):
     """Write columns by their names."""
     rows = np.column_stack(list(columns.values()))
-    lines = [separator.join(f"{v:.10g}" for v in row) for row in rows]
+    lines = [separator.join(f"{v:.14g}" for v in row) for row in rows]
     path.write_text(head + "\n".join([separator.join(columns), *lines]) + "\n")
     return path
 
@@ -78,9 +78,39 @@ def test_axes_that_no_number_counts_have_lines_of_their_own(tmp_path):
     names = {"t": T, **{f"cur_{k}": 70 * SPEED for k in (5, 6, 8)}, "ext_cur_7": SPEED}
     lines, _ = lines_of(table(tmp_path / "a.csv", names))
     assert lines[5:] == [
-        "axis{n}_current: {source: cur_{n+4}, unit: mA} # largest 140: too many for amperes",
-        "axis3_current: {source: ext_cur_7, unit: mA} # largest 140: too many for amperes",
+        "axis{n}_current: {source: cur_{n}, unit: mA} # largest 140: too many for amperes",
+        "axis7_current: {source: ext_cur_7, unit: mA} # largest 140: too many for amperes",
     ]
+
+
+def test_joints_keep_the_numbers_of_their_names_and_what_is_left_is_named(tmp_path):
+    names = {"t": T, **{f"J{n}_cur": SPEED for n in (4, 6)}, **{f"q{n}": ANGLE for n in (3, 4)}}
+    lines, _ = lines_of(table(tmp_path / "a.csv", names))
+    assert lines[5:] == [
+        "axis{n}_current: {source: J{n}_cur, unit: A} # largest 2",
+        "axis4_position: {source: q4, unit: rad} # largest 1, by the range alone",
+        "# not used: q3",
+    ]
+    # what {n} does not stand for has lines of its own
+    lines, _ = lines_of(table(tmp_path / "a.csv", {"t": T, "cur_01": SPEED, "cur_02": SPEED}))
+    assert [line.partition(",")[0] for line in lines[5:]] == [
+        "axis1_current: {source: cur_01",
+        "axis2_current: {source: cur_02",
+    ]
+
+
+def test_columns_of_one_name_and_files_of_one_joint_are_said(tmp_path):
+    path = table(tmp_path / "n_axis1.csv", {"t": T, "I": SPEED, "I ": SPEED, "cur_3": SPEED})
+    other = table(tmp_path / "n_axis2.csv", {"t": T, "cur_3": SPEED})
+    lines, _ = lines_of(path)
+    assert lines[5:] == [
+        "axis3_current: {source: cur_3, unit: A} # largest 2",
+        "# not used, for several columns have the name: I (1), I (2)",
+    ]
+    joints = "# the files seem to hold one joint each: give each a map with its axis"
+    assert lines_of(path, other)[0][-1] == joints
+    for name in ("n_axis2_b.csv", "m_axis1.csv", "n_axis1.txt"):
+        assert joints not in lines_of(path, table(tmp_path / name, {"t": T, "cur_3": SPEED}))[0]
 
 
 def test_units_that_a_file_declares_are_believed_and_decimal_commas_read(tmp_path):
@@ -203,3 +233,26 @@ def test_a_position_of_many_turns_is_said_to_be_the_motors(tmp_path, scale, said
     (line,) = [line for line in lines if line.startswith("axis1_position")]
     assert line.endswith(" turns; a motor's needs scale: 1 / gear ratio") is said
     assert "unit: deg" in line
+
+
+def test_an_encoding_that_is_given_is_taken(tmp_path, capsys):
+    path = tmp_path / "a.csv"
+    rows = "".join(f"{t:g},{i:.6f}\n" for t, i in zip(T, SPEED, strict=True))
+    path.write_text("t,電流1軸[A]\n" + rows + "4.0", encoding="shift_jis")
+    with pytest.raises(SystemExit) as stopped:
+        main(["ingest", str(path), "--guess", "--set", "encoding=shift_jis"])
+    assert not stopped.value.code
+    printed = capsys.readouterr().out
+    assert "encoding: shift_jis" in printed
+    assert 'axis1_current: {source: "電流1軸[A]", unit: A}' in printed
+    for wrong in ("encoding=klingon", "separator=;"):
+        with pytest.raises(SystemExit) as stopped:
+            main(["ingest", str(path), "--guess", "--set", wrong])
+        assert stopped.value.code == 2
+
+
+def test_currents_that_lost_their_sign_are_said(tmp_path):
+    path = table(tmp_path / "a.csv", {"t": T, "cur_1": np.mod(np.round(3000 * SPEED), 65536)})
+    assert lines_of(path)[0][5].endswith(
+        "negative numbers seem to be 65536 too large: log them as signed"
+    )

@@ -11,11 +11,11 @@ KNOWN = {
     "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1",
     "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1",
     "temperature": "motor_temp_1 temps_1 temperature_1 temperatures_1",
-    "time": "time timestamp timestamps stamp t clock Zeit",
+    "time": "time timestamp timestamps stamp t clock Zeit ts epoch epoch_ms",
 }
 WANTED = (
     "target command commanded cmd cmptd computed desired des setpoint ref reference limit error "
-    "sm model std planned nominal"
+    "sm model std planned nominal set soll sollwert"
 )
 ELSEWHERE = "mm tcp tool gripper base cartesian flange io voltage"
 

@@ -7,6 +7,7 @@ from opamc_cli.storage.ingest.guess.values import (
     angle_units,
     are_phases,
     current_unit,
+    is_unsigned,
     rate_from_speed,
     time_unit,
     wraps,
@@ -86,8 +87,7 @@ def test_a_declared_unit_is_believed_where_it_is_one_of_the_quantity(unit, kind,
         (1.0, 30 / np.pi, ("rad", "rpm")),
         (180 / np.pi, 0.5 / np.pi, ("deg", "rev/s")),
         (1.0, 0.5 / np.pi, ("rad", "rev/s")),
-        # a tenth apart still agrees, more does not
-        (1.0, 1.09, ("rad", "rad/s")),
+        (1.0, 1.02, ("rad", "rad/s")),
     ],
 )
 def test_units_of_an_angle_are_those_whose_steps_agree_with_the_speed(position, speed, units):
@@ -121,11 +121,51 @@ def test_currents_of_more_than_sixty_are_in_milliampere():
     assert (current_unit(60.0).unit, current_unit(60.1).unit) == ("A", "mA")
 
 
+def test_signed_numbers_that_were_written_as_unsigned_are_told():
+    signed = np.round(6000 * np.sin(T))
+    assert is_unsigned(np.mod(signed, 65536))
+    for honest in (signed, np.abs(signed), signed + 32768, np.mod(signed, 65536) + 0.5, 11 * T):
+        assert not is_unsigned(honest)
+    assert not is_unsigned(np.array([np.nan]))
+
+
 def test_rates_are_those_of_loggers():
     for rate, known in ((4.9, None), (5.0, 5.0), (20_000.0, 20_000.0), (21_000.0, None)):
         assert rate_from_speed({1: np.arange(50.0) / rate}, {1: np.ones(50)}) == known
-    for step, unit in ((0.19, "s"), (0.21, "ms"), (0.21e3, "us"), (5.1e-5, "s"), (1e-9, "s")):
+    for step, unit in ((0.19, "s"), (0.21, "ms"), (0.21e3, "us"), (5.1e-5, "s")):
         assert time_unit(np.arange(50) * step + 0.5).unit == unit, step
+    assert time_unit(np.arange(50) * 1e-9 + 0.5) is None
+
+
+@pytest.mark.parametrize(
+    ("start", "per_s", "unit"),
+    [
+        *((1.7e9, 1, "s"), (1.7e12, 1e3, "ms"), (1.7e18, 1e9, "ns"), (2.9e7, 1 / 60, "min")),
+        *((1.34e17, 1e7, "filetime"), (6.39e17, 1e7, "ticks"), (46_000.0, 1 / 86_400, "days")),
+    ],
+)
+def test_dates_tell_the_unit_of_stamps_whatever_their_steps(start, per_s, unit):
+    for rate in (250.0, 1.0):
+        assert time_unit(start + np.arange(50) / rate * per_s).unit == unit
+    assert time_unit(46_000 + T).unit == "s"
+
+
+def test_a_speed_that_is_ten_times_too_large_is_of_a_wrong_clock_and_no_rpm():
+    # of counts of 0.1 ms that are taken for milliseconds
+    for scale in (1.0, 180 / np.pi):
+        found = angle_units({1: scale * ANGLE}, {1: scale * SPEED}, 25.0)
+        assert found[0].why.endswith(
+            "alone (its steps are 0.1 of the speed: the unit of the time may be wrong)"
+        )
+
+
+def test_coarse_logs_agree_with_their_speed():
+    times = np.arange(300) / 10
+    found = angle_units(
+        {1: np.sin(2 * np.pi * times)}, {1: 2 * np.pi * np.cos(2 * np.pi * times)}, 10.0
+    )
+    assert (found[0].unit, found[1].unit) == ("rad", "rad/s")
+    assert "agree" in found[0].why
 
 
 def test_stamps_may_stand_still_for_a_tenth_of_their_steps():

@@ -26,9 +26,12 @@ def test_a_line_is_repeated_for_as_many_axes_as_are_said():
     }
 
 
-def test_without_a_number_it_ends_where_the_file_does():
+def test_without_a_number_there_are_those_that_the_file_has():
     assert list(expand(LINE, None, lambda e: e["source"] in ("i_0", "i_1"))) == [
         *("axis1_a", "axis2_a")
+    ]
+    assert list(expand(LINE, None, lambda e: e["source"] in ("i_3", "i_9"))) == [
+        *("axis4_a", "axis10_a")
     ]
     assert list(expand(LINE, None, lambda e: False)) == ["axis1_a"]
     assert len(expand(LINE, None, lambda e: True)) == MOST_AXES

@@ -3,7 +3,7 @@
 import pytest
 from pydantic import ValidationError
 
-from opamc_cli.storage.ingest.map.map_file import IngestMap, for_axes
+from opamc_cli.storage.ingest.map.map_file import IngestMap, count_doubts, for_axes
 from opamc_cli.storage.ingest.source import Listed
 
 COLUMN = {"source": "x", "unit": "A"}
@@ -77,8 +77,29 @@ def test_a_line_for_every_axis_that_the_file_has():
     assert set(alone.columns) == {"axis1_a", "axis1_position", "axis2_a"}
 
 
-def test_axes_end_where_the_file_has_no_channel_for_the_next_one():
-    lines = {"axis«n»_a": {"source": "i_«n»", "unit": "A"}}
-    listed = [Listed("i_1"), Listed("i_2"), Listed("i_4")]
-    found = for_axes(IngestMap.model_validate({"columns": lines}), lambda: listed).columns
-    assert list(found) == ["axis1_a", "axis2_a"]
+def counted(source, *names, time=None):
+    """Return the axes of a line for all, and what is said of them."""
+    given = {"columns": {"axis«n»_a": {"source": source, "unit": "A"}}}
+    if time is not None:
+        given["time"] = {"source": time, "unit": "s"}
+    channels, listed = IngestMap.model_validate(given), list(map(Listed, names))
+    own = for_axes(channels, lambda: listed)
+    return list(own.columns), *count_doubts("a.csv", channels, own, listed)
+
+
+def test_a_joint_keeps_its_number_where_others_are_missing():
+    assert counted("J«n»", "J4", "J5") == (["axis4_a", "axis5_a"], [], [])
+    axes, gaps, lost = counted("J«n»", "J1", "J10", "J12")
+    assert axes == ["axis1_a", "axis10_a", "axis12_a"]
+    (gap,) = gaps
+    assert gap.startswith("a.csv: has no channel for axis 2, 3, 4, 5, 6, 7, 8, 9, 11, but for axis")
+    assert not lost
+
+
+def test_a_joint_0_is_left_out_aloud_where_lines_count_from_1():
+    axes, _, (lost,) = counted("J«n»", "J0", "J1")
+    assert axes == ["axis1_a"]
+    assert lost.startswith("a.csv: J0 is in no run: {n} counts from 1; write {n-1} if")
+    # what is named otherwise, or counts from where the line says, is not left out
+    assert not counted("J«n»", "J0", "J1", time="J0")[2]
+    assert not counted("J«n+1»", "J0", "J1", "J2")[2]
