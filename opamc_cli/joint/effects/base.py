@@ -105,6 +105,13 @@ class Effect:
             steps[name] = value * 0.4 if ratio > 5 else 0.05 * (high - low)
         return steps
 
+    def form_of(self, parameters: Parameters) -> str:
+        """Tell which of its forms a guess is: of each named one a candidate is tried by itself.
+
+        Such a form is nothing that smoothing of the motion does.
+        """
+        return ""
+
     def is_constant(self, parameters: Parameters) -> bool:
         """Tell whether the regressors stay the same whatever the fitted model is."""
         return self.from_motion

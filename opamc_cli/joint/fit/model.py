@@ -61,6 +61,11 @@ class Term:
         return (self.effect.name, tuple(sorted(self.parameters.items())), self.keep)
 
     @property
+    def form(self) -> tuple[str, str]:
+        """The effect's name, and which of its forms it is."""
+        return self.effect.name, self.effect.form_of(self.parameters)
+
+    @property
     def is_constant(self) -> bool:
         """Whether the regressors stay the same whatever the fitted model is."""
         return self.effect.is_constant(self.parameters)
