@@ -9,6 +9,9 @@ from opamc_cli.signal.transform.second_order import answers
 
 LINK_HZ = 20.0
 """Of a motor on the spring alone whose inertia would be the coefficient: a unit, no more."""
+LATE = 0.2
+"""Share of the one coefficient by which noise may move the other: of a delay of 16 ms they are as
+large, and of opposite signs."""
 SHORTEST = 5
 """Samples of a cubic's window."""
 
@@ -72,8 +75,12 @@ class Elasticity(Effect):
         return stack(track.own_means(load - acceleration), track.own_means(rate))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
-        return bool(abs(coefficients[1]) < coefficients[0])
+        """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
+
+        Seen from the link, friction of the motor comes sooner: what comes later is a delay.
+        """
+        least = -LATE if self.form_of(parameters) else -1.0
+        return bool(least * coefficients[0] < coefficients[1] < coefficients[0])
 
 
 def _highest(track: Track) -> float:
