@@ -106,10 +106,7 @@ class Effect:
         return steps
 
     def form_of(self, parameters: Parameters) -> str:
-        """Tell which of its forms a guess is: of each named one a candidate is tried by itself.
-
-        Such a form is nothing that smoothing of the motion does.
-        """
+        """Tell which of its forms a guess is; what has a name is nothing that smoothing does."""
         return ""
 
     def is_constant(self, parameters: Parameters) -> bool:

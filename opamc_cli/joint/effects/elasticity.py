@@ -55,7 +55,7 @@ class Elasticity(Effect):
         return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
 
     def form_of(self, parameters: Parameters) -> str:
-        """Tell from where it is seen: either is tried, whichever promises more."""
+        """Tell from where it is seen."""
         return "link" if parameters.get("link") else ""
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:

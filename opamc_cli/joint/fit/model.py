@@ -61,9 +61,9 @@ class Term:
         return (self.effect.name, tuple(sorted(self.parameters.items())), self.keep)
 
     @property
-    def form(self) -> tuple[str, str]:
-        """The effect's name, and which of its forms it is."""
-        return self.effect.name, self.effect.form_of(self.parameters)
+    def form(self) -> str:
+        """Which of its effect's forms it is."""
+        return self.effect.form_of(self.parameters)
 
     @property
     def is_constant(self) -> bool:

@@ -133,7 +133,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     if among_fast:
         # What a drive makes of a ripple takes up friction, too: beside it as it was fitted without
         # a slow effect, that may show as little, or best in a form that it has not.
-        forms = _best_of_each(found, lambda term: (term.form, term.keep))
+        forms = _best_of_each(found, lambda term: (term.effect.name, term.keep))
         again = [candidate.term for candidate in forms]
         found += fast.candidates(batches_of(dataset, again, fine=True))
     residual = np.where(dataset.sharp.fit, chain.fit.residual_a, 0.0)
@@ -143,7 +143,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
                 found.append(best_form(dataset, fast, Term(effect, parameters)))
     # Two lines of one kind are two candidates.
     track = dataset.fine.track
-    ordered = _best_of_each(found, lambda term: (term.form, line_of(term, track)))
+    ordered = _best_of_each(found, lambda term: (term.effect.name, line_of(term, track)))
     least = np.inf if every else 0.0
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
@@ -220,7 +220,7 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
     share, t_value = child.gain_over(parent)
-    effect, (_, form) = (own := child.terms[-1]).effect, own.form
+    effect, form = child.terms[-1].effect, child.terms[-1].form
     error = 0.0 if effect.unnamed else abs(share) / max(abs(t_value), 1.0)
     # What one effect leaves, beside a motion that the same phases tell, is no other one.
     followed = "logged" not in child.fit.dataset.fine.track.channels

@@ -40,5 +40,4 @@ def test_a_soft_gear_is_named_where_the_position_is_the_link_s(sign):
     current += 0.1 / np.std(bend[moving]) * bend
     current += np.random.default_rng(7).normal(0, 0.02, v.size)
     _, loop = close_recording(replace(made, position=path), current)
-    forms = [step.term.form for step in loop.steps]
-    assert (("elasticity", "link") in forms) == (sign > 0)
+    assert ("link" in [step.term.form for step in loop.steps]) == (sign > 0)
