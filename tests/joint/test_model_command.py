@@ -487,7 +487,7 @@ def test_a_joint_that_may_ask_for_another_is_told_of_where_none_is_logged(tmp_pa
     for beside in ({}, {"axis2_position": made.position[::-1].copy(), "axis2_current": still}):
         write_run(tmp_path / "run.parquet", 100.0, **columns, **beside)
         close(tmp_path, "--axis", "1", model=MODEL)
-        said = "what one that moves in time with it asks would look like position_drag"
+        said = "and the library lacks, would look like position_drag"
         assert (said in capsys.readouterr().err) == (not beside)
 
 

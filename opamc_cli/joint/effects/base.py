@@ -105,6 +105,10 @@ class Effect:
             steps[name] = value * 0.4 if ratio > 5 else 0.05 * (high - low)
         return steps
 
+    def form_of(self, parameters: Parameters) -> str:
+        """Tell which of its forms a guess is; what has a name is nothing that smoothing does."""
+        return ""
+
     def is_constant(self, parameters: Parameters) -> bool:
         """Tell whether the regressors stay the same whatever the fitted model is."""
         return self.from_motion

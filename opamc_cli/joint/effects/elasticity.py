@@ -4,7 +4,16 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.signal.motion.smoothing import derivatives
 from opamc_cli.signal.transform.second_order import answers
+
+LINK_HZ = 20.0
+"""Of a motor on the spring alone whose inertia would be the coefficient: a unit, no more."""
+LATE = 0.2
+"""Share of the one coefficient by which noise may move the other: of a delay of 16 ms they are as
+large, and of opposite signs."""
+SHORTEST = 5
+"""Samples of a cubic's window."""
 
 
 class Elasticity(Effect):
@@ -20,6 +29,7 @@ class Elasticity(Effect):
     domain = "acceleration"
     per = ("rad/s²",)
     searches = ("resonance_hz", "damping")
+    forms = ("link",)
     meaning = "winding up and ringing of the joint: check flexspline stiffness, bolts and the belt"
     as_smoothing = True
     needs = ("position", "logged")
@@ -28,11 +38,12 @@ class Elasticity(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Resonances from 2 Hz up, three dampings, as far apart as half the power is wide."""
         high = max(0.9 * _highest(track), 2.0)
-        return [
+        motor = [
             {"resonance_hz": resonance, "damping": damping}
             for damping in (0.03, 0.1, 0.2)
             for resonance in geometric(2.0, high, 1 + round(np.log(high / 2) / damping / 2))
         ]
+        return [*motor, {"link": 1.0}]
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
         """Half as far, or a neighbour tells nothing of the top: damped by 3 %, 40 % is too far."""
@@ -43,17 +54,33 @@ class Elasticity(Effect):
         """From slow swaying to what the grid can show; damped more, nothing rings."""
         return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
 
+    def form_of(self, parameters: Parameters) -> str:
+        """Tell from where it is seen."""
+        return "link" if parameters.get("link") else ""
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Acceleration of the sprung load less that of the motor, and its rate of change."""
+        """Acceleration of one side less that of the other, and its rate of change."""
         full = track.full or track
+        if self.form_of(parameters):
+            w, window = 2 * np.pi * LINK_HZ, max(full.kernel.size, SHORTEST) | 1
+            paths = [full.acceleration[start:stop] for start, stop in full.bounds]
+            bend, rise = (
+                np.concatenate([derivatives(path, full.rate_hz, window, order) for path in paths])
+                for order in (2, 1)
+            )
+            return stack(track.own_means(bend / w**2), track.own_means(rise / w))
         w = 2 * np.pi * parameters["resonance_hz"]
         acceleration = full.acceleration
         load, rate = answers([acceleration], w, parameters["damping"], full.rate_hz, full.bounds)
         return stack(track.own_means(load - acceleration), track.own_means(rate))
 
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
-        """Inertia is positive, and damping moves its torque by less than an eighth of a turn."""
-        return bool(abs(coefficients[1]) < coefficients[0])
+        """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
+
+        Seen from the link, friction of the motor comes sooner: what comes later is a delay.
+        """
+        least = -LATE if self.form_of(parameters) else -1.0
+        return bool(least * coefficients[0] < coefficients[1] < coefficients[0])
 
 
 def _highest(track: Track) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
+from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES
@@ -15,7 +16,7 @@ from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track,
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.joint.name.chain import chain_of
-from opamc_cli.joint.name.search import Pool, candidates
+from opamc_cli.joint.name.search import Pool, candidates, trials
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
@@ -80,7 +81,9 @@ class Ways:
         """
         present, model = before.dataset.smoothing, self._declared(before.dataset)
         beside = (*model, *((term.effect, term) for term in found))
-        best = self._best_of(present, beside, 0 if found else FUNCTIONS)
+        # Next to rest a long window rounds off more than a delay takes away: a wind-up fits that.
+        first = present if found else self._best_of(present, model, late=True)
+        best = self._best_of(first, beside, 0 if found else FUNCTIONS)
         if best == present and not (found and any(term.parameters for term in before.terms)):
             return None
         dataset = before.dataset if best == present else _differentiated(self._whole, best)
@@ -90,9 +93,13 @@ class Ways:
             return None
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
 
-    def _best_of(self, first: Way, model: Declared, functions: int = 0) -> Way:
-        """Return the way that leaves least beside so many functions, or the first: see HALF."""
+    def _best_of(self, first: Way, model: Declared, functions: int = 0, late: bool = False) -> Way:
+        """Return the way that leaves least beside so many functions, or the first: see HALF.
+
+        Or beside a delay of the current, if it may come `late`.
+        """
         fits = {way: declared_fit(dataset, model) for way, dataset in self._short.items()}
+        fits = {way: _or_late(fit) if late else fit for way, fit in fits.items()}
         left = {first: np.inf} | {way: _left(fit) for way, fit in fits.items()}
         if functions and first in fits:
             found = _with_functions(fits.pop(first), functions)
@@ -112,6 +119,13 @@ def _differentiated(laid: Laid, way: Way, short: bool = False) -> Dataset:
     track = replace(build_track(recordings, joint, way), **judged)
     most = ENOUGH if short else MOST_SAMPLES
     return replace(dataset_of(track, grouping, most, ends=not short), smoothing=way)
+
+
+def _or_late(fit: Fit) -> Fit:
+    """Fit a delay beside a model, where there is one."""
+    pool = Pool.of(fit.dataset, {TimeDelay.name: TimeDelay()})
+    late = [trial.chain.fit for trial in trials(chain_of(fit, 0), pool) if trial.why_not is None]
+    return late[0] if late else fit
 
 
 def _with_functions(fit: Fit, functions: int) -> Fit:

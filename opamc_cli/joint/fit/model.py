@@ -11,10 +11,10 @@ from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.fit.parts import Parts, Sums, parts_of, whole_parts
 from opamc_cli.joint.fit.regressor_cache import RegressorCache
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
-from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Smoothing
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, coarsen
+from opamc_cli.signal.motion.smoothing import widened
 from opamc_cli.signal.transform.averages import averaged, block_mean
 from opamc_cli.signal.transform.least_squares import solve
 
@@ -59,6 +59,11 @@ class Term:
     def key(self) -> tuple[object, ...]:
         """What makes two terms the same."""
         return (self.effect.name, tuple(sorted(self.parameters.items())), self.keep)
+
+    @property
+    def form(self) -> str:
+        """Which of its effect's forms it is."""
+        return self.effect.form_of(self.parameters)
 
     @property
     def is_constant(self) -> bool:

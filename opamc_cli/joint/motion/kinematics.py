@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from opamc_cli.joint.motion.corners import clear_of_corners, widened
 from opamc_cli.joint.motion.phases.angle_filter import NOISE_SHARE
 from opamc_cli.joint.motion.phases.following import follow_phases
 from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
@@ -19,12 +18,14 @@ from opamc_cli.signal.motion.smoothing import (
     SHORTEST_WINDOW,
     averaging_kernel,
     blurred,
+    clear_of_corners,
     derivatives,
     measurement_noise,
     noise_gain,
     smoothing_window,
     taken_noise_gain,
     unstepped,
+    widened,
 )
 
 LEAST_CORNER = 0.05 / 3

@@ -220,7 +220,7 @@ def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
 def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     """Say why the last effect of a chain is not worth adding, or None where it is."""
     share, t_value = child.gain_over(parent)
-    effect = child.terms[-1].effect
+    effect, form = child.terms[-1].effect, child.terms[-1].form
     error = 0.0 if effect.unnamed else abs(share) / max(abs(t_value), 1.0)
     # What one effect leaves, beside a motion that the same phases tell, is no other one.
     followed = "logged" not in child.fit.dataset.fine.track.channels
@@ -232,7 +232,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     drifts = effect.changes_in_time and "drift" not in pool.without
     if drifts and child.no_more_than_drift(parent, pool.least_share):
         return "slow noise explains it as well: within parts of the data nothing speaks for it"
-    smooths = effect.as_smoothing and "smoothing" not in pool.without
+    smooths = effect.as_smoothing and not form and "smoothing" not in pool.without
     if smooths and child.gain_beside_smoothing(parent) < pool.least_share:
         return "what the smoothing takes from the measured motion explains it as well"
     return None

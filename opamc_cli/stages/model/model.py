@@ -48,8 +48,8 @@ three arms whose joints all move."""
 SLOWEST_ORDERS = {"motor": 1.0, "joint": 30.0}
 """A motor's turn, per turn of the angle that is known: no strain wave gear's ratio is less."""
 ALONE = (
-    "axis {}: no other joint is logged, and what one that moves in time with it asks would look "
-    "like {}; log it beside to tell"
+    "axis {}: no other joint is logged, and what one that moves in time with it asks, or what "
+    "comes back in every cycle and the library lacks, would look like {}; log it beside to tell"
 )
 ONE_PROGRAM = (
     "axis {}: which of the other joints load it, and what of that is an effect of its own, one "

@@ -36,7 +36,7 @@ def test_regressors_are_finite_and_as_long_as_the_track(name):
         columns = effect.columns(track, guess)
         assert columns.shape[0] == track.size
         assert np.all(np.isfinite(columns))
-        assert set(effect.limits(track)) <= set(guess)
+        assert effect.form_of(guess) or set(effect.limits(track)) <= set(guess)
 
 
 def test_a_place_is_sought_where_it_is_passed_both_ways():

@@ -1,8 +1,11 @@
 """A declared model: terms that are given or searched, and the window that predicts best."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from closing import MODEL, close_on, joint_of, plain_fit
+from closing import MODEL, close_on, close_recording, joint_of, plain_fit
+from simulator import simulate
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import Ways, declared_fit
@@ -118,6 +121,16 @@ def test_a_window_does_not_smooth_away_what_something_missing_answers_to(hidden,
     assert [step.term.effect.name for step in loop.steps if step.named] == [hidden]
     assert loop.before.dataset.fine.track.kernel.size < 0.1 * rate
     assert loop.rmse_after_a < 0.5 * loop.rmse_before_a
+
+
+def test_a_delay_that_a_long_window_hides_next_to_rest_has_its_name():
+    """A wind-up of 15.7 Hz had its place: of a joint at rest the window takes more than it does."""
+    made = simulate(3, (), rate=250.0, cycles=8, kind="quintic")
+    late = np.roll(made.current, 6)
+    seen = replace(made, position=5e-6 * np.round(made.position / 5e-6))
+    _, loop = close_recording(seen, late)
+    assert [step.term.effect.name for step in loop.steps if step.named] == ["time_delay"]
+    assert loop.steps[0].term.parameters["delay_s"] == pytest.approx(0.024, abs=0.002)
 
 
 def test_without_a_reason_the_window_stays():

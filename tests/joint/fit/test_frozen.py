@@ -10,9 +10,9 @@ from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, why_not_applied
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
-from opamc_cli.joint.motion.corners import widened
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
+from opamc_cli.signal.motion.smoothing import widened
 
 LIBRARY = built_in_library()
 

@@ -8,12 +8,12 @@ from closing import close_on
 from simulator import simulate
 
 from opamc_cli.joint.fit.model import dataset_of
-from opamc_cli.joint.motion.corners import clear_of_corners
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
 from opamc_cli.signal.motion.smoothing import (
     averaging_kernel,
+    clear_of_corners,
     derivatives,
     measurement_noise,
     smoothing_window,
