@@ -139,7 +139,11 @@ class Beside:
             moment = moment - fast.reshape(moment.shape)
         rest = self._elsewhere(cross, batch.own, moment)
         gamma, projected = self._asked_for(batch.terms[0], *rest), rest[1]
-        return self._taken(gamma, projected, cross, batch.own, moment)
+        found = self._taken(gamma, projected, cross, batch.own, moment)
+        # Of the wrong sign a form is none: it would stand in the way of its effect's others.
+        pairs = zip(batch.terms, gamma.mean(axis=0), strict=True)
+        wrong = [t.form and not t.effect.plausible(own, t.parameters) for t, own in pairs]
+        return np.where(np.array(wrong, dtype=bool), 0.0, found)
 
     def gains_of_forms(self, batch: Batch, forms: Sequence[tuple[Term, Ints]]) -> list[float]:
         """Likewise of forms of a batch's one guess: what one leaves out has no coefficient."""

@@ -143,7 +143,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
                 found.append(best_form(dataset, fast, Term(effect, parameters)))
     # Two lines of one kind are two candidates.
     track = dataset.fine.track
-    ordered = _best_of_each(found, lambda term: (term.effect.name, line_of(term, track)))
+    ordered = _best_of_each(found, lambda term: (term.effect.name, term.form, line_of(term, track)))
     least = np.inf if every else 0.0
     better = []
     for candidate in [one for one in ordered if one.score < least][:TRIED]:
