@@ -203,7 +203,7 @@ ODD_MAPS = {
     RATE + ONE[:-1] + ", axis1_b: {source: a, unit: A}}": "axis1_a and columns.axis1_b are both of",
     RATE + "columns: {axis1_a: {source: a, unit: A, scale: 0}}": "scale is 0",
     RATE + "columns: {axis1_a: {source: t, unit: A, scale: 1.e+9}}": "has no value in",
-    "time: {source: t, unit: s}\n" + ONE: "sampling_rate_hz is",
+    "time: {source: t, unit: s}\n" + ONE: "says 1e-09 Hz, a log has 0.001 to 1e+06",
     MAP + "metadata: {payload_kg: 1.e+9}": "payload_kg is 1000000000",
     MAP + f"metadata: {{robot: {'x' * 1001}}}": "at most 1000",
 }

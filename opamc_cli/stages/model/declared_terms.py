@@ -23,10 +23,11 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
         decide is missing beside others.
     """
     given = declared.parameters
-    searched = effect.limits(track)
+    form = effect.form_of(given)
+    searched = {} if form else effect.limits(track)
     if not given and (searched or declared.columns is None):
         return None
-    guesses = effect.guesses(track, np.zeros(track.size))
+    guesses = [] if form else effect.guesses(track, np.zeros(track.size))
     defaults = {**(guesses[0] if guesses else {}), **dict.fromkeys(effect.forms, 0.0)}
     # What a closed model says of a smaller form goes with the columns that it keeps.
     smaller = [] if declared.columns is None else effect.variants(defaults)

@@ -27,6 +27,7 @@ from opamc_cli.storage.ingest.map.map_file import (
 )
 from opamc_cli.storage.ingest.map.units import (
     ISO8601,
+    LATEST_S,
     SAMPLES,
     conversion,
     date_s,
@@ -358,7 +359,7 @@ def _info(path: Path, source: Source, channels: IngestMap, rate: float) -> RunIn
         if value is None:
             continue
         if key == "started_at":
-            known: object = utc_text(_since_1970(value, given, channels))
+            known: object = utc_text(_since_1970(path, value, given, channels))
             wanted = "a date and time in ISO 8601, such as 2022-10-26T08:17:21Z"
         elif key in ("speed_percent", "payload_kg"):
             known, wanted = _number(value), "a number"
@@ -375,14 +376,20 @@ def _info(path: Path, source: Source, channels: IngestMap, rate: float) -> RunIn
     return RunInfo(sampling_rate_hz=rate, **values)  # type: ignore[arg-type]
 
 
-def _since_1970(value: object, given: object, channels: IngestMap) -> object:
+def _since_1970(path: Path, value: object, given: object, channels: IngestMap) -> object:
     """Return the date that a first time stamp is, where stamps count from 1970."""
     time = channels.time
     number = _number(value)
     if time is None or not isinstance(given, ValueMap) or given.source != time.source:
         return value
     seconds = date_s(number, time.unit) if number is not None else None
-    return value if seconds is None else np.datetime64(round(seconds * 1e6), "us")
+    if seconds is None:
+        return value
+    if seconds >= LATEST_S:
+        years = 1970 + seconds / 31_556_952
+        msg = f"{path}: no log is of {years:.0f}: its time is in another unit than {time.unit}"
+        raise InputError(msg)
+    return np.datetime64(round(seconds * 1e6), "us")
 
 
 def _number(value: object) -> float | None:

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s
+from opamc_cli.storage.ingest.map.units import CONVERSIONS, LATEST_S, conversion, date_s
 
 Float = npt.NDArray[np.float64]
 
@@ -42,7 +42,7 @@ ANGLE_UNITS = {
 RATES_HZ = (5.0, 20_000.0)
 """Rates at which arms are logged."""
 
-DATES_S = (9.467e8, 3.471e9)
+DATES_S = (9.467e8, LATEST_S)
 """Seconds from 1970 to 2000 and to 2080: within, no two units of time take a number for a date."""
 
 DATED_HZ = 0.1

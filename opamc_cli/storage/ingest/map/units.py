@@ -36,6 +36,8 @@ of a time is that of a stamp which is a date."""
 
 EARLIEST_S = 5e8
 """A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
+LATEST_S = 3.471e9
+"""From there on (2080) it counts in another unit, or from another year, as LabVIEW from 1904."""
 
 TORQUES = frozenset({"Nm", "mNm"})
 """Units in which a joint's torque stands for its motor's current; it stays a torque."""
