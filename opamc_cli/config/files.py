@@ -133,7 +133,11 @@ def validate(
         elif missing:
             msg = f"{source}: {key} is missing; add it"
         else:
-            wanted = TAKES.get(first["type"]) or _lower_first(first["msg"])
+            # what a key takes may be of several kinds
+            kinds = [e["type"] for e in error.errors() if e["loc"][:-1] == first["loc"][:-1]]
+            takes = dict.fromkeys(TAKES[kind] for kind in kinds if kind in TAKES)
+            wanted = " or ".join(takes).replace(" or it takes ", " or ")
+            wanted = wanted if first["type"] in TAKES else _lower_first(first["msg"])
             if "valid tuple" in wanted:
                 wanted = f"it takes a list, such as {key}={_example(model, first['loc'])}"
             msg = f"{source}: {key} is {shown(first['input'])}; {wanted}"

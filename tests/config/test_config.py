@@ -75,6 +75,8 @@ def test_joints_have_gears_of_their_own():
     joint = load_config(None, ["joint.gear_ratio={1: 160, 3: 100}", "joint.pole_pairs=5"]).joint
     assert [joint.ratio_of(axis) for axis in (1, 2, 3)] == [160, None, 100]
     assert [joint.poles_of(axis) for axis in (1, 2)] == [5, 5]
+    with pytest.raises(ConfigError, match="it takes a number or keys and their values"):
+        load_config(None, ["joint.gear_ratio=[160, 100]"])
     with pytest.raises(ConfigError, match="takes a number"):
         load_config(None, ["joint.gear_ratio={1: 160, 3: yes}"])
 

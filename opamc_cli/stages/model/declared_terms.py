@@ -32,7 +32,12 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
     # What a closed model says of a smaller form goes with the columns that it keeps.
     smaller = [] if declared.columns is None else effect.variants(defaults)
     known = sorted(
-        {*searched, *defaults, *effect.searches, *(k for form, _ in smaller for k in form)}
+        {
+            *searched,
+            *defaults,
+            *(() if form else effect.searches),
+            *(k for form, _ in smaller for k in form),
+        }
     )
     for name in given:
         if name not in known:

@@ -44,6 +44,12 @@ def test_what_is_no_number_is_refused_by_its_key(entry, sentence, tmp_path):
     assert refused.value.exit_code == 2
 
 
+def test_a_form_takes_no_parameter_of_another():
+    given = DeclaredEffect(effect="elasticity", parameters={"link": 1.0, "resonance_hz": 20.0})
+    with pytest.raises(ConfigError, match="has no parameter 'resonance_hz'; known: link"):
+        declared_term(built_in_library()["elasticity"], given, SimpleNamespace(size=1))
+
+
 @pytest.mark.parametrize("name", built_in_library())
 def test_every_form_that_a_closed_model_may_hold_is_read_again(name):
     """A warm-up of dry friction alone, a payload's weight, or hum, was written and then refused."""
