@@ -83,6 +83,12 @@ class JointConfig(Section):
         "are absolute or count from the working directory.",
     )
 
+    @property
+    def axes_named(self) -> set[int]:
+        """Axes of which something is given by themselves."""
+        by_axis = [one for one in (self.gear_ratio, self.pole_pairs) if isinstance(one, dict)]
+        return {axis for one in by_axis for axis in one}
+
     def ratio_of(self, axis: int) -> float | None:
         """Return an axis' gear ratio, None if unknown."""
         given = self.gear_ratio

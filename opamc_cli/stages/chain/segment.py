@@ -120,6 +120,10 @@ def run(
     results = [AxisSegments(*each) for each in outcome.results]  # a kept one is a tuple
     errors += outcome.errors
     notes = [note for result in results for note in result.notes]
+    strange = config.joint.axes_named - {job.axis for job in work}
+    if strange:
+        numbers = ", ".join(map(str, sorted(strange)))
+        notes.append(f"joint.gear_ratio or joint.pole_pairs name axis {numbers}, which no run has")
     errors += _runs_without_motion(sources, results, outcome.errors)
     path_of = {source.name: source.path for source in sources}
     errors += [

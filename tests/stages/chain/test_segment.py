@@ -147,8 +147,10 @@ def test_reported_current_is_cut_by_the_joints_motion(tmp_path, known):
     }
     del values["axis1_position" if known == "velocity" else "axis1_velocity"]
     path = save(tmp_path / "drive.parquet", values, 1000.0)
-    joint = {"joint": {"gear_ratio": 100, "pole_pairs": 5}}
-    rows = segment.run([path], Config.model_validate(joint), tmp_path / "out").table.to_pylist()
+    joint = {"joint": {"gear_ratio": {1: 100, 7: 50}, "pole_pairs": 5}}
+    outcome = segment.run([path], Config.model_validate(joint), tmp_path / "out")
+    assert "joint.gear_ratio or joint.pole_pairs name axis 7, which no run has" in outcome.notes
+    rows = outcome.table.to_pylist()
     assert [r["direction"] for r in rows] == [m.direction for m in MOVES]
     for row, (start, stop), move in zip(rows, recording.intervals, MOVES, strict=True):
         assert abs(row["start"] - start) < 40
