@@ -14,8 +14,7 @@ from opamc_cli.joint.fit.thinning import MOST_SAMPLES, cut, thinned
 from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Smoothing
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track, coarsen
-from opamc_cli.signal.motion.smoothing import widened
-from opamc_cli.signal.transform.averages import averaged, block_mean
+from opamc_cli.signal.motion.smoothing import averaged, block_mean, widened
 from opamc_cli.signal.transform.least_squares import solve
 
 COARSE_RATE_HZ = 100.0

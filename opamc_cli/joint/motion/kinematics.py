@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from opamc_cli.joint.motion.phases.angle_filter import NOISE_SHARE
 from opamc_cli.joint.motion.phases.following import follow_phases
 from opamc_cli.joint.motion.phases.half_turns import lost, without_slips
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
@@ -27,6 +26,7 @@ from opamc_cli.signal.motion.smoothing import (
     unstepped,
     widened,
 )
+from opamc_cli.signal.transform.angle_filter import NOISE_SHARE
 
 LEAST_CORNER = 0.05 / 3
 """Share of the acceleration; three times that is lacking at a corner of a path without noise."""

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from opamc_cli.signal.transform.averages import averaged, block_mean
+from opamc_cli.signal.motion.smoothing import averaged, block_mean
 from opamc_cli.signal.transform.least_squares import inverse
 
 Floats = NDArray[np.float64]

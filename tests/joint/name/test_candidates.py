@@ -9,7 +9,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
 from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
-from opamc_cli.signal.transform.averages import averaged, block_mean
+from opamc_cli.signal.motion.smoothing import averaged, block_mean
 from tests.marks import long
 
 LIBRARY = built_in_library()

@@ -6,14 +6,17 @@ from simulator import simulate
 from opamc_cli.signal.motion.smoothing import (
     LONG_WINDOW,
     SHORTEST_WINDOW,
+    averaged,
     averaging_kernel,
+    block_mean,
     derivatives,
     measurement_noise,
     smoothing_window,
     taken_noise_gain,
     unstepped,
 )
-from opamc_cli.signal.transform.averages import averaged
+
+TWO = ((0, 7), (7, 12))
 
 
 def slow_derivative(path, rate, window, order):
@@ -106,3 +109,19 @@ def test_a_motion_that_is_measured_without_fault_has_no_noise():
     made = simulate(22324, (), rate=100.0, kind="trapezoid")
     assert measurement_noise(made.position) < 1e-8
     assert smoothing_window(made.position, 100.0) == SHORTEST_WINDOW
+
+
+def test_a_block_is_its_samples_mean_and_a_rest_is_dropped():
+    values = np.arange(12.0)
+    assert block_mean(values, TWO, 3).tolist() == [1.0, 4.0, 8.0]
+    both = block_mean(np.stack([values, -values], axis=1), TWO, 3)
+    assert both.tolist() == [[1.0, -1.0], [4.0, -4.0], [8.0, -8.0]]
+    assert block_mean(values, TWO, 1) is values
+
+
+def test_a_moving_average_does_not_reach_into_another_recording():
+    values = np.r_[np.zeros(7), np.full(5, 9.0)]
+    assert averaged(values, TWO, np.ones(3) / 3) == pytest.approx(values)
+    impulse = np.zeros(12)
+    impulse[3] = 3.0
+    assert averaged(impulse, TWO, np.ones(3) / 3)[:7] == pytest.approx([0, 0, 1, 1, 1, 0, 0])

@@ -10,13 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from opamc_cli.joint.motion.phases.angle_filter import (
-    acceleration_noise,
-    clean_bandwidth,
-    smoothed_angle,
-    smoothing_kernel,
-    widest_bandwidth,
-)
 from opamc_cli.joint.motion.phases.half_turns import bridged
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.track import Bools, Floats
@@ -26,6 +19,13 @@ from opamc_cli.signal.plausible.sensor_errors import (
     current_vector,
     rounded,
     without_sensor_errors,
+)
+from opamc_cli.signal.transform.angle_filter import (
+    acceleration_noise,
+    clean_bandwidth,
+    smoothed_angle,
+    smoothing_kernel,
+    widest_bandwidth,
 )
 
 STRONG = 5.0

@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from opamc_cli.joint.motion.phases.angle_filter import smoothed_angle
 from opamc_cli.joint.motion.phases.phase_angle import PhaseAngle
 from opamc_cli.joint.motion.track import Bools, Floats
+from opamc_cli.signal.transform.angle_filter import smoothed_angle
 
 UNSEEN_S = 0.002
 """After this long without current half turns are counted anew: while the torque passes zero and the

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from opamc_cli.joint.motion.phases.angle_filter import (
+from opamc_cli.signal.transform.angle_filter import (
     NOISE_SHARE,
     acceleration_noise,
     clean_bandwidth,

@@ -2,9 +2,11 @@
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 from scipy.special import beta
 
-from opamc_cli.joint.motion.track import Bools, Floats
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 WIDEST_HZ = 30.0
 NARROWEST_HZ = 6.0
