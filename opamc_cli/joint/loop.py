@@ -1,6 +1,6 @@
 """Close the loop: explain, name, and open the sealed data once."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,6 +55,11 @@ class Step:
     def named(self) -> bool:
         """Whether the step is an effect of the library."""
         return not self.term.effect.unnamed
+
+    @property
+    def of_measuring(self) -> bool:
+        """Whether it is a function of what smoothing, or the time of measuring, may do."""
+        return self.term.effect.unnamed and self.term.effect.as_smoothing
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,9 @@ def _closed(
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
+    if not {"unnamed", "fewer"} & set(without_rules):
+        fewer = min(_with_fewer_names(start, named, unnamed), key=_score, default=final)
+        final = fewer if fewer.score < final.score - LEAST_SHARE else final
     final = _named_as_well(lowering(final), pool, named)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
@@ -155,6 +163,29 @@ def _closed(
     fits = before, only_named.fit, final.fit, best_before
     loop = _opened(fits, saturated, steps, tried, library)
     return replace(loop, asked=tuple(one.term for one in named))
+
+
+def _score(chain: Chain) -> float:
+    return chain.score
+
+
+def _with_fewer_names(start: Chain, named: list[Named], unnamed: Pool) -> Iterator[Chain]:
+    """Functions without a name beside none, one and more of the names that take most.
+
+    No lines, of which any motion that repeats is a sum, and no shift or response beside an effect
+    that is one: it would be the same without its name.
+    """
+    measuring = any(one.term.effect.as_smoothing for one in named)
+    library = {
+        name: one
+        for name, one in unnamed.library.items()
+        if not (one.fast or (one.as_smoothing and measuring))
+    }
+    smooth = replace(unnamed, library=library)
+    most = sorted(named, key=lambda one: -one.trial.gain)
+    for count in range(len(named)):
+        chain = extended(start, *(one.term for one in most[:count])) if count else start
+        yield worth_their_price(beam(chain, smooth, width=1))
 
 
 def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
@@ -261,8 +292,11 @@ def _opened(
     r2_after = after.sealed_r2
     predicts = r2_after > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
     predicts |= r2_after > 1 - ROUNDING
+    # A form that holds a part of its curve, or a function beside the names, is not closed; what
+    # makes up for how the motion was measured says nothing of the joint.
+    whole = not any(one.approximate and not one.of_measuring for one in steps)
     if any(step.named for step in steps):
-        verdict = "closed" if reached >= EXACT and predicts else "partial"
+        verdict = "closed" if reached >= EXACT and predicts and whole else "partial"
     else:
         unknown = found.certain or bool(steps) or not predicts
         unknown |= not at_noise and bool(unconfirmed)

@@ -24,6 +24,8 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.loop import close_loop
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.name.chain import chain_of, extended
+from opamc_cli.joint.name.search import Trial
+from opamc_cli.joint.name.settle import Named
 from opamc_cli.signal.cycles.period import cycle_length
 from tests.marks import long
 
@@ -310,6 +312,41 @@ def test_names_that_hold_no_more_than_no_names_do_give_way(monkeypatch, beside):
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
     kept = close_loop(fitted, library, without_rules=("unnamed",))
     assert [step.term.effect.name for step in kept.steps[: len(names)]] == [*names]
+
+
+def test_names_that_functions_do_without_give_way(monkeypatch):
+    """What the library lacks was several names at once, each worth its price beside the others."""
+    library = {name: built_in_library()[name] for name in ("spring", "quadratic_friction")}
+    fitted = fit_declared([joint_of("cyclic", SHAPES["position_drag"], strength=5.0)])
+
+    def settled_on_names(best, pool, unnamed):
+        chain, named = chain_of(fitted, 0), []
+        for effect in library.values():
+            parent, chain = chain, extended(chain, Term(effect, {}))
+            named.append(Named(Trial.of(parent, chain), (), ()))
+        return chain, named
+
+    monkeypatch.setattr(loop_module, "settled", settled_on_names)
+    loop = close_loop(fitted, library)
+    assert {step.term.effect.domain for step in loop.steps} == {"joint-angle"}
+    assert loop.verdict == "not-in-library"
+    assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
+    kept = close_loop(fitted, library, without_rules=("fewer",))
+    assert {*library} <= {step.term.effect.name for step in kept.steps}
+
+
+def test_a_function_beside_the_names_is_not_closed():
+    def both(q, v, a, t):
+        shapes = [SHAPES[name](q, v, a, t) for name in ("mains_hum", "position_drag")]
+        return sum(size * shape / np.std(shape) for size, shape in zip((8, 1), shapes, strict=True))
+
+    library = {"mains_hum": built_in_library()["mains_hum"]}
+    loop = close_loop(fit_declared([joint_of("cyclic", both)]), library)
+    first, *others = loop.steps
+    assert (first.named, first.term.effect.name) == (True, "mains_hum")
+    assert [step.term.effect.domain for step in others] == ["joint-angle"]
+    assert loop.explained_share > 0.9
+    assert (loop.verdict, loop.remaining_domain) == ("partial", "joint-angle")
 
 
 def test_names_stay_beside_the_functions_that_explain_most(monkeypatch):

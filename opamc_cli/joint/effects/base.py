@@ -139,6 +139,10 @@ class Effect:
         """Parameters moved to a value with a meaning where the data cannot tell the difference."""
         return parameters
 
+    def decoys(self, parameters: Parameters, track: Track) -> list[Parameters]:
+        """Lines that are surely not this one; none of an effect that is no line."""
+        return []
+
     def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
         """Effects that look the same on any such recording, whatever fits best."""
         return ()

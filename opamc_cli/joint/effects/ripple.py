@@ -29,6 +29,7 @@ MOST_EXPANDED = 2
 """Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
+ASIDE = (-3.7, -2.3, 2.3, 3.7)
 OF_A_SENSOR = {"1p": "sensor_offset", "2p": "sensor_gain", "6p": "dead_time"}
 """Kinds of orders that errors of the current measurement have, with the effects."""
 
@@ -155,6 +156,12 @@ class Ripple(Effect):
         nearest = min(named, key=lambda one: abs(one - order))
         close = abs(nearest - order) < 0.25 * track.order_resolution
         return parameters | {"order": nearest} if close else parameters
+
+    def decoys(self, parameters: Parameters, track: Track) -> list[Parameters]:
+        """Orders on both sides, between the lobes of what the stroke makes of this one."""
+        width = track.order_resolution
+        beside = [parameters["order"] + k * width for k in ASIDE]
+        return [parameters | {"order": order} for order in beside if order > ASIDE[-1] * width]
 
     def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
         """Tell what the current sensors, where nothing else is logged, may do at such an order."""

@@ -27,6 +27,7 @@ class AngleLine(Ripple):
 
     # All that a line may follow is explained, at any order, and nothing claimed.
     variants, settled, interpretation = Effect.variants, Effect.settled, Effect.interpretation
+    decoys = Effect.decoys
 
 
 class Tone(MainsHum):

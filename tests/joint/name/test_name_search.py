@@ -95,6 +95,30 @@ def test_what_is_not_physical_hides_nothing(monkeypatch):
     assert names_of(beam(chain, pool_of(chain, "ripple"))) == []
 
 
+def friction_after_reversals(q, v, a, t):
+    turns = np.flatnonzero(np.diff(np.sign(v), prepend=np.sign(v[0])))
+    last = np.maximum.accumulate(np.where(np.isin(np.arange(t.size), turns), t, 0.0))
+    return np.sign(v) * np.exp(-(t - last) / 0.2)
+
+
+@pytest.mark.parametrize(
+    ("shape", "why"),
+    [
+        (lambda q, v, a, t: np.sin(40 * q), None),
+        (friction_after_reversals, "lines beside it explain as much: it is none"),
+    ],
+    ids=["a line", "friction"],
+)
+def test_a_line_is_one_that_others_do_not_stand_for(shape, why):
+    """Thirty coefficients a direction held what every cycle repeats, at any order."""
+    chain = chain_on("cyclic", shape, strength=15.0)
+    answered = {"order": 40.0, "direction": 1.0, "answer": 1.0, "top_hz": 8.0}
+    child = extended(chain, Term(LIBRARY["ripple"], answered))
+    assert child.gain_over(chain)[0] > 0.3
+    assert objection(child, chain, pool_of(chain, "ripple")) == why
+    assert objection(child, chain, pool_of(chain, "ripple", without=("decoys",))) is None
+
+
 def test_an_effect_has_to_take_its_share():
     chain = chain_on("cyclic", bump, strength=2.0)
     assert why_not(chain, drag()) is None
