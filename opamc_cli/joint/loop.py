@@ -1,6 +1,6 @@
 """Close the loop: explain, name, and open the sealed data once."""
 
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,8 +9,17 @@ from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
-from opamc_cli.joint.name.chain import EXACT, PRICE, Chain, chain_of, extended, released, without
-from opamc_cli.joint.name.form import APPROXIMATE, Curve, curve_of, share_of_form
+from opamc_cli.joint.name.chain import (
+    EXACT,
+    HALF,
+    PRICE,
+    Chain,
+    chain_of,
+    extended,
+    released,
+    without,
+)
+from opamc_cli.joint.name.form import Curve, curve_of, share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import Named, lowering, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
@@ -148,9 +157,9 @@ def _closed(
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
-    if not {"unnamed", "fewer"} & set(without_rules):
-        fewer = min(_with_fewer_names(start, named, unnamed), key=_score, default=final)
-        final = fewer if fewer.score < final.score - LEAST_SHARE else final
+    if named and "unnamed" not in without_rules and "alone" not in without_rules:
+        alone = _without_names(start, named, unnamed)
+        final = alone if alone.score < final.score - LEAST_SHARE else final
     final = _named_as_well(lowering(final), pool, named)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
@@ -165,15 +174,11 @@ def _closed(
     return replace(loop, asked=tuple(one.term for one in named))
 
 
-def _score(chain: Chain) -> float:
-    return chain.score
+def _without_names(start: Chain, named: list[Named], unnamed: Pool) -> Chain:
+    """Explain by smooth functions alone what several names may hold that are all none.
 
-
-def _with_fewer_names(start: Chain, named: list[Named], unnamed: Pool) -> Iterator[Chain]:
-    """Functions without a name beside none, one and more of the names that take most.
-
-    No lines, of which any motion that repeats is a sum, and no shift or response beside an effect
-    that is one: it would be the same without its name.
+    By no lines, of which any motion that repeats is a sum, and by no shift or response in the place
+    of an effect that is one: it would be the same without its name.
     """
     measuring = any(one.term.effect.as_smoothing for one in named)
     library = {
@@ -181,11 +186,7 @@ def _with_fewer_names(start: Chain, named: list[Named], unnamed: Pool) -> Iterat
         for name, one in unnamed.library.items()
         if not (one.fast or (one.as_smoothing and measuring))
     }
-    smooth = replace(unnamed, library=library)
-    most = sorted(named, key=lambda one: -one.trial.gain)
-    for count in range(len(named)):
-        chain = extended(start, *(one.term for one in most[:count])) if count else start
-        yield worth_their_price(beam(chain, smooth, width=1))
+    return worth_their_price(beam(start, replace(unnamed, library=library), width=1))
 
 
 def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
@@ -214,7 +215,7 @@ def _with_true_names(
     for one in named:
         drop = one.trial.parent.mean_square - one.trial.chain.mean_square
         share = share_of_form(best, drop, one.term, unnamed)
-        if share >= APPROXIMATE or "unnamed" in pool.without:
+        if share >= HALF or "unnamed" in pool.without:
             shares[id(one.term)] = share
             continue
         place = [term is one.term for term in best.terms].index(True)

@@ -331,7 +331,7 @@ def test_names_that_functions_do_without_give_way(monkeypatch):
     assert {step.term.effect.domain for step in loop.steps} == {"joint-angle"}
     assert loop.verdict == "not-in-library"
     assert loop.rmse_after_a < 0.3 * loop.rmse_before_a
-    kept = close_loop(fitted, library, without_rules=("fewer",))
+    kept = close_loop(fitted, library, without_rules=("alone",))
     assert {*library} <= {step.term.effect.name for step in kept.steps}
 
 

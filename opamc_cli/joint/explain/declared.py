@@ -15,13 +15,11 @@ from opamc_cli.joint.motion.groups import Grouping
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
 from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
-from opamc_cli.joint.name.chain import chain_of
+from opamc_cli.joint.name.chain import HALF, chain_of
 from opamc_cli.joint.name.search import Pool, candidates, trials
 
 BETTER = 0.97
 """Of the mean square error: another window than the noise asks for must be worth it."""
-HALF = 0.5
-"""Likewise beside functions without a name: with 0.6 they make up for a short window's noise."""
 ENOUGH = 12_500
 """Moving samples for that: a quarter of what the loop takes of a long recording."""
 FUNCTIONS = 4

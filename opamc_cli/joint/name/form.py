@@ -11,9 +11,6 @@ from opamc_cli.joint.name.chain import Chain
 from opamc_cli.joint.name.search import Pool, trials
 from opamc_cli.joint.name.significance import LEAST_T
 
-APPROXIMATE = 0.5
-"""Share of its domain's curve that a form holds, from which on it has the name approximately (from
-`EXACT` on without that word); below, the curve has none."""
 POINTS = 40
 """Of a curve: what a plot of some hundred pixels shows."""
 
