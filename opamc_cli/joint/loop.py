@@ -66,9 +66,9 @@ class Step:
         return not self.term.effect.unnamed
 
     @property
-    def of_measuring(self) -> bool:
-        """Whether it is a function of what smoothing, or the time of measuring, may do."""
-        return self.term.effect.unnamed and self.term.effect.as_smoothing
+    def is_shift(self) -> bool:
+        """Whether it is what any lag between the channels makes of the model."""
+        return self.term.effect.unnamed and self.term.effect.from_terms
 
 
 @dataclass(frozen=True)
@@ -293,9 +293,8 @@ def _opened(
     r2_after = after.sealed_r2
     predicts = r2_after > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
     predicts |= r2_after > 1 - ROUNDING
-    # A form that holds a part of its curve, or a function beside the names, is not closed; what
-    # makes up for how the motion was measured says nothing of the joint.
-    whole = not any(one.approximate and not one.of_measuring for one in steps)
+    # Where a form holds a part of its curve, or a function stands beside the names, more lacks.
+    whole = not any(one.approximate and not one.is_shift for one in steps)
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts and whole else "partial"
     else:
