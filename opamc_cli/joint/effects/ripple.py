@@ -158,10 +158,12 @@ class Ripple(Effect):
         return parameters | {"order": nearest} if close else parameters
 
     def decoys(self, parameters: Parameters, track: Track) -> list[Parameters]:
-        """Orders on both sides, between the lobes of what the stroke makes of this one."""
-        width = track.order_resolution
-        beside = [parameters["order"] + k * width for k in ASIDE]
-        return [parameters | {"order": order} for order in beside if order > ASIDE[-1] * width]
+        """Orders beside one of no known source, between the lobes of what the stroke makes of it."""
+        order, width = parameters["order"], track.order_resolution
+        if read_order(order, track).kind != "unknown":
+            return []
+        beside = [order + k * width for k in ASIDE]
+        return [parameters | {"order": other} for other in beside if other > ASIDE[-1] * width]
 
     def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
         """Tell what the current sensors, where nothing else is logged, may do at such an order."""

@@ -17,7 +17,15 @@ from opamc_cli.joint.name.candidates import (
     batches_of,
     best_form,
 )
-from opamc_cli.joint.name.chain import PRICE, Chain, Signature, extended, line_of, signature_of
+from opamc_cli.joint.name.chain import (
+    HALF,
+    PRICE,
+    Chain,
+    Signature,
+    extended,
+    line_of,
+    signature_of,
+)
 from opamc_cli.joint.name.refine import refined
 from opamc_cli.joint.name.significance import LEAST_T, p_value
 
@@ -31,11 +39,6 @@ MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
 TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
-
-ALIKE = 1 / 3
-"""Of what a line takes, as a logarithm of the error: lines beside true ripples (of 14 joints) took
-up to 0.25 of it, where thirty coefficients a direction held a friction that the library lacks 0.38
-and more."""
 
 
 @dataclass(frozen=True)
@@ -254,7 +257,7 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
 
 
 def _is_known(line: Term, parent: Chain) -> bool:
-    """Whether lines that are surely other ones explain much less, on average."""
+    """Whether lines that are surely other ones take less than half of it, as a logarithm."""
     others = line.effect.decoys(line.parameters, parent.fit.dataset.fine.track)
     if not others:
         return True
@@ -262,7 +265,7 @@ def _is_known(line: Term, parent: Chain) -> bool:
     alike = [replace(line, parameters=one) for one in (line.parameters, *others)]
     own, *rest = (-math.log(max(1 - beside.candidate(one).gain, LEAST_LEFT)) for one in alike)
     parent.fit.forget()
-    return sum(rest) < ALIKE * own * len(rest)
+    return sum(rest) < HALF * own * len(rest)
 
 
 def beam(
