@@ -158,7 +158,7 @@ class Ripple(Effect):
         return parameters | {"order": nearest} if close else parameters
 
     def decoys(self, parameters: Parameters, track: Track) -> list[Parameters]:
-        """Orders beside one of no known source, between the lobes of what the stroke makes of it."""
+        """Orders beside one of no known source, between the lobes that the stroke makes of it."""
         order, width = parameters["order"], track.order_resolution
         if read_order(order, track).kind != "unknown":
             return []
