@@ -157,7 +157,9 @@ def _closed(
         beside = worth_their_price(extended(saturated[0], *(one.term for one in named)))
         if beside.score < final.score - LEAST_SHARE:
             final = extended(start, *sorted(beside.terms, key=lambda term: term.effect.unnamed))
-    if named and "unnamed" not in without_rules and "alone" not in without_rules:
+    # All functions do as well as smooth ones, and have been searched.
+    able = named and saturated[0].score < final.score - LEAST_SHARE
+    if able and "unnamed" not in without_rules and "alone" not in without_rules:
         alone = _without_names(start, named, unnamed)
         final = alone if alone.score < final.score - LEAST_SHARE else final
     final = _named_as_well(lowering(final), pool, named)
