@@ -215,6 +215,34 @@ def test_presliding_is_no_fault_and_has_no_name(seed):
     assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
+def dead_zone(made):
+    """A drive's dead zone: each ampere that it asks for begins above the same small one."""
+    return np.sign(np.convolve(made.current, np.ones(15), mode="same"))
+
+
+def late_brake(made):
+    """A brake that opens some tenths of a second after each rest."""
+    speed = np.gradient(made.position) * made.rate_hz
+    way = np.sign(np.where(np.abs(speed) > 0.01 * np.abs(speed).max(), speed, 0.0))
+    number = np.arange(way.size)
+    rested = np.maximum.accumulate(np.where(way == 0, number, 0))
+    return way * np.exp(-(number - rested) / made.rate_hz / 0.2)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("lacking", "function"), [(dead_zone, "current"), (late_brake, "time_since_rest")]
+)
+@pytest.mark.parametrize("seed", [5, 8])
+def test_what_no_effect_describes_is_one_function_of_the_right_thing(lacking, function, seed):
+    made = simulate(seed, (), rate=250.0, cycles=8, kind="quintic")
+    loop = close_recording(made, made.current + 5 * made.noise_rms * lacking(made))[1]
+    assert [step.term.effect.name for step in loop.steps] == [f"unnamed_{function}"]
+    assert loop.verdict == "not-in-library"
+    left, lacked = (e**2 - made.noise_rms**2 for e in (loop.rmse_after_a, loop.rmse_before_a))
+    assert left < 0.2 * lacked
+
+
 @pytest.mark.long
 def test_a_payload_that_only_sealed_data_know_is_not_called_nothing():
     made = simulate(3, (), rate=250.0, cycles=5)

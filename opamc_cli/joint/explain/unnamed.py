@@ -22,6 +22,7 @@ MODIFIED: dict[str, Callable[[Track], Sequence[Floats]]] = {
     "one": lambda t: [np.ones(t.size)],
     "direction": lambda t: [t.direction],
     "friction": lambda t: [t.direction, t.velocity],
+    "sign": lambda t: [np.sign(t.model_a)],
     "load": lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration],
 }
 """What a function may change."""
@@ -46,14 +47,16 @@ class Smooth(Effect):
         needs: tuple[str, ...] = ("position",),
         follows_model: bool = False,
         constant: bool = True,
+        such_as: str = "",
     ) -> None:
         self.name = f"unnamed_{name}"
         self.domain = domain
         self.needs = needs
         told = name.replace("_", " ")
-        self.meaning = f"a function of {told}; no effect of the library has its form"
+        such = f": {such_as}" if such_as else ""
+        self.meaning = f"a function of {told}{such}; no effect of the library has its form"
         self.from_motion = not follows_model
-        self.changes_in_time = domain in ("time", "temperature") or name.startswith("time")
+        self.changes_in_time = "revisits" in needs or "temperature" in needs
         self._covariate = covariate
         self._modified = MODIFIED[modified]
         self._first = 0 if constant else 1
@@ -160,6 +163,16 @@ def travel_since_reversal(track: Track) -> Floats:
     return np.asarray(path - np.maximum.accumulate(np.where(turned, path, 0.0)))
 
 
+def time_since_rest(track: Track) -> Floats:
+    """Seconds since the joint last rested or turned, or its recording began."""
+    direction, number = track.direction, np.arange(track.size)
+    begins = (direction == 0) | (np.diff(direction, prepend=np.nan) != 0)
+    begins[[start for start, _ in track.bounds]] = True
+    return np.asarray((number - np.maximum.accumulate(np.where(begins, number, 0))) / track.rate_hz)
+
+
+LATE = "a brake that opens late, or friction after a rest"
+DRIVE = "a drive's dead zone, or less torque from each ampere of a large current"
 WARM, AGAIN = ("position", "temperature"), ("position", "revisits")
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), "direction"),
@@ -168,6 +181,10 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, "direction"),
     Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, "direction"),
     Smooth("load", "load", lambda t: np.abs(t.load_a), "direction", follows_model=True),
+    Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),
+    Smooth(
+        "current", "load", lambda t: np.abs(t.model_a), "sign", follows_model=True, such_as=DRIVE
+    ),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
     Smooth("time", "time", lambda t: t.time_s, "one", AGAIN),
     Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", AGAIN),

@@ -11,7 +11,13 @@ from hypothesis import strategies as st
 from simulator import simulate
 
 from opamc_cli.joint.explain.saturated import unnamed_library
-from opamc_cli.joint.explain.unnamed import Response, Shift, stretched, travel_since_reversal
+from opamc_cli.joint.explain.unnamed import (
+    Response,
+    Shift,
+    stretched,
+    time_since_rest,
+    travel_since_reversal,
+)
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import coarsen
@@ -158,3 +164,14 @@ def test_travel_since_reversal_of_a_zigzag():
     )
     # A rest is no reversal; a reversal counts from the sample at which the direction is another.
     np.testing.assert_array_equal(travel_since_reversal(track), [0, 1, 2, 3, 0, 1, 1, 2, 0, 2])
+
+
+def test_time_since_rest_begins_anew_at_rests_reversals_and_recordings():
+    track = SimpleNamespace(
+        direction=np.array([1, 1, 0, 1, 1, 1, -1, -1, -1, -1]),
+        bounds=((0, 8), (8, 10)),
+        size=10,
+        rate_hz=2.0,
+    )
+    since = 2.0 * time_since_rest(track)
+    np.testing.assert_array_equal(since, [0, 1, 0, 0, 1, 2, 0, 1, 0, 1])
