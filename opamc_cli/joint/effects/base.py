@@ -147,6 +147,13 @@ class Effect:
         """Effects that look the same on any such recording, whatever fits best."""
         return ()
 
+    def drawn_over(self, track: Track) -> tuple[str, Floats, Floats] | None:
+        """Return what its curve is drawn over, where that is not its domain's covariate.
+
+        A name, values in the domain's unit and the sign to take the curve by, (n,) each.
+        """
+        return None
+
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say what the effect with these parameters means to a maintainer."""
         return self.meaning

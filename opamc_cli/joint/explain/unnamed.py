@@ -21,6 +21,7 @@ Covariate = Callable[[Track], Floats]
 MODIFIED: dict[str, Callable[[Track], Sequence[Floats]]] = {
     "one": lambda t: [np.ones(t.size)],
     "direction": lambda t: [t.direction],
+    "speed": lambda t: [t.velocity],
     "friction": lambda t: [t.direction, t.velocity],
     "sign": lambda t: [np.sign(t.model_a)],
     "load": lambda t: [np.sin(t.position_rad), np.cos(t.position_rad), t.acceleration],
@@ -57,6 +58,7 @@ class Smooth(Effect):
         self.meaning = f"a function of {told}{such}; no effect of the library has its form"
         self.from_motion = not follows_model
         self.changes_in_time = "revisits" in needs or "temperature" in needs
+        self._told = told
         self._covariate = covariate
         self._modified = MODIFIED[modified]
         self._first = 0 if constant else 1
@@ -64,6 +66,12 @@ class Smooth(Effect):
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """From a bend to sixteen half waves."""
         return [{"degree": degree} for degree in DEGREES]
+
+    def drawn_over(self, track: Track) -> tuple[str, Floats, Floats] | None:
+        """Its own covariate, and the sign of what it modifies; of a changing load that load."""
+        if self.domain == "load" and self.changes_in_time:
+            return None
+        return self._told, self._covariate(track), np.sign(self._modified(track)[0])
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Cosines of the stretched covariate times each that they modify."""
@@ -179,6 +187,7 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), "one"),
     Smooth("angle", "joint-angle", lambda t: t.position_rad, "one"),
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, "direction"),
+    Smooth("angle_and_speed", "joint-angle", lambda t: t.position_rad, "speed"),
     Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, "direction"),
     Smooth("load", "load", lambda t: np.abs(t.load_a), "direction", follows_model=True),
     Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),

@@ -81,8 +81,10 @@ def curve_of(fit: Fit, place: int) -> Curve:
     name, unit, resists, values_of = COVARIATES[term.effect.domain]
     track = grid.track
     known = values_of(track, next(iter(term.parameters.values()), 0.0))
-    over = (track.position_rad if known is None else known)[rows]
-    side = track.direction[rows] if resists or known is None else np.ones(rows.size)
+    over = track.position_rad if known is None else known
+    side = track.direction if resists or known is None else np.ones(track.size)
+    name, over, side = term.effect.drawn_over(track) or (name, over, side)
+    over, side = over[rows], side[rows]
     order = np.argsort(over, kind="stable")
     bins = [piece for piece in np.array_split(order, POINTS) if piece.size]
     return Curve(

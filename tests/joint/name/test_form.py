@@ -109,6 +109,7 @@ TRACK = SimpleNamespace(
     velocity=DIRECTION * RNG.random(SIZE),
     acceleration=RNG.normal(size=SIZE),
     load_a=RNG.normal(size=SIZE),
+    model_a=RNG.normal(size=SIZE),
     temperature_c=20 + RNG.random(SIZE),
     time_s=RNG.permutation(SIZE) / 10,
     machine_angle_rad=RNG.random(SIZE) * 30,
@@ -119,8 +120,9 @@ RESIDUAL = RNG.normal(size=SIZE)
 COLUMN = RNG.normal(size=(SIZE, 2))
 
 
-def drawn(domain, track=TRACK, inside=None):
-    term = SimpleNamespace(effect=SimpleNamespace(domain=domain), parameters={"first": 3.0, "b": 9})
+def drawn(domain, track=TRACK, inside=None, of=None):
+    of = of or SimpleNamespace(domain=domain, drawn_over=lambda track: None)
+    term = SimpleNamespace(effect=of, parameters={"first": 3.0, "b": 9})
     inside = np.ones(SIZE, dtype=bool) if inside is None else inside
     dataset = SimpleNamespace(
         sharp=SimpleNamespace(spread=lambda part: part, fit=inside, track=track),
@@ -163,6 +165,24 @@ def test_a_curve_is_drawn_over_its_domain_s_covariate(domain, over, side, covari
         assert curve.residual_a[k] == pytest.approx(both)
     assert curve.x.size == curve.named_a.size == curve.residual_a.size == BINS
     assert np.all(np.diff(curve.x) >= 0)
+
+
+@pytest.mark.parametrize(
+    ("name", "over", "side", "covariate"),
+    [
+        ("current", np.abs(TRACK.model_a), np.sign(TRACK.model_a), "current"),
+        ("angle_and_speed", TRACK.position_rad, np.sign(TRACK.velocity), "angle and speed"),
+        ("time_and_load", np.abs(TRACK.load_a), DIRECTION, "load"),
+    ],
+)
+def test_a_function_is_drawn_over_what_it_is_a_function_of(name, over, side, covariate):
+    function = unnamed_library()[f"unnamed_{name}"]
+    curve = drawn(function.domain, of=function)
+    assert curve.covariate == covariate
+    order = np.argsort(over, kind="stable")
+    for k, piece in enumerate(np.array_split(order, BINS)):
+        assert curve.x[k] == pytest.approx(over[piece].mean())
+        assert curve.named_a[k] == pytest.approx((side * (COLUMN @ [2.0, -1.0]))[piece].mean())
 
 
 def test_fewer_samples_than_bins_have_a_bin_each():
