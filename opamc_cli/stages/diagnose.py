@@ -16,7 +16,7 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.stages.verdict import findings, verdict
-from opamc_cli.stages.verdict.agreement.common import far_together
+from opamc_cli.stages.verdict.agreement.common import not_sure
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
@@ -225,9 +225,8 @@ def _diagnose(
     tables = [name for name in FILES if name.endswith(".parquet")]
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = decided.with_files(far_together(judged, config.score)) | exchanged_joints(
-            sides, decided.target_runs(), judged
-        )
+        unsure = not_sure(judged, config.score, unjudged.foreign)
+        odd = decided.with_files(unsure) | exchanged_joints(sides, decided.target_runs(), judged)
         named = with_reasons(judged, {**odd, **unjudged.axes})
         return named | header(sources, every_note, out, tables)
 
@@ -238,7 +237,7 @@ def _diagnose(
         *([InputError(stranger)] if stranger else []),
     )
     in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
-    findings.write_findings(out, findings.Findings(causes, unjudged.axes))
+    findings.write_findings(out, findings.Findings(causes, unjudged.axes, unjudged.foreign))
     written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
     progress("report")
     title = config.report.title

@@ -14,7 +14,7 @@ from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict import verdict
-from opamc_cli.stages.verdict.agreement.common import far_together
+from opamc_cli.stages.verdict.agreement.common import not_sure
 from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.findings import read_findings
@@ -74,9 +74,8 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     sources = (*sides.baseline.sources, *sides.target.sources)
 
     def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        odd = decided.with_files(far_together(judged, config.score)) | exchanged_joints(
-            sides, decided.target_runs(), judged
-        )
+        unsure = not_sure(judged, config.score, found.foreign)
+        odd = decided.with_files(unsure) | exchanged_joints(sides, decided.target_runs(), judged)
         named = with_reasons(judged, {**odd, **found.unjudged})
         head = header(sources, notes, out, score.FILES)
         return named | head | {"tables": head["tables"] | _beside(folder, (baseline, target))}

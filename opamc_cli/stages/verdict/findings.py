@@ -28,6 +28,8 @@ class Findings:
 
     causes: Mapping[int, Mapping[str, Any]] = field(default_factory=dict)
     unjudged: Mapping[int, Sequence[str]] = field(default_factory=dict)
+    foreign: frozenset[int] = frozenset()
+    """Of these, the ones of another program or log."""
 
 
 def write_findings(folder: Path, findings: Findings) -> None:
@@ -39,6 +41,7 @@ def write_findings(folder: Path, findings: Findings) -> None:
         },
         "causes": {str(axis): dict(cause) for axis, cause in findings.causes.items()},
         "unjudged": {str(axis): list(why) for axis, why in findings.unjudged.items()},
+        "foreign": sorted(findings.foreign),
     }
     write_text(folder / files.FINDINGS, json.dumps(content, indent=2, allow_nan=False) + "\n")
 
@@ -51,6 +54,7 @@ def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
         found = Findings(
             {int(axis): dict(cause) for axis, cause in content["causes"].items()},
             {int(axis): [str(each) for each in why] for axis, why in content["unjudged"].items()},
+            frozenset(map(int, content["foreign"])),
         )
     except (InputError, ValueError, LookupError, TypeError, AttributeError):
         return Findings()

@@ -48,6 +48,7 @@ def test_a_signed_current_has_its_sign_wherever_its_recording_is_cut(tmp_path, c
     """Every second motion of sixteen goes the same way; so does every fourth of 32."""
     usual = measured(tmp_path, "usual", there_and_back(7))
     own = measured(tmp_path, "own", there_and_back(count))
+    reference = reference_of([usual])
     assert refusal(own, usual) == ""
     assert own.reversing == pytest.approx(0.5, abs=0.1)
     assert own.size["current"] == pytest.approx(usual.size["current"], rel=0.1)
@@ -56,6 +57,8 @@ def test_a_signed_current_has_its_sign_wherever_its_recording_is_cut(tmp_path, c
     assert "has lost its sign" in refusal(unsigned, usual)
     turned = measured(tmp_path, "turned", there_and_back(count), alter=np.negative)
     assert "inverted" in refusal(turned, usual)
+    of_log = [found.of_log for each in (unsigned, turned) for found in findings([each], reference)]
+    assert of_log == [True, True]
 
 
 def test_motions_longer_than_what_is_looked_at_are_seen_both_ways(tmp_path):

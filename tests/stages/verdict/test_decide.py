@@ -10,6 +10,7 @@ import jsonschema
 import pytest
 
 from opamc_cli.__main__ import main
+from opamc_cli.stages.verdict.findings import Findings, read_findings, write_findings
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import save_run
 
@@ -49,6 +50,18 @@ def diagnosed(tmp_path_factory):
             patch.setattr(f"opamc_cli.stages.report.figures.shown.{section}", ())
         assert ended("diagnose", *flat, *options) == 1
     return out
+
+
+def test_what_was_found_out_from_the_recordings_is_kept_for_the_same_tables(tmp_path):
+    tables = [tmp_path / role / "patterns.parquet" for role in ("baseline", "target")]
+    for table in tables:
+        table.parent.mkdir()
+        table.write_text("counts")
+    found = Findings({1: {"share": 0.5}}, {2: ["Why."], 3: ["Why."]}, frozenset({2}))
+    write_findings(tmp_path, found)
+    assert read_findings(tmp_path, tables) == found
+    tables[1].write_text("other counts")
+    assert read_findings(tmp_path, tables) == Findings()
 
 
 @pytest.mark.long

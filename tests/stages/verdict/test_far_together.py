@@ -3,7 +3,7 @@
 import pytest
 
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.stages.verdict.agreement.common import far_together
+from opamc_cli.stages.verdict.agreement.common import far_together, not_sure
 
 
 def verdict(*axes):
@@ -37,6 +37,46 @@ def test_joints_that_are_far_together_are_no_small_changes():
     found = far_together(verdict((40.0, 1e-9, 0.05), (50.0, 1e-9, 0.05)), ScoreConfig())
     assert list(found) == [1, 2]
     assert all("other joints lie as far" in why for (why,) in found.values())
+
+
+def robot(**states):
+    """Return a verdict of axes in turn, their states as letters, each with its health index."""
+    names = {"h": "healthy", "c": "changed", "f": "fault"}
+    axes = [
+        {"axis": axis, "state": names[text[0]], "health_index": float(index)}
+        | {"p_adjusted": 1e-9, "distance": {"effect": 0.9}}
+        for axis, (text, index) in enumerate(states.values(), 1)
+    ]
+    return {"axes": axes}
+
+
+@pytest.mark.parametrize(
+    ("states", "foreign", "unsure"),
+    [
+        # five of six fit no motion, or have their sign inverted
+        ([("f", 900)], {2, 3, 4, 5, 6}, [1]),
+        ([("c", 200)], {2, 3, 4, 5, 6}, [1]),
+        ([("h", 0.3)], {2, 3, 4, 5, 6}, []),
+        # half is not most: a fault that breaks its own motion is one joint of six
+        ([("f", 900), ("h", 1), ("h", 1)], {4, 5, 6}, []),
+        ([("f", 900)], {2}, []),
+        ([("f", 900), ("h", 40), ("h", 2)], {4, 5, 6}, [1, 2]),
+        # four lie as far as one, or less far than it
+        (
+            [("h", 500), ("h", 30), ("f", 600), ("h", 400), ("h", 900), ("h", 1)],
+            (),
+            [1, 2, 3, 4, 5],
+        ),
+        ([("h", 30), ("h", 30), ("f", 600), ("h", 40), ("h", 90), ("h", 1)], (), [1, 2, 4, 5]),
+    ],
+)
+def test_a_joint_that_most_others_leave_alone_is_no_sure_fault(states, foreign, unsure):
+    judged = robot(**{str(axis): one for axis, one in enumerate(states, 1)})
+    # what `far_together` says of a joint alone is not asked here
+    found = not_sure(judged, ScoreConfig(), foreign)
+    assert sorted(found) == unsure
+    left = [axis for axis in unsure if judged["axes"][axis - 1]["state"] != "healthy"]
+    assert all("most of the robot, cannot be compared" in found[axis][0] for axis in left)
 
 
 def test_a_joint_near_its_baseline_is_nothing_to_tell():

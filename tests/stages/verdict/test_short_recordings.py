@@ -6,11 +6,12 @@ from types import SimpleNamespace
 import pyarrow as pa
 import pytest
 
+from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.unjudged import Side, unjudged
 from opamc_cli.stages.verdict.agreement.whole import not_whole
 
 
-def side(role, spans):
+def side(role, spans, findings=()):
     rows = [
         {
             **{"run": run, "axis": 1, "cycle": cycle, "start": start, "stop": stop},
@@ -22,7 +23,7 @@ def side(role, spans):
         SimpleNamespace(run=run, path=Path(run), axis=1, moves=True)
         for run in dict.fromkeys(row["run"] for row in rows)
     ]
-    return Side(role, measured, (), pa.Table.from_pylist(rows))
+    return Side(role, measured, findings, pa.Table.from_pylist(rows))
 
 
 @pytest.mark.parametrize(
@@ -41,6 +42,26 @@ def test_a_recording_that_is_much_shorter_is_told_so_first(stop, says):
     (why,) = unjudged(side("baseline", nights), target).axes[1]
     assert says in why
     assert why.startswith("The target: ")
+
+
+BAD_SENSOR = Finding("new", 1, "axis1_a keeps one value")
+OTHER_SIGN = Finding("new", 1, "the sign is inverted", of_log=True)
+
+
+@pytest.mark.parametrize(
+    ("normal", "finding", "foreign"),
+    [
+        (0, (), {1}),  # no motion fits
+        (0, (OTHER_SIGN,), {1}),
+        (0, (BAD_SENSOR,), set()),
+        (-1, (), set()),  # nor does any of the baseline itself
+    ],
+)
+def test_another_program_or_log_is_told_from_a_bad_sensor(normal, finding, foreign):
+    baseline = side("baseline", [("a", normal, 0, 2000), ("b", normal, 0, 2000)])
+    found = unjudged(baseline, side("target", [("new", -1, 0, 2000)], finding))
+    assert found.axes.keys() == {1}
+    assert found.foreign == foreign
 
 
 def moved(role, motions, fits):

@@ -1,10 +1,29 @@
-"""Joints that are far from the baseline together: common, but not therefore healthy."""
+"""Joints that are far from the baseline together: common, but neither healthy nor at fault."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Collection, Mapping
 from typing import Any
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
+
+
+def not_sure(
+    verdict: Mapping[str, Any], limits: ScoreConfig, foreign: Collection[int]
+) -> dict[int, tuple[str, ...]]:
+    """Return the axes that are neither healthy nor at fault for sure, since others moved as far.
+
+    Parameters
+    ----------
+    verdict
+        Content of verdict.json.
+    limits
+        Those by which its axes were judged.
+    foreign
+        Axes that cannot be compared at all, since their target is of another program or log.
+    """
+    far = far_together(verdict, limits)
+    return far | left_alone(verdict, far, foreign)
 
 
 def far_together(verdict: Mapping[str, Any], limits: ScoreConfig) -> dict[int, tuple[str, ...]]:
@@ -20,6 +39,29 @@ def far_together(verdict: Mapping[str, Any], limits: ScoreConfig) -> dict[int, t
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
+    }
+
+
+def left_alone(
+    verdict: Mapping[str, Any], far: Collection[int], foreign: Collection[int]
+) -> dict[int, tuple[str, ...]]:
+    """Return the unhealthy axes that are no surer a fault than most others are, with the reason.
+
+    What another program or log does to most joints it does to all, whether or not each shows it.
+
+    `far` are those of `far_together`, `foreign` as in `not_sure`.
+    """
+    index = {entry["axis"]: entry["health_index"] or 0.0 for entry in verdict["axes"]}
+    others = {*far, *foreign}
+    if 2 * len(others) <= len({*index, *foreign}):
+        return {}
+    reach = math.inf if foreign else max(index[axis] for axis in far)
+    return {
+        entry["axis"]: (_LEFT_ALONE.format(", ".join(map(str, sorted(others)))),)
+        for entry in verdict["axes"]
+        if entry["state"] in ("changed", "fault")
+        and entry["axis"] not in others
+        and index[entry["axis"]] <= reach
     }
 
 
@@ -39,6 +81,11 @@ def _alone(entry: Mapping[str, Any], limits: ScoreConfig) -> str:
 _COMMON = (
     "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
     "check unit, sensors, clock, program, payload and speed, and record again, or a new baseline."
+)
+_LEFT_ALONE = (
+    "It differs from the baseline, but axes {}, most of the robot, cannot be compared or lie as "
+    "far: another program, payload or way of logging changes a joint as a fault does; record again "
+    "as for the baseline, or a new baseline."
 )
 _ALONE = (
     "too far to be called healthy, though what was compared does not suffice to call it changed; "

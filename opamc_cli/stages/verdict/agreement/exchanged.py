@@ -61,5 +61,5 @@ def exchanged(
                 f"baseline, {reversed_} would if the current turned the other way: are two of its "
                 "phases exchanged?"
             )
-            found.append(Finding(own.run, own.axis, why))
+            found.append(Finding(own.run, own.axis, why, of_log=True))
     return found

@@ -73,6 +73,8 @@ class Finding:
     """A clause such as "axis3_b keeps one value"."""
     at_rest: bool = False
     """Whether it is no more than that the axis rests, as most do where axes move in turn."""
+    of_log: bool = False
+    """Whether another logger or map does it, which reach further than one joint's sensor."""
 
 
 @dataclass(frozen=True)
@@ -134,9 +136,10 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
         if (own.run, own.axis) in told:
             continue
         rules = RULES if own.moves else RULES_AT_REST
-        why = next((why for rule in rules if (why := rule(own, reference))), None)
+        told_by = ((why, rule in OF_LOG) for rule in rules if (why := rule(own, reference)))
+        why, of_log = next(told_by, (None, False))
         if why is not None:
-            found.append(Finding(own.run, own.axis, why))
+            found.append(Finding(own.run, own.axis, why, of_log=of_log))
         elif not own.moves:
             found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
     return found
@@ -348,6 +351,9 @@ RULES: tuple[Callable[[Measured, Reference], str | None], ...] = (
     _other_steps,
 )
 """In the order in which they are asked."""
+
+OF_LOG = frozenset({_other_sign, _turned_round, _coarser, _other_steps})
+"""A joint that they do not show may be logged in another way all the same."""
 
 RULES_AT_REST = (_other_signal, _frozen, _far_too_large, _unbalanced, _incomplete)
 """Of an axis in which no motion was found, since its current may be why."""

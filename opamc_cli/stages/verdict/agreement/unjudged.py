@@ -66,6 +66,8 @@ class Unjudged:
     """The same of the baseline's runs: the target is judged by the others."""
     at_rest: Mapping[int, Mapping[str, InputError]] = field(default_factory=dict)
     """By axis and run of the target, why it has none, which is usual where axes move in turn."""
+    foreign: frozenset[int] = frozenset()
+    """Axes whose target is of another program or log, by motions that fit nothing or its sign."""
 
     def sessions_at_rest(self, sides: Sides) -> list[InputError]:
         """Return one for each axis that rests in all of a target session, if in no other.
@@ -90,6 +92,7 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
     dropped: dict[tuple[Path, str], dict[int, str]] = {}
     n_lost: Counter[Path] = Counter()
     at_rest: dict[int, dict[str, InputError]] = {}
+    foreign: set[int] = set()
     for axis in sorted(baseline.moving_axes() | target.moving_axes()):
         for side in (target, baseline):
             lost = _lost(axis, side, baseline)
@@ -100,6 +103,10 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
                 whys = {_but_numbers(why): why for why in (lost or idle).values()}
                 said = tuple(sentence(side.role, why) for why in whys.values())
                 axes[axis] = axes.get(axis, ()) + said
+                if side is baseline:  # each night finds that so
+                    foreign.discard(axis)
+                elif lost and not lost.keys() & _of_sensors(axis, side):
+                    foreign.add(axis)
                 continue
             for run, why in lost.items():
                 # what is wrong with all of a recording is said once
@@ -121,7 +128,7 @@ def unjudged(baseline: Side, target: Side) -> Unjudged:
         error = InputError(f"{path}: {_ended(why)}{left_out * (not others)}", axes=lacking)
         of_side.setdefault(roles[path], []).append(error)
     errors, of_baseline = (tuple(of_side.get(side.role, ())) for side in (target, baseline))
-    return Unjudged(axes, errors, of_baseline, at_rest)
+    return Unjudged(axes, errors, of_baseline, at_rest, frozenset(foreign))
 
 
 def _but_numbers(why: str) -> str:
@@ -194,6 +201,12 @@ def _lost(axis: int, side: Side, baseline: Side) -> dict[str, str]:
                 _unfitting(axis, rows, baseline) if ratio is None else of_another_speed(ratio)
             )
     return lost
+
+
+def _of_sensors(axis: int, side: Side) -> set[str]:
+    """Return the runs in which a channel of an axis is bad, whatever the others are."""
+    own = [f for f in side.findings if f.axis == axis]
+    return {finding.run for finding in own if not (finding.at_rest or finding.of_log)}
 
 
 def _idle(axis: int, side: Side) -> dict[str, str]:
