@@ -298,11 +298,13 @@ def write(
 
 
 def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
-    """Return the exit code of a verdict: an unhealthy joint makes it 1, else an unjudged one 5."""
+    """Return the exit code of a verdict: an unhealthy joint makes it 1, else a doubtful one 5."""
     states = {axis["state"] for axis in verdict["axes"]}
     if states & {"changed", "fault"}:
         return ExitCode.UNHEALTHY
-    return ExitCode.DONE if states == {"healthy"} else ExitCode.NOT_ENOUGH_DATA
+    excused = any(axis["excused"] for axis in verdict["axes"])
+    sure = states == {"healthy"} and not excused
+    return ExitCode.DONE if sure else ExitCode.NOT_ENOUGH_DATA
 
 
 def content(

@@ -51,9 +51,11 @@ def test_its_first_reason_says_that_a_fault_may_look_alike(differing):
     assert "a fault that looks alike would not be told" in first
 
 
-def test_it_is_healthy_and_a_fault_still_wins():
+def test_it_does_not_end_as_health_does_and_a_fault_still_wins():
+    """Of a robot whose joints all had twice the friction a scheduler saw 0."""
     excused = axis(2, excused=True)
-    assert exit_code({"axes": [axis(1), excused]}) is ExitCode.DONE
+    assert exit_code({"axes": [axis(1), axis(2)]}) is ExitCode.DONE
+    assert exit_code({"axes": [axis(1), excused]}) is ExitCode.NOT_ENOUGH_DATA
     assert exit_code({"axes": [excused, axis(3, "fault")]}) is ExitCode.UNHEALTHY
 
 
