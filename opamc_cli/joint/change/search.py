@@ -76,6 +76,8 @@ class Grease:
     dry: float
     wet: float
     """With `dry`: relative changes of dry and of viscous friction."""
+    whole: float
+    """Of both together, as root mean square at the speeds that occur."""
 
     @classmethod
     def of(cls, compared: Compared, population: Population) -> "Grease":
@@ -94,7 +96,11 @@ class Grease:
         for name, before, after in zip(population.names, population.mean, mean, strict=True):
             if name in changes and before > 0:  # of a negative friction a share says nothing
                 changes[name] = float(after / before - 1)
-        return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"])
+        rubs = np.array([name in changes for name in population.names])
+        products = compared.sums(population.terms).gram.sum(axis=0)
+        before, after = (rubs * one @ products @ (rubs * one) for one in (population.mean, mean))
+        whole = float(np.sqrt(after / before)) - 1 if before > 0 else 0.0
+        return cls(degrees is not None, warmer, changes["coulomb"], changes["viscous"], whole)
 
     @property
     def mostly_wet(self) -> bool:
@@ -108,10 +114,14 @@ class Grease:
         Where none is logged, mostly viscous friction by no more than a factor of two.
         """
         if self.warmer_c is not None:
-            stiffer = abs(np.log(max(1 + self.wet, 1e-3)))
-            return self.wet * self.warmer_c < 0 and stiffer < STEEPEST_PER_C * abs(self.warmer_c)
+            return self.wet * self.warmer_c < 0 and self._within(self.wet, self.whole)
         little = 1 / LARGEST_COLD_FACTOR < 1 + self.wet < LARGEST_COLD_FACTOR
         return not self.logged and self.mostly_wet and little
+
+    def _within(self, *changes: float) -> bool:
+        """Whether a logged difference of temperature is enough for relative changes."""
+        factors = np.maximum(1 + np.array(changes), 1e-3)
+        return bool(np.all(abs(np.log(factors)) < STEEPEST_PER_C * abs(self.warmer_c or 0.0)))
 
     def warms(self, shift: Shift) -> bool:
         """Whether friction falls by a shift, and warmth may be behind it, as far as is known.
@@ -120,7 +130,8 @@ class Grease:
         dry friction fell: 0.9 of it or more where all fell alike, 0.2 at most where a preload did.
         """
         thinner = not self.logged and self.wet < min(self.dry / 2, 0.0)
-        warm = thinner if self.warmer_c is None else self.warmer_c > 0
+        logged = self.warmer_c is not None and self.warmer_c > 0 and self._within(self.whole)
+        warm = thinner if self.warmer_c is None else logged
         return warm and shift.falls > 0
 
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:

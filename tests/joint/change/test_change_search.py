@@ -134,6 +134,19 @@ def test_grease_of_another_temperature_is_stiffer_when_cold_and_not_by_more(
         assert "viscous" in cause.ties
 
 
+@pytest.mark.parametrize(("colder", "dry", "effect"), [
+    (3.0, 0.7, "coulomb"), (-3.0, -0.5, "coulomb"), (-3.0, -0.1, "thermal_viscous"),
+])  # fmt: skip
+def test_dry_friction_changes_by_no_more_than_the_temperature_can_do(colder, dry, effect):
+    """A brake that drags by 70 % was colder grease by 2 degrees, for viscous friction rose, too."""
+
+    def more(q, v, a, t):
+        return dry * COEFFICIENTS[3] * np.sign(v) + 0.1 * np.sign(dry) * COEFFICIENTS[4] * v
+
+    (cause, *_) = causes_of(more, colder=colder, noise_a=0.001, spread=0.0)
+    assert cause.effect == effect
+
+
 @pytest.mark.parametrize(
     ("colder", "effect", "word"),
     [
