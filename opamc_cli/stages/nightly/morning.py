@@ -20,7 +20,7 @@ OVER = {
     kind: rank
     for rank, kind in enumerate(
         (
-            *("lost", "ended", "silent", "thinned", "lacking", "failed", "partial"),
+            *("lost", "ended", "fault", "silent", "thinned", "lacking", "failed", "partial"),
             *("not-judged", "missing", "cleared", "excused", "outside", "gathering"),
         )
     )
@@ -46,7 +46,7 @@ class Morning:
     """What a start has to say."""
 
     lines: tuple[str, ...]
-    """Sentences for people: robots that need a look first, three lines each."""
+    """Sentences for people: robots that need a look first, four lines each."""
     standing: tuple[str, ...]
     """What was said before and still stands, worst first, one line each."""
     values: dict[str, Any]
@@ -127,6 +127,18 @@ def tell(
     """
     names = {robot.name for robot in summary.robots}
     news = [event for event in untold if event.robot in names or event.kind in NO_ROBOTS]
+    under: dict[tuple[str, int | None], str] = {
+        (robot.name, joint.axis): joint.since
+        for robot in summary.robots
+        for joint in robot.joints
+        if joint.alarm
+    }
+    # nights that an alarm which stands is of are its own
+    news = [
+        one
+        for one in news
+        if one.kind != "fault" or one.time < under.get((one.robot, one.axis), "9999")
+    ]
     failed_now = {(robot, why) for robot, _, why in outcome.failed}
     lines = list(outcome.absent)
     standing_lines: list[str] = []
@@ -145,6 +157,13 @@ def tell(
             of = robot.failure
             why = f"{of.night} could not be judged: {of.why}" if of else "no recording"
             standing_lines.append(f"{robot.name} {why}")
+    told_now = {(event.robot, event.text) for event in news}
+    standing_lines += [
+        f"{robot.name} {event.text}"
+        for robot in summary.robots
+        for event in robot.lately
+        if (robot.name, event.text) not in told_now
+    ]
     if len(standing_lines) > MOST_STANDING:
         more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
         standing_lines[MOST_STANDING:] = [more]
@@ -187,10 +206,12 @@ def _alarm_lines(
     yield f"{_place(robot, joint)}: {how}, not as it was since {alarm.since}"
     yield f"  {robot.text_of(joint)}"
     where = out / joint.report if joint.report else out / files.PAGE
+    of_robot, of_cell = quote(robot.name), f"--why TEXT --cell {quote(str(cell))}"
     yield (
-        f"  see {where}; silence it with: opamc nightly acknowledge {quote(robot.name)} "
-        f"--axis {joint.axis} --why TEXT --cell {quote(str(cell))}"
+        f"  see {where}; silence it with: opamc nightly acknowledge {of_robot} "
+        f"--axis {joint.axis} {of_cell}"
     )
+    yield f"  after a repair: opamc nightly rebaseline {of_robot} --from DATE {of_cell}"
 
 
 def _place(robot: RobotSummary, joint: JointSummary) -> str:

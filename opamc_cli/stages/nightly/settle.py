@@ -8,6 +8,7 @@ from datetime import date, timedelta
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
+from opamc_cli.decision.trend.alarm import LATELY
 from opamc_cli.decision.trend.chart import LIMIT
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
@@ -54,7 +55,7 @@ def settle_cell(
         How all robots of the cell stand now.
     """
     # another version may tell other alarms, or tell them otherwise, of nights it cannot judge anew
-    rule = {**cell.alarm.model_dump(), "limit": LIMIT, "version": __version__}
+    rule = {**cell.alarm.model_dump(), "limit": LIMIT, "lately": LATELY, "version": __version__}
     history.apply_rule(digest(rule))
     by_robot: dict[str, list[NightRow]] = {}
     for row in sorted(history.nights().values(), key=lambda row: (row.robot, row.night)):

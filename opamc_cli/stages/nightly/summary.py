@@ -5,9 +5,18 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from opamc_cli.decision.trend.alarm import LATELY
+from opamc_cli.stages.nightly.alarms.course import day
 from opamc_cli.stages.nightly.inputs.recordings import some
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import UNJUDGED, AlarmRow, NightRow, begun_anew, told_by
+from opamc_cli.storage.history.rows import (
+    UNJUDGED,
+    AlarmRow,
+    Event,
+    NightRow,
+    begun_anew,
+    told_by,
+)
 
 SEVERITY = (
     "alarm",
@@ -89,6 +98,8 @@ class RobotSummary:
     """Whether somebody has said that it has none."""
     gathering: bool = False
     """Whether its last night became part of a baseline though an earlier one was complete."""
+    lately: tuple[Event, ...] = ()
+    """What was said within a month of joints at fault for which no alarm stood, or does."""
 
     @property
     def several_programs(self) -> bool:
@@ -205,6 +216,14 @@ class RobotSummary:
                     "text": one.reason,
                     "cause": one.cause,
                 }
+        for said in self.lately:
+            yield {
+                "kind": "alone",
+                "axis": said.axis,
+                "program": None,
+                "night": said.time,
+                "text": said.text,
+            }
 
 
 @dataclass(frozen=True)
@@ -327,6 +346,7 @@ def summarise(
             # against a baseline that somebody has replaced
             row |= {"state": "baseline", "health_index": None, "reason": "", "cause": None}
         joints.setdefault(row["robot"], []).append(_joint(row, alarm))
+    lately = _lately(history, last, begun)
     names = sorted({*last, *joints, *robots})
     return Summary(
         tuple(
@@ -340,10 +360,33 @@ def summarise(
                 name in last
                 and last[name].status == "baseline"
                 and complete.get(name, "9999") < last[name].night,
+                lately.get(name, ()),
             )
             for name in names
         )
     )
+
+
+def _lately(
+    history: History, last: Mapping[str, NightRow], begun: Mapping[str, str]
+) -> dict[str, tuple[Event, ...]]:
+    """Return what holds of what was said of single nights at fault, by robot."""
+    raised: dict[tuple[str, int | None], str] = {}
+    for alarm in history.alarms():
+        until = "9999" if alarm.cleared is None else alarm.raised
+        raised[alarm.robot, alarm.axis] = max(until, raised.get((alarm.robot, alarm.axis), ""))
+    found: dict[tuple[str, str], Event] = {}
+    query = "SELECT * FROM event WHERE kind = 'fault' ORDER BY time, axis"
+    for event in (Event(**row) for row in history.rows(query)):
+        newest = last[event.robot].night if event.robot in last else ""
+        anew = max(begun.get(event.robot, ""), raised.get((event.robot, event.axis), ""))
+        if newest and event.time >= anew and day(newest) - day(event.time) <= LATELY:
+            found[event.robot, event.text] = event
+    robots = {robot for robot, _ in found}
+    return {
+        name: tuple(event for (robot, _), event in found.items() if robot == name)
+        for name in robots
+    }
 
 
 def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:

@@ -7,7 +7,10 @@ from typing import get_args, get_type_hints
 
 import pyarrow as pa
 
-OF_ROBOT = ("alarm", "reminder", "cleared", "not-judged", "excused", "outside", "failed", "partial")
+OF_ROBOT = (
+    *("alarm", "reminder", "cleared", "fault"),
+    *("not-judged", "excused", "outside", "failed", "partial"),
+)
 """Kinds of event that follow from the nights of one robot."""
 
 OF_NIGHT = ("judged-anew", "lacking")

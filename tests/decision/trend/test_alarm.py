@@ -1,10 +1,13 @@
 """When nights make an alarm, by hand."""
 
+import random
+
 import pytest
 
-from opamc_cli.decision.trend.alarm import Episode, Night, episodes
+from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, episodes, nights_to_go
 
 S, N, U = Night(True), Night(False), Night(False, judged=False)
+L = Night(True, large=True)
 NEAR, ODD = Night(False, calm=False), Night(False, differs=True)
 
 
@@ -36,3 +39,43 @@ NEAR, ODD = Night(False, calm=False), Night(False, differs=True)
 )
 def test_two_of_three_nights_make_an_alarm(nights, expected):
     assert episodes(nights, 2, 3) == expected
+
+
+@pytest.mark.parametrize(
+    ("nights", "expected"),
+    [
+        ([L, N, N, N, L, N, N], []),
+        ([L, N, N, N, L, N, N, N, L], [Episode(8, None, returns=True)]),
+        # a small one is none of them, and one that was not judged is no night
+        ([L, N, N, N, S, N, N, N, L], []),
+        ([L, *[N] * 27, L, L], [Episode(29, None)]),
+        ([L, *[N] * 14, L, *[N] * 13, L], [Episode(29, None, returns=True)]),
+        ([L, *[N] * 14, L, *[N] * 14, L], []),
+        ([L, *[N] * 14, L, *[U] * 9, *[N] * 13, L], [Episode(38, None, returns=True)]),
+        # over when the first of them is past, and the next one is no third
+        ([L, N, N, N, L, N, N, N, L, *[N] * 21], [Episode(8, None, returns=True)]),
+        ([L, N, N, N, L, N, N, N, L, *[N] * 22], [Episode(8, LATELY, returns=True)]),
+        # what lasts is an alarm of nights together, and over with them
+        ([L, N, N, N, L, L, N, N, N], [Episode(5, 8)]),
+    ],
+)
+def test_large_nights_that_come_back_make_an_alarm(nights, expected):
+    assert episodes(nights, 2, 3) == expected
+
+
+def test_an_alarm_waits_for_as_many_nights_as_end_it():
+    draw = random.Random(5)
+    seen = set()
+    for _ in range(400):
+        nights = draw.choices([N, S, L, ODD, NEAR, U], [9, 1, 2, 1, 1, 1], k=draw.randint(4, 60))
+        found = episodes(nights, 2, 3)
+        if not found or found[-1].cleared is not None:
+            continue
+        judged = [one for one in nights if one.judged]
+        more = nights_to_go(judged, 2, 3, returns=found[-1].returns)
+        seen.add((found[-1].returns, more > 3))
+        ends = [
+            episodes([*nights, *[N] * k], 2, 3)[len(found) - 1].cleared for k in (more - 1, more)
+        ]
+        assert (ends[0], ends[1] is not None) == (None, True)
+    assert seen == {(False, False), (True, False), (True, True)}

@@ -68,8 +68,8 @@ def test_what_was_said_in_a_night_is_not_changed_by_later_ones():
         settle_robot("r1", series[:stop], (), (), AlarmConfig(remind_after=7), 0.4, 6)
         for stop in (18, 28)
     )
-    assert [one.kind for one in early.events] == ["alarm", "reminder"]
-    assert late.events[:2] == early.events
+    assert [one.kind for one in early.events] == ["alarm", "reminder", "fault"]
+    assert {*early.events} < {*late.events}
     assert late.alarms[0].text != early.alarms[0].text
     assert "effect 0.05" in late.events[0].text
     assert "effect 0.95" in late.alarms[0].text
@@ -213,8 +213,32 @@ def test_an_alarm_stands_while_the_joint_differs_whatever_excuses_it():
         row.update(reason=EXCUSED, p_value=0.002)
     found = settled(series)
     assert [one.cleared for one in found.alarms] == ["2026-03-19"]
-    # the alarm says it, and no line besides
-    assert [one.kind for one in found.events] == ["alarm", "reminder", "cleared"]
+    # the alarm says it, and no line besides; before it stood there was one
+    assert [one.kind for one in found.events] == ["alarm", "reminder", "cleared", "fault"]
+    assert found.events[-1].time == "2026-03-06"
+
+
+def test_an_alarm_says_what_it_waits_for_once_the_joint_is_healthy():
+    def waits(*after, far=0.0, p=0.5, states=("fault",) * 3):
+        quiet = [0.1 * (-1) ** day for day in range(16)]
+        distances = [*quiet, *(2.0 * (one == "fault") for one in states), *[far] * len(after)]
+        series = nights_of([*["healthy"] * 16, *states, *after], distances)
+        for row in series[16:]:
+            row["effect"] = 0.4 * (row["state"] == "fault")
+        series[-1]["p_value"] = p
+        return settled(series).alarms[-1].text.partition("; over ")[2]
+
+    assert waits() == ""
+    assert waits("changed") == ""
+    assert waits("healthy") == "after 2 more nights without a sign of it"
+    assert waits("healthy", "healthy") == "after 1 more night without a sign of it"
+    small = "after 3 more nights without a sign of it (a p-value of 0.01 or below is one)"
+    assert waits("healthy", p=0.002) == small
+    far = " more nights without a sign of it (its distance of late still is one)"
+    assert waits("healthy", "healthy", far=1.0).endswith(far)
+    # of nights that lie apart it is said how many they were, and they have to be past
+    apart = ("fault", "healthy", "healthy", "healthy") * 2 + ("fault",)
+    assert waits("healthy", states=apart) == "after 21 more nights without a sign of it"
 
 
 def settled(series, nights=(), declared=()):
@@ -232,7 +256,7 @@ def test_a_night_of_another_condition_clears_no_alarm():
     assert (alarm.raised[-2:], alarm.cleared) == ("07", None)
     # the rule stands in the nights of the other condition as well
     assert [night[-2:] for _, _, night in found.standing] == [f"{day:02d}" for day in range(7, 14)]
-    assert [one.kind for one in found.events] == ["alarm"]
+    assert [one.kind for one in found.events] == ["alarm", "fault"]
 
 
 def test_an_alarm_that_a_new_baseline_ends_is_said_to_be_over_and_stays():
@@ -400,7 +424,7 @@ def test_a_joint_that_something_outside_it_changed_is_told_by_cause_and_again_af
         row.update(state="changed", harmless=True, cause="sensor_gain", p_value=1e-9)
     rows[4]["cause"] = "payload_change"
     rows[5].update(state="fault", harmless=False, cause="ripple")
-    found = settled(rows).events
+    found = [one for one in settled(rows).events if one.kind != "fault"]
     assert [(one.time[-2:], one.kind) for one in found] == [
         (day, "outside") for day in ("03", "05", "12")
     ]
@@ -432,3 +456,69 @@ def test_a_joint_that_is_not_judged_is_counted_beside_one_that_changed():
         "1 robot changed in the last night, no alarm yet: r1; "
         "1 robot of these with a joint not judged: r1"
     )
+
+
+def single(*rows):
+    """Return when and how it is said of a joint that it was not as it was in single nights."""
+    return [(one.time[-5:], one.kind, one.text) for one in settled(rows).events]
+
+
+def intermittent(states, effect=0.2, **said):
+    """Return nights of a joint whose faults have this effect."""
+    rows = nights_of(states)
+    for row in rows:
+        if row["state"] != "healthy":
+            row.update(effect=effect, distance=1.0, **said)
+    return rows
+
+
+NEEDS = (
+    "an alarm needs 2 of 3 nights at fault, 3 of 30 with an effect of 0.4, or a change that lasts"
+)
+
+
+def test_a_single_night_at_fault_is_said_and_each_time_that_it_comes_back():
+    """A cable that dropped out every third night was silence, fifteen starts in a row."""
+    one, calm = "fault", ["healthy"] * 3
+    rows = intermittent(["healthy", one, *calm, one, *calm, one], cause="ripple")
+    alone = f"axis 2: at fault in 2026-03-02 alone (effect 0.20, looks like ripple): {NEEDS}"
+    assert single(*rows[:3]) == [("03-02", "fault", alone)]
+    text = (
+        "axis 2: at fault in 3 nights from 2026-03-02 to 2026-03-10 "
+        f"(the last: effect 0.20, looks like ripple): {NEEDS}"
+    )
+    kinds = [("03-02", "fault"), ("03-06", "fault"), ("03-10", "fault")]
+    assert single(*rows) == [(*said, text) for said in kinds]
+    # after a month it is another
+    late = {**rows[1], "night": "2026-05-01", "cause": None}
+    between = [{**rows[0], "night": f"2026-04-{day}"} for day in (29, 30)]
+    assert single(*rows, *between, late)[3] == (
+        "05-01",
+        "fault",
+        f"axis 2: at fault in 2026-05-01 alone (effect 0.20): {NEEDS}",
+    )
+    # a night that was not judged is no healthy one, and one that only changed is the chart's
+    between = {**rows[2], "state": "insufficient-data"}
+    told = single(rows[1], between, {**rows[1], "night": "2026-03-05"})
+    assert [time for time, kind, _ in told if kind == "fault"] == ["03-02", "03-05"]
+    assert single({**rows[1], "state": "changed"}) == []
+
+
+def test_large_faults_that_come_back_are_an_alarm_that_says_so():
+    rows = intermittent((["fault"] + ["healthy"] * 3) * 3, effect=0.5)
+    (alarm,) = settled(rows).alarms
+    assert (alarm.raised, alarm.since) == ("2026-03-09", "2026-03-01")
+    told = [one for one in settled(rows).events if one.kind == "alarm"]
+    assert [one.text for one in told] == [
+        "axis 2: at fault, effect 0.50; comes and goes, in 3 nights until 2026-03-09; "
+        "now at fault level (0.4), no trend"
+    ]
+
+
+def test_what_is_said_of_single_nights_is_not_said_beside_the_alarm_that_they_are_of():
+    alarm = AlarmRow("r1", "", 2, "2026-03-04", "2026-03-03", None, None, "at fault", "{}")
+    joint = JointSummary(2, "", "fault", "2026-03-04", "", 5.0, alarm)
+    robot = RobotSummary("r1", (joint,), NightRow("r1", "2026-03-04", "", "done"))
+    said = [Event(f"2026-03-0{day}", "r1", 2, "fault", f"night {day}") for day in (2, 3)]
+    morning = tell(Summary((robot,)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
+    assert morning.lines == ("r1 night 2",)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from opamc_cli.config.cell import AlarmConfig
-from opamc_cli.decision.trend.alarm import Episode
+from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, nights_to_go
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
@@ -32,18 +32,25 @@ class Watched:
 
 
 def alarm_of(
-    joint: Watched, rows: Sequence[Mapping[str, Any]], found: Episode, signal: int, ended: str
+    joint: Watched,
+    rows: Sequence[Mapping[str, Any]],
+    nights: Sequence[Night],
+    found: Episode,
+    ended: str,
 ) -> tuple[AlarmRow, list[Event]]:
     """Tell an episode of a joint's nights, what is said of it night by night included.
 
-    Its first `signal` came in one of the nights that raised it; it is over in the night `ended`,
-    which is empty where it is not.
+    It is over in the night `ended`, which is empty where it is not.
     """
     first = rows[found.raised]
     robot, axis = first["robot"], first["axis"]
     until = ended or "9999"
     last = sum(row["night"] < until for row in rows)
-    since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], rows[signal])
+    own = _own(nights, found, joint.rule.of)
+    signal = own[0]
+    since = str(rows[signal]["night"])
+    if not found.returns:  # of what comes and goes no curve tells when it began
+        since = _since(rows[max(0, found.raised + 1 - MOST_NIGHTS) : found.raised + 1], since)
 
     def told(night: int) -> tuple[dict[str, Any], str]:
         """Return the trend by what was known in a night, and the words of it."""
@@ -53,18 +60,23 @@ def alarm_of(
         judged_low = rows[night]["state"] in JUDGED and effect < FALLEN * limit
         words = trend_phrase(trend, limit, effect >= limit, judged_low)
         differed = any(row["state"] in ("changed", "fault") for row in rows[signal:night])
-        return trend, f"{_state_phrase(rows[night], differed)}; {words}"
+        parts = [_state_phrase(rows[night], differed), words]
+        if found.returns:
+            parts.insert(1, f"comes and goes, in {len(own)} nights until {first['night']}")
+        if rows[night]["state"] == "healthy":
+            parts.append(_end_phrase(nights[: night + 1], found, joint.rule))
+        return trend, "; ".join(parts)
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)
     # later nights do not change what was said in earlier ones
     said = told(found.raised)[1]
     events = [Event(first["night"], robot, axis, "alarm", f"{joint.name}: {said}")]
-    nights = [row["night"] for row in rows[found.raised : last]]
-    for index in said_in(nights, [""] * len(nights), joint.rule.remind_after)[1:]:
-        if known is None or nights[index] < known.night:
+    dates = [row["night"] for row in rows[found.raised : last]]
+    for index in said_in(dates, [""] * len(dates), joint.rule.remind_after)[1:]:
+        if known is None or dates[index] < known.night:
             said = f"{joint.name}: alarm since {since}; {told(found.raised + index)[1]}"
-            events.append(Event(nights[index], robot, axis, "reminder", said))
+            events.append(Event(dates[index], robot, axis, "reminder", said))
     if ended:
         how = f"no sign of it in {joint.rule.of} judged nights"
         if found.cleared is None:
@@ -105,17 +117,37 @@ def _acknowledged(
     )
 
 
-def _since(until_raised: Sequence[Mapping[str, Any]], signal: Mapping[str, Any]) -> str:
-    """Return the night in which a change began.
+def _own(nights: Sequence[Night], found: Episode, among: int) -> list[int]:
+    """Return the nights that raised an alarm."""
+    judged = [index for index in range(found.raised + 1) if nights[index].judged]
+    if found.returns:
+        return [index for index in judged[-LATELY:] if nights[index].large]
+    return [index for index in judged[-among:] if nights[index].signal]
+
+
+def _end_phrase(nights: Sequence[Night], found: Episode, rule: AlarmConfig) -> str:
+    """Tell what a joint's alarm waits for, now that its last night is healthy."""
+    judged = [one for one in nights if one.judged]
+    more = nights_to_go(judged, rule.nights, rule.of, returns=found.returns)
+    text = f"over after {more} more {'night' if more == 1 else 'nights'} without a sign of it"
+    if judged[-1].signal or not judged[-1].calm:
+        text += " (its distance of late still is one)"
+    elif judged[-1].differs:
+        text += " (a p-value of 0.01 or below is one)"
+    return text
+
+
+def _since(until_raised: Sequence[Mapping[str, Any]], signal: str) -> str:
+    """Return the night in which a change began; `signal` is the first that raised its alarm.
 
     How it goes on after the alarm does not say: a distance grows ever faster, and then slower.
     """
     seen = measured(until_raised)
     if not seen:
-        return str(signal["night"])
+        return signal
     begun = onset(days(seen), distances(seen))
     # a change that was there from the first night on has no before
-    return str(min(seen[begun]["night"], signal["night"]))
+    return min(str(seen[begun]["night"]), signal)
 
 
 def _state_phrase(row: Mapping[str, Any], differed: bool) -> str:

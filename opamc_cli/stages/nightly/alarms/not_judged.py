@@ -1,10 +1,12 @@
-"""What to say of nights that were not judged, or not for sure: not every night the same."""
+"""What to say of nights of which no alarm tells: not every night the same."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
+from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.decision.trend.alarm import LATELY, recurring
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
 from opamc_cli.stages.nightly.alarms.together import kind
 from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
@@ -25,6 +27,56 @@ def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) 
             text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
+
+
+def alone(
+    rows: Sequence[Mapping[str, Any]], name: str, rule: AlarmConfig, fault_effect: float
+) -> Iterator[Event]:
+    """Say of a joint in which nights it was at fault without an alarm.
+
+    Each time that it comes back after other nights, and how often it did within a month. Nights
+    that only changed are left to the chart: of ten healthy robots every second night has one.
+    """
+    needs = (
+        f"an alarm needs {rule.nights} of {rule.of} nights at fault, {recurring(rule.nights)} of "
+        f"{LATELY} with an effect of {fault_effect:g}, or a change that lasts"
+    )
+    for times in _coming_back(rows):
+        nights = [row for run in times for row in run]
+        first, last = nights[0], nights[-1]
+        seen = [] if last["effect"] is None else [f"effect {last['effect']:.2f}"]
+        seen += [f"looks like {last['cause']}"] if last["cause"] else []
+        of, latest = f"{first['night']} alone", ", ".join(seen)
+        if len(nights) > 1:
+            of = f"{len(nights)} nights from {first['night']} to {last['night']}"
+            latest = f"the last: {latest}"
+        text = f"{name}: at fault in {of} ({latest}): {needs}"
+        for run in times:
+            dates = [row["night"] for row in run]
+            kinds = [str(row["cause"]) for row in run]
+            for index in said_in(dates, kinds, rule.remind_after):
+                row = run[index]
+                yield Event(row["night"], row["robot"], row["axis"], "fault", text)
+
+
+def _coming_back(
+    rows: Sequence[Mapping[str, Any]],
+) -> Iterator[list[list[Mapping[str, Any]]]]:
+    """Yield nights at fault, as runs without another, those within a month together."""
+    judged = [row for row in rows if row["state"] in JUDGED]
+    times: list[list[Mapping[str, Any]]] = []
+    for fault, run in groupby(judged, key=_is_own_fault):
+        nights = list(run) if fault else []
+        if nights and times and day(nights[0]["night"]) - day(times[-1][-1]["night"]) > LATELY:
+            yield times
+            times = []
+        times += [nights] if nights else []
+    if times:
+        yield times
+
+
+def _is_own_fault(row: Mapping[str, Any]) -> bool:
+    return row["state"] == "fault" and not row["harmless"]
 
 
 def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:

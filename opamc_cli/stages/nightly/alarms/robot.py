@@ -10,7 +10,13 @@ from opamc_cli.decision.trend.alarm import Night, episodes
 from opamc_cli.decision.trend.chart import CALM, LIMIT
 from opamc_cli.stages.nightly.alarms.alarm import Watched, alarm_of
 from opamc_cli.stages.nightly.alarms.course import JUDGED, chart_of, courses
-from opamc_cli.stages.nightly.alarms.not_judged import excused, failed, not_judged, outside
+from opamc_cli.stages.nightly.alarms.not_judged import (
+    alone,
+    excused,
+    failed,
+    not_judged,
+    outside,
+)
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, NightRow, begun_anew
 
 DIFFERS = 0.01
@@ -65,7 +71,7 @@ def settle_robot(
         name = f"axis {axis}" + (f" in program {program}" if several else "")
         watched = Watched(name, declared, rule, fault_effect, baseline_nights)
         for rows, replaced in courses(joint):
-            seen = _nights(rows, rule, baseline_nights)
+            seen = _nights(rows, rule, fault_effect, baseline_nights)
             for found in episodes(seen, rule.nights, rule.of):
                 raised = rows[found.raised]["night"]
                 if found.cleared is not None:
@@ -73,8 +79,7 @@ def settle_robot(
                 else:
                     # a baseline that was declared is known before a night is judged against it
                     ended = _after_maintenance(raised, nights, declared) or replaced
-                signal = _first_signal(seen, found.raised, rule.of)
-                alarm, said = alarm_of(watched, rows, found, signal, ended)
+                alarm, said = alarm_of(watched, rows, seen, found, ended)
                 alarms.append(alarm)
                 events += said
                 standing += [
@@ -85,6 +90,9 @@ def settle_robot(
         events += not_judged(joint, name, rule.remind_after)
         under = {night for of, at, night in standing if (of, at) == (program, axis)}
         free = [row for row in joint if row["night"] not in under]
+        for rows, _ in courses(joint):
+            for stands, part in groupby(rows, key=lambda row: row["night"] in under):
+                events += [] if stands else alone(list(part), name, rule, fault_effect)
         events += excused(free, name, rule.remind_after)
         events += outside(free, name, rule.remind_after)
     events += failed(robot, nights, rule.remind_after)
@@ -92,7 +100,10 @@ def settle_robot(
 
 
 def _nights(
-    rows: Sequence[Mapping[str, Any]], rule: AlarmConfig, baseline_nights: int
+    rows: Sequence[Mapping[str, Any]],
+    rule: AlarmConfig,
+    fault_effect: float,
+    baseline_nights: int,
 ) -> list[Night]:
     averages = chart_of(rows, baseline_nights)
     found = []
@@ -100,18 +111,19 @@ def _nights(
         # a fault whose cause lies outside the joint is none of it; nights that only changed are
         # left to the chart: by chance a baseline is so even that every tenth night of it differs
         fault = row["state"] == "fault" and not row["harmless"]
-        gross = fault and (row["effect"] or 0.0) > rule.gross
-        signal, calm = fault or average > LIMIT, not average > CALM
+        effect = row["effect"] or 0.0
         p = row["p_value"]
-        differs = p is not None and p <= DIFFERS and not row["harmless"]
-        found.append(Night(signal, gross, differs, calm, judged=row["state"] in JUDGED))
+        found.append(
+            Night(
+                signal=fault or average > LIMIT,
+                large=fault and effect >= fault_effect,
+                gross=fault and effect > rule.gross,
+                differs=p is not None and p <= DIFFERS and not row["harmless"],
+                calm=not average > CALM,
+                judged=row["state"] in JUDGED,
+            )
+        )
     return found
-
-
-def _first_signal(nights: Sequence[Night], raised: int, among: int) -> int:
-    """Return the first of the nights that raised an alarm."""
-    judged = [index for index in range(raised + 1) if nights[index].judged][-among:]
-    return next(index for index in judged if nights[index].signal)
 
 
 def _after_maintenance(

@@ -63,6 +63,7 @@ def render(history: History, summary: Summary) -> str:
         headline=summary.headline(),
         until=nights[-1] if nights else "",
         cards=summary.needing()[:MOST_CARDS],
+        lately=[(robot.name, one) for robot in summary.robots for one in robot.lately][:MOST_CARDS],
         more=max(0, len(summary.needing()) - MOST_CARDS),
         data=_data(history, summary, nights),
     )
