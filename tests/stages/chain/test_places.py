@@ -100,8 +100,9 @@ def test_motions_that_lead_elsewhere_are_not_compared_and_said(tmp_path):
     done = run_chain([tmp_path / "target"], chain[0], tmp_path / "t", reference=done.motions)
     motions = pq.read_table(done.motions)["motion"].to_pylist()
     assert motions == [0, 1, -1, -1, 4, 5] * 5
-    [error] = done.errors
-    assert "10 of 30 motions of axis 1 lead elsewhere" in str(error)
+    zero, edited = done.errors
+    assert "axis 1 has another zero" in str(zero)
+    assert "10 of 30 motions of axis 1 lead elsewhere" in str(edited)
 
 
 def test_a_stroke_that_ends_late_is_told_and_said_unless_the_baseline_knows_it(tmp_path):
