@@ -275,7 +275,8 @@ def _leading_elsewhere(
     """Find motions that lead elsewhere than the reference's, whatever the position's zero.
 
     Where half lead as they should, the others are no motions of the program: their rows, and an
-    error for each axis of a run. Else all are told all the same, with a note.
+    error for each axis of a run. Else all are told all the same, with a note. Another zero of the
+    position is an error, too: a joint that has slipped is not as it was.
     """
     runs, axes, numbers = (np.asarray(motions[name]) for name in ("run", "axis", "motion"))
     left = np.zeros(motions.num_rows, dtype=bool)
@@ -300,9 +301,12 @@ def _leading_elsewhere(
             )
             continue
         if not own.lead_as(known)[row, motion].any():
-            notes.append(
-                f"{part.source.path}: the position of axis {part.axis} has another zero than the "
-                "reference's: was it set anew?"
+            errors.append(
+                InputError(
+                    f"{part.source.path}: the position of axis {part.axis} has another zero than "
+                    "the reference's: was it set anew, or has the joint or its encoder slipped?",
+                    axes=[part.axis],
+                )
             )
         if not same.all():
             left[rows[told[~same]]] = True

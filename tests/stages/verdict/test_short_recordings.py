@@ -138,6 +138,10 @@ def test_a_recording_that_ends_early_is_told():
     assert told("ccx", "ccccc", "ccccc") == [cut.format("2 cycles", "5", 6.9)]
     assert told("c", "ccccc", "cccc") == [cut.format("1 cycle", "4 to 5", 2.9)]
     assert told("cccc", "ccccc", "ccccc") == []
+    # of three cycles, the fourth cut, two are not few; half as many motions are
+    assert told("ccx", "cccxx", "cccxx") == []
+    (said,) = told("ccx", "cccxxx", "cccxxx")
+    assert said.startswith("new: holds 7 segments where the baseline's recordings hold 12 (")
 
 
 @pytest.mark.parametrize(
@@ -165,6 +169,23 @@ def test_cycles_that_the_edges_cut_are_no_other_program():
     assert told("xxcxx", "xxcxx", "cc") == []
     assert told("xxcxx", "ccc", "ccc") != []  # but the recording is cut
     # nor are motions that noise has made
-    assert told("xcxxcxxcx", "ccc", "ccc") == []
+    assert told("xcxxcxxcx/ccc", "ccc", "ccc") == []
+    assert told("xcxxcxxcx", "ccc", "xcxxcxxcx") == []
     # nor is what the baseline's recordings hold as well
     assert told("cxxxcxxx", "cxxxcxxx", "cxxxcxxx") == []
+
+
+def test_a_large_part_is_one_beyond_the_baselines_own():
+    """Waits at random leave half of a stranger's healthy recordings unmatched, in shorter parts."""
+    assert told("xxcccxxxxxx", "xxcccxxxxxx", "ccccc", "ccccc") == []
+    assert told("xxcxxx", "xxcxx", "xxcxx") == []
+    assert told("xxcxxxxxxx", "xxcxx", "xxcxx") != []
+
+
+def test_a_stop_of_most_joints_within_their_cycles_is_told():
+    """A segment that a stop has made is no large part, and no baseline recording holds one."""
+    (said,) = told("cxcc", "ccc", "ccc")
+    assert said.startswith("new: within the cycles of axes 1, 2 segments fit no motion (from 3 s")
+    assert told("cxcc/ccc", "ccc", "ccc") == []
+    assert told("cxcc", "ccc", "ccxc") == []
+    assert told("xcccx", "ccc", "ccc") == []

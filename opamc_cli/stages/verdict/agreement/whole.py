@@ -1,8 +1,8 @@
 """Recordings of which much is missing, or of another program: what is left may look healthy."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from statistics import median
 
 import numpy as np
 import numpy.typing as npt
@@ -12,10 +12,10 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.verdict.agreement.unjudged import Side
 
 FEW_CYCLES = 0.6
-"""Of the fewest that a recording of the baseline holds."""
+"""Of the fewest cycles, or else motions, that a recording of the baseline holds."""
 
 ALIKE = 0.1
-"""Of the cycles, one at least: baseline recordings that differ by more have no usual length."""
+"""Of these, a cycle at least: baseline recordings that differ by more have no usual length."""
 
 MUCH_UNKNOWN = 0.4
 """Share of a recording's segments that fit nothing: about half, of two programs that were glued."""
@@ -26,14 +26,21 @@ class _Held:
     """What one axis of one run holds."""
 
     cycles: int
+    n_motions: int
+    """Of a cycle."""
     n_segments: int
+    n_unfit: int
+    """Segments that fit no motion."""
     n_unknown: int
-    """Segments that fit no motion, a cycle's worth or more of them in a row."""
+    """Of these, a cycle's worth or more in a row."""
+    within_s: float
+    """When the first segment begins that fits nothing between others that fit; inf if none."""
     ends_s: float
 
     @property
-    def unknown(self) -> float:
-        return self.n_unknown / self.n_segments
+    def length(self) -> float:
+        """Its segments in cycles."""
+        return self.n_segments / self.n_motions
 
 
 def not_whole(baseline: Side, target: Side) -> list[InputError]:
@@ -51,40 +58,76 @@ def not_whole(baseline: Side, target: Side) -> list[InputError]:
         known = {
             axis: [own[axis] for own in usual.values() if axis in own] for axis in sorted(axes)
         }
-        odd = [
-            axis
-            for axis, others in known.items()
-            if axes[axis].unknown >= MUCH_UNKNOWN
-            and axes[axis].unknown > 2 * median([own.unknown for own in others] or [0.0])
-        ]
+        odd = [axis for axis, others in known.items() if _much_unknown(axes[axis], others)]
         if odd:
             why, of = _of_another_program(axes, odd), odd
-        elif all(_far_fewer(axes[axis].cycles, others) for axis, others in known.items()):
-            why, of = _cut(axes, known), [*axes]
+        elif cut := _cut(axes, known):
+            why, of = cut, [*axes]
+        elif broken := _broken_off(axes, usual.values()):
+            of, why = broken
         else:
             continue
         errors.append(InputError(f"{paths[run]}: {why}", axes=of))
     return errors
 
 
-def _far_fewer(cycles: int, others: Sequence[_Held]) -> bool:
-    counts = [own.cycles for own in others]
-    if len(counts) < 2 or max(counts) - min(counts) > max(1.0, ALIKE * max(counts)):
+def _much_unknown(own: _Held, others: Sequence[_Held]) -> bool:
+    """Tell whether much fits nothing, more than all that does not in any baseline recording."""
+    share = own.n_unknown / own.n_segments
+    usual = max((one.n_unfit / one.n_segments for one in others), default=0.0)
+    return share >= MUCH_UNKNOWN and share > usual
+
+
+def _far_fewer(own: float, usual: Sequence[float]) -> bool:
+    if len(usual) < 2 or max(usual) - min(usual) > max(1.0, ALIKE * max(usual)):
         return False
-    return cycles <= FEW_CYCLES * min(counts)
+    return own <= FEW_CYCLES * min(usual)
 
 
-def _cut(axes: Mapping[int, _Held], usual: Mapping[int, Sequence[_Held]]) -> str:
+def _cut(axes: Mapping[int, _Held], usual: Mapping[int, Sequence[_Held]]) -> str | None:
+    """Say that all joints hold far fewer cycles, or motions, than in the baseline; None if not.
+
+    Of few cycles the last one may be nearly whole and count as none: motions tell it then.
+    """
     most = max(axes, key=lambda axis: axes[axis].cycles)
-    own, others = axes[most], sorted({one.cycles for one in usual[most]})
-    hold = " to ".join(map(str, dict.fromkeys((others[0], others[-1]))))
+    own, others = axes[most], usual[most]
+    if all(_far_fewer(axes[axis].cycles, [o.cycles for o in usual[axis]]) for axis in axes):
+        what, count, counts = "cycle", own.cycles, [one.cycles for one in others]
+    elif all(_far_fewer(axes[axis].length, [o.length for o in usual[axis]]) for axis in axes):
+        what, count, counts = "segment", own.n_segments, [one.n_segments for one in others]
+    else:
+        return None
+    hold = " to ".join(map(str, dict.fromkeys((min(counts), max(counts)))))
     ends_s = max(one.ends_s for one in axes.values())
-    ended = ends_s < min(one.ends_s for one in usual[most])
+    ended = ends_s < min(one.ends_s for one in others)
     why = f"its motion ends at {ends_s:.3g} s" if ended else "it stands still for longer in between"
     return (
-        f"holds {own.cycles} cycle{'s' * (own.cycles > 1)} where the baseline's recordings hold "
-        f"{hold} ({why})"
+        f"holds {count} {what}{'s' * (count > 1)} where the baseline's recordings hold {hold} "
+        f"({why})"
     )
+
+
+def _broken_off(
+    axes: Mapping[int, _Held], usual: Iterable[Mapping[int, _Held]]
+) -> tuple[list[int], str] | None:
+    """Say that most joints together made motions within their cycles that fit none; None if not.
+
+    One joint alone may creep, or its noise may look like a motion.
+    """
+    odd = _within(axes)
+    if not odd or any(_within(own) for own in usual):
+        return None
+    at_s = min(axes[axis].within_s for axis in odd)
+    return odd, (
+        f"within the cycles of axes {', '.join(map(str, odd))} segments fit no motion (from "
+        f"{at_s:.3g} s on), in no recording of the baseline: did the robot stop there?"
+    )
+
+
+def _within(axes: Mapping[int, _Held]) -> list[int]:
+    """Return the axes that hold what fits nothing between what fits; none if not most do."""
+    odd = [axis for axis, own in axes.items() if math.isfinite(own.within_s)]
+    return odd if len(odd) > max(1, len(axes) / 2) else []
 
 
 def _of_another_program(axes: Mapping[int, _Held], odd: Sequence[int]) -> str:
@@ -100,19 +143,26 @@ def _of_another_program(axes: Mapping[int, _Held], odd: Sequence[int]) -> str:
 
 def _held(motions: pa.Table) -> dict[str, dict[int, _Held]]:
     """Return, by run and axis, what the recordings hold of which any segment fits."""
-    runs, axes, cycle, motion, stop, rate = (
+    runs, axes, cycle, motion, start, stop, rate = (
         np.asarray(motions[name])
-        for name in ("run", "axis", "cycle", "motion", "stop", "sampling_rate_hz")
+        for name in ("run", "axis", "cycle", "motion", "start", "stop", "sampling_rate_hz")
     )
     found: dict[str, dict[int, _Held]] = {}
     for axis in np.unique(axes).tolist():
         for run in np.unique(runs[axes == axis]).tolist():
             own = (axes == axis) & (runs == run)
             if cycle[own].max() >= 0:
+                fits = cycle[own] >= 0
+                inside = ~fits & np.logical_or.accumulate(fits)
+                inside &= np.logical_or.accumulate(fits[::-1])[::-1]
+                n_motions = int(motion[own].max()) + 1
                 found.setdefault(str(run), {})[axis] = _Held(
                     int(cycle[own].max()) + 1,
-                    int(own.sum()),
-                    _unknown(cycle[own] >= 0, int(motion[own].max()) + 1),
+                    n_motions,
+                    fits.size,
+                    int(np.count_nonzero(~fits)),
+                    _unknown(fits, n_motions),
+                    float((start[own] / rate[own])[inside].min(initial=math.inf)),
                     float((stop[own] / rate[own]).max()),
                 )
     return found
