@@ -185,7 +185,7 @@ DERIVED = (
     "SELECT * FROM alarm",
     "SELECT robot, night, status, why FROM night",
     "SELECT robot, time, axis, kind, text FROM event WHERE kind IN ('alarm', 'cleared', "
-    "'not-judged', 'excused', 'failed', 'partial', 'missing')",
+    "'fault', 'not-judged', 'excused', 'failed', 'partial', 'missing')",
 )
 """What follows from files and what was declared."""
 
