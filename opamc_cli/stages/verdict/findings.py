@@ -54,7 +54,7 @@ def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
         found = Findings(
             {int(axis): dict(cause) for axis, cause in content["causes"].items()},
             {int(axis): [str(each) for each in why] for axis, why in content["unjudged"].items()},
-            frozenset(map(int, content["foreign"])),
+            frozenset(map(int, content.get("foreign", ()))),
         )
     except (InputError, ValueError, LookupError, TypeError, AttributeError):
         return Findings()
