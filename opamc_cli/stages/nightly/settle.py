@@ -66,7 +66,11 @@ def settle_cell(
         _settle(cell, source, history, robot, by_robot.get(robot, []), before)
     if whole:
         gone = {one.robot: one.night for one in history.declared() if one.kind == "gone"}
-        history.replace_missing(_missing(by_robot, set(robots), gone, cell.alarm.remind_after))
+        # what left the cell is no other that has files
+        own = {*robots, *(by_robot if cell.robots == "auto" else ())}
+        left = [one for one in history.events() if one.kind == "missing" and one.robot not in own]
+        nights = {robot: by_robot.get(robot, []) for robot in own}
+        history.replace_missing([*left, *_missing(nights, gone, cell.alarm.remind_after)])
     _prune(cell, history)
     named = None if cell.robots == "auto" else tuple(cell.robots)
     by_first_nights = cell.baseline.nights is not None
@@ -148,7 +152,6 @@ def _events_of(
 
 def _missing(
     by_robot: Mapping[str, Sequence[NightRow]],
-    robots: set[str],
     gone: Mapping[str, str],
     remind_after: int,
 ) -> Iterator[Event]:
@@ -158,9 +161,9 @@ def _missing(
     nor is it said of weekdays on which it rests, as long as it has files again after them.
     """
     nights = sorted({night for rows in by_robot.values() for night in _recorded(rows)})
-    for robot in sorted(robots | set(by_robot)):
-        own = {row.night for row in by_robot.get(robot, ()) if row.night}
-        if not own and by_robot.get(robot):
+    for robot in sorted(by_robot):
+        own = {row.night for row in by_robot[robot] if row.night}
+        if not own and by_robot[robot]:
             continue  # all its files tell no night, which is said
         if not own:
             yield Event(nights[0] if nights else "", robot, None, "missing", "no file at all")

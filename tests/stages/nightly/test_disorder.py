@@ -109,7 +109,7 @@ def missing(own, days=70):
         ]
 
     rows = {"r1": nights("r1", own), "r2": nights("r2", range(days))}
-    return [(event.time, event.text) for event in _missing(rows, {"r1", "r2"}, {}, 7)]
+    return [(event.time, event.text) for event in _missing(rows, {}, 7)]
 
 
 def test_the_weekday_on_which_a_robot_rests_is_not_said_for_ever():
@@ -403,6 +403,20 @@ def test_a_robot_whose_only_night_is_gone_lacks_what_others_have(cell, logs, opa
     (logs / "r1" / night(5)).mkdir()
     (logs / "r1" / night(5) / "cycle.parquet").write_text("half a file")
     assert "r3 no file of" in opamc("nightly", cell, "--quiet").out  # r1 was there
+
+
+def test_a_robot_that_left_the_cell_is_none_of_the_others_with_files(cell, logs, opamc):
+    (logs / "r1" / night(5)).mkdir()
+    (logs / "r1" / night(5) / "cycle.parquet").write_text("half a file")
+    rows = (cell.read_text(), "robots: {r1: {}, r2: {}, r3: {}}\n", "robots: {r2: {}, r3: {}}\n")
+    lacking = []
+    for named in rows[1:]:
+        cell.write_text(rows[0] + named)
+        opamc("nightly", cell, "--quiet")
+        with History(cell.parent / "nightly" / "history.sqlite") as history:
+            said = [one for one in history.events() if one.kind == "missing"]
+        lacking.append({one.robot for one in said if night(5) in one.text})
+    assert lacking == [{"r3"}, set()]
 
 
 def test_a_robot_that_the_cell_does_not_name_is_said_once(cell, logs, opamc):
