@@ -11,10 +11,11 @@ from browser import browse, needs_browser
 from opamc_cli.stages.nightly.publish.page import render
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import AlarmRow, MeasureRow, NightRow, VerdictRow
+from opamc_cli.storage.history.rows import AlarmRow, Event, MeasureRow, NightRow, VerdictRow
 
 NIGHTS = [cell_logs.night(index) for index in range(30)]
 NASTY = '</script><b>"r&1'
+SINGLE = f"axis 2: at fault in {NIGHTS[20]} alone (effect 0.40)"
 
 
 def write_history(path: Path, names: list[str]) -> History:
@@ -44,6 +45,7 @@ def write_history(path: Path, names: list[str]) -> History:
         *(names[0], "pick", 3, NIGHTS[12], NIGHTS[9], None, None, "at fault, effect 0.41", "{}")
     )
     history.settle(names[0], [alarm], [("pick", 3, NIGHTS[-1])], [])
+    history.settle(names[2], [], [], [Event(NIGHTS[20], names[2], 2, "fault", SINGLE)])
     return history
 
 
@@ -60,6 +62,9 @@ def test_what_needs_a_look_stands_in_the_page_itself(page):
     text = page.read_text(encoding="utf-8")
     assert "1 joint of 1 robot with an alarm" in text
     assert f"alarm since {NIGHTS[9]}" in text
+    card = text.partition("r3, axis 2</h2>")[2].partition("</article>")[0]
+    assert "at fault in single nights, no alarm" in card
+    assert SINGLE in card
     assert NASTY not in text
     assert not re.search(r"(src|href)=\"https?:", text)
     data = json.loads(re.search(r'id="data">(.*?)</script>', text, re.DOTALL)[1])
