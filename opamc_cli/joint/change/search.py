@@ -64,8 +64,8 @@ class Scale(Effect):
     name = "current_scale"
     domain = "load"
     meaning = (
-        "all of the current in one proportion, friction and load alike: each ampere gives another "
-        "torque (a weakened magnet), or the current is measured, or logged, on another scale"
+        "a current that is all in one proportion to what it was, friction and load alike: magnets "
+        "that have weakened, or a sensor or log of another scale"
     )
     per = ("current",)
     needs = ()

@@ -64,7 +64,7 @@ def test_all_of_the_current_in_one_proportion_is_no_payload():
     (cause,) = causes_of(scaled)
     assert (cause.effect, cause.ties) == ("current_scale", ())
     assert cause.evidence["relative_change"] == pytest.approx(0.15, rel=0.1)
-    assert "each ampere gives another torque" in cause.interpretation
+    assert "magnets that have weakened" in cause.interpretation
     # what one of two causes explains as well, or both better, is none
     assert causes_of(lambda *at: scaled(*at) + 2 * heavy(*at))[0].effect != "current_scale"
     assert causes_of(lambda *at: payload(*at) + 0.5 * thick(*at))[0].effect != "current_scale"
