@@ -34,6 +34,7 @@ EXPECTED = {
     "viscous": "viscous",
     "offset": "offset",
     "position drag": "position_drag",
+    "scale": "current_scale",
 }
 
 

@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 RATE_HZ = 2048.0
 SPEEDS_PERCENT = (100.0, 50.0, 20.0)
 BASELINE_SESSIONS, TARGET_SESSIONS = 6, 2
+SCALE = 1.12
 OTHER_ORDER = 3.3
 """A ripple order that no part of a strain wave gear has."""
 
@@ -50,7 +51,7 @@ class Pair:
 
 ROBOT_CHANGES = (
     "nothing", "flexspline 0.5", "flexspline 1", "colder", "payload", "coulomb", "ripple",
-    "offset",
+    "offset", "scale",
 )  # fmt: skip
 """What happens to the virtual robot's joint between baseline and target."""
 
@@ -114,7 +115,8 @@ def robot_pair(change: str, seed: int) -> Pair:
         return Recording(
             name=f"session-{session:03d}",
             rate_hz=RATE_HZ,
-            phases_a=made.phases_a.astype(np.float64),
+            phases_a=made.phases_a.astype(np.float64)
+            * (SCALE if change == "scale" and after else 1),
             position_rad=made.position_rad,
             temperature_c=made.temperature_c.astype(np.float64),
         )
@@ -135,7 +137,7 @@ def _effect(axis: int, name: str, magnitude: float, **parameters: float) -> Effe
 
 JOINT_CHANGES = (
     "nothing", "tooth", "ripple", "colder", "payload", "coulomb", "viscous", "offset",
-    "position drag",
+    "position drag", "scale",
 )  # fmt: skip
 """What happens to the tests' own joint between baseline and target."""
 
@@ -180,6 +182,7 @@ def joint_pair(change: str, seed: int, position: bool) -> Pair:
         swell = 1.0 + 0.4 * np.sign(v[rows])  # a damaged mesh is felt one way more than the other
         shape = {
             "nothing": 0.0,
+            "scale": (SCALE - 1) * made.current[rows],
             "tooth": 1.5 * noise * swell * np.cos(order * ratio * q[rows] + phase),
             "ripple": 1.5 * noise * np.cos(order * ratio * q[rows] + phase),
             "colder": 0.35 * wet[rows],

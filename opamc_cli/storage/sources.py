@@ -174,6 +174,17 @@ def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource])
     return tuple(notes)
 
 
+def other_conditions(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> str:
+    """Say in a clause under which speed and payload no recording of the baseline was made."""
+    told = []
+    for key, name, unit in (("payload_kg", "payload", "kg"), ("speed_percent", "speed", "%")):
+        own, known = ({getattr(run.info, key) for run in side} for side in (target, baseline))
+        if None not in known and (other := own - known - {None}):
+            here, there = (", ".join(f"{one:g}" for one in sorted(of)) for of in (other, known))
+            told.append(f"the target's {name} is {here} {unit}, the baseline's {there} {unit}")
+    return "; ".join(told)
+
+
 def other_robot(baseline: Sequence[RunSource], target: Sequence[RunSource]) -> str | None:
     """Say that a target is of a robot that the baseline knows nothing of; None where it is not."""
     healthy = {run.info.robot for run in baseline}

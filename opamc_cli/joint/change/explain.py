@@ -8,7 +8,7 @@ from opamc_cli.joint.change.energy import energy_of, rest_growth
 from opamc_cli.joint.change.lines import fast_residuals
 from opamc_cli.joint.change.periodic import find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
-from opamc_cli.joint.change.search import find_slow_causes
+from opamc_cli.joint.change.search import SCALE, find_slow_causes
 from opamc_cli.joint.change.slow import learn, shift_power, with_model
 from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
@@ -84,7 +84,7 @@ def explain_change(
     current and its motion, or three phases; effects of the library, by default the built-in one,
     may be causes; `follow` tells how the baseline's are followed, or remembers it.
     """
-    library = library or built_in_library()
+    library = {SCALE.name: SCALE} | (library or built_in_library())
     cycles = len(baseline) < FEWEST_SESSIONS
     before = read_side(baseline, joint, cycles, follow)
     after = read_side(target, joint, cycles)

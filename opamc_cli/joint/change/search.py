@@ -7,9 +7,10 @@ import numpy as np
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.slow import Population, Shift, left_by, shift_power, shifts
 from opamc_cli.joint.change.units import Compared, own_fit
-from opamc_cli.joint.effects.base import Parameters
+from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
 from opamc_cli.joint.fit.model import Term
+from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.joint.name.search import guessed
 
 NO_CAUSE_OF_CHANGE = frozenset(
@@ -22,7 +23,9 @@ to show."""
 PLACE_BOUND = frozenset({"spring", "hysteresis"})
 """Not sought where the phases alone give the place: it has no zero there."""
 
-EXPECTED = {"payload_change": 0.1, "offset": 0.1, "viscous": 0.4, "coulomb": 0.4}
+EXPECTED = {
+    "payload_change": 0.1, "offset": 0.1, "viscous": 0.4, "coulomb": 0.4, "current_scale": 0.1
+}  # fmt: skip
 """What most often changes, and each one's part of the level: friction differs most from day to day
 and needs the larger parts; payload and offset, where there are any, are seen at once. Of effects
 that explain a change equally well, the first of these is named."""
@@ -54,6 +57,25 @@ STEEPEST_PER_C = 0.06
 
 SMALLEST_WARMTH_C, LARGEST_COLD_FACTOR = 2.0, 2.0
 
+
+class Scale(Effect):
+    """All of the current in one proportion; of two recordings alone is it more than a unit."""
+
+    name = "current_scale"
+    domain = "load"
+    meaning = (
+        "a current that is all in one proportion to what it was, friction and load alike: magnets "
+        "that have weakened, or a sensor or log of another scale"
+    )
+    per = ("current",)
+    needs = ()
+
+    def columns(self, track: Track, parameters: Parameters) -> Floats:
+        """Return the baseline's mean model."""
+        return np.asarray(track.model_a)[:, None]
+
+
+SCALE = Scale()
 LESS_FRICTION = "less friction, and no logged warmth that explains it: a lost preload, or wear-in"
 
 
@@ -192,6 +214,8 @@ def find_slow_causes(
         own = dict(zip(population.names, population.mean, strict=True)).get(last, 0.0)
         if last in FRICTION and own > 0:  # of a negative friction a share says nothing
             cause = replace(cause, evidence={"relative_change": cause.shift.coefficients[-1] / own})
+        if last == SCALE.name:
+            cause = replace(cause, evidence={"relative_change": cause.shift.coefficients[-1]})
         found.append(cause)
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         if cause.effect == "thermal_viscous":
@@ -243,7 +267,8 @@ def _next(
     if not chosen and "viscous" in best and grease.warmer_c is not None and grease.plausible:
         # What is expected of another temperature needs less proof than what is not.
         shift = best["viscous"][1]
-        other = min((p for name, (p, _) in best.items() if name not in FRICTION), default=1.0)
+        others = best.keys() - FRICTION - {SCALE.name}
+        other = min((best[name][0] for name in others), default=1.0)
         if shift.p_value <= PLANNED_P and other >= min(shift.p_value, LARGEST_P):
             return grease.cause(shift, shift.p_value, ("viscous",))
     sure = {name: entry for name, entry in best.items() if entry[0] <= LARGEST_P}
@@ -255,6 +280,21 @@ def _next(
         name: left - float(np.mean(left_by(compared, population, shift)[late]))
         for name, (_, shift) in sure.items()
     }
+    # What friction of both kinds, or another payload, explains as well is no scale; nor is what
+    # both together, which may happen to one joint at another temperature, explain better.
+    scale = gains.pop(SCALE.name, 0.0)
+    both = [term for term in candidates if term.effect.name in ("coulomb", "viscous")]
+    loads = [term for term in candidates if term.effect.name == "payload_change"]
+    if scale > 0 and len(both) == 2 and loads and grease.warmer_c is None:
+        alone, beside = (
+            left - float(np.mean(left_by(compared, population, one)[late]))
+            for first in ((), loads)
+            for one in shifts(compared, population, (*chosen, *first, both[0]), both[1:])
+        )
+        if NEARLY_AS_GOOD * scale > max([*gains.values(), alone]) and scale > AS_GOOD * beside:
+            gains = {SCALE.name: scale}
+    if not gains:
+        return None
     most = max(gains.values())
     usual = float(np.mean(left_by(compared, population)[~late]))
     if most < SMALLEST_GAIN * max(left - usual, 0.0) or most <= 0:
@@ -273,6 +313,8 @@ def _next(
         # Over a short travel another weight looks like a spring, and is what changes.
         ties = ("spring", *(tie for tie in ties if tie != "payload_change"))
         first = "payload_change"
+    if first == "payload_change" and scale >= gains[first]:
+        ties += (SCALE.name,)
     p_value, shift = sure[first]
     parameters = dict(shift.terms[-1].parameters)
     meaning = library[first].interpretation(parameters, compared.track)

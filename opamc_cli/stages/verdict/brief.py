@@ -30,6 +30,10 @@ SMOOTHER = 0.5
 
 GEAR = "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
 
+UNLIKE = (
+    "Record again under the baseline's conditions: {}, which moves a healthy joint's current, too."
+)
+
 
 def brief(
     judgement: Judgement,
@@ -39,10 +43,12 @@ def brief(
     which: str | None = None,
     *,
     in_vain: bool = False,
+    unlike: str = "",
 ) -> dict[str, Any] | None:
     """Return what a maintainer needs of an unhealthy joint; None for any other.
 
-    `which` says which of several target sessions show it; `in_vain`, that a cause was sought.
+    `which` says which of several target sessions show it; `in_vain`, that a cause was sought;
+    `unlike`, which declared conditions are not the baseline's.
 
     Returns
     -------
@@ -53,7 +59,7 @@ def brief(
     if judgement.state not in ("changed", "fault"):
         return None
     return {
-        "inspect": _inspect(cause, judgement, bundle),
+        "inspect": _inspect(cause, judgement, bundle, unlike),
         "evidence": [*([which] if which else []), *_evidence(judgement, bundle, unit)][
             :MOST_EVIDENCE
         ],
@@ -61,7 +67,11 @@ def brief(
     }
 
 
-def _inspect(cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bundle) -> str:
+def _inspect(
+    cause: Mapping[str, Any] | None, judgement: Judgement, bundle: Bundle, unlike: str
+) -> str:
+    if unlike and (cause is None or lies_outside(cause)):
+        return UNLIKE.format(unlike)
     if cause is None:
         if _smoother(judgement, bundle):
             return (

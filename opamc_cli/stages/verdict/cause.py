@@ -19,7 +19,7 @@ from opamc_cli.decision.measurement.sensors import (
 from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import SMALLEST_SHARE, Change, explain_change
 from opamc_cli.joint.change.reading import Cause
-from opamc_cli.joint.change.search import LESS_FRICTION
+from opamc_cli.joint.change.search import LESS_FRICTION, SCALE
 from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
@@ -350,8 +350,9 @@ def _with_sensor(sensor: dict[str, Any], found: dict[str, Any] | None) -> dict[s
         evidence = {**found["evidence"], **sensor["evidence"]}
         return {**found, "evidence": evidence, "why": [*found["why"], *sensor["why"]]}
     rest = [one for one in found["others"] if one["effect"] != sensor["effect"]]
-    # a sum, or spikes, prove it: a gain of 1.3 looks like a payload besides
-    proven = AT_REST not in sensor["evidence"] and lies_outside(found)
+    # a sum, or spikes, prove it: a gain of 1.3 looks like a payload, or all of a scale, besides
+    alike = lies_outside(found) or found["effect"] == SCALE.name
+    proven = AT_REST not in sensor["evidence"] and alike
     if proven or _heard_at_rest(found):
         return {**sensor, "others": [{key: found[key] for key in OF_OTHERS}, *rest]}
     others = [*rest, {key: sensor[key] for key in OF_OTHERS}]

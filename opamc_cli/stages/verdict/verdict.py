@@ -25,7 +25,7 @@ from opamc_cli.stages.verdict.evidence import bundles
 from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.sources import RunSource, current_unit
+from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
@@ -318,6 +318,7 @@ def content(
     pooled = _pooled_features(scored.features)
     sides = (decided.sides.baseline, decided.sides.target)
     unit = current_unit([source for side in sides for source in side.sources])
+    unlike = other_conditions(*(side.sources for side in sides))
     axes = []
     for axis, judgement in decided.judgements.items():
         in_vain = causes.get(axis) == {}
@@ -378,7 +379,9 @@ def content(
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,
                 "cause": None if cause is None else dict(cause),
-                "brief": brief(final, bundle, cause, unit, which or files, in_vain=in_vain),
+                "brief": brief(
+                    *(final, bundle, cause, unit, which or files), in_vain=in_vain, unlike=unlike
+                ),
                 "reasons": said,
             }
         )

@@ -9,7 +9,7 @@ from opamc_cli.joint.change import search
 from opamc_cli.joint.change.search import find_slow_causes
 from opamc_cli.joint.change.slow import learn, with_model
 
-FEW = {name: LIBRARY[name] for name in (
+FEW = {search.SCALE.name: search.SCALE} | {name: LIBRARY[name] for name in (
     "payload_change", "offset", "coulomb", "viscous", "sublinear_friction", "quadratic_friction",
     "spring", "asymmetric_friction", "thermal_viscous",
 )}  # fmt: skip
@@ -27,6 +27,11 @@ def only(*names):
 
 def payload(q, v, a, t):
     return 0.1 * a + 0.3 * np.sin(q) + 0.1 * np.cos(q)
+
+
+def scaled(q, v, a, t):
+    columns = np.stack([a, np.sin(q), np.cos(q), np.sign(v), v, np.ones(q.size)], axis=1)
+    return 0.15 * columns @ COEFFICIENTS
 
 
 def heavy(q, v, a, t):
@@ -53,6 +58,16 @@ def test_another_payload_is_told_from_a_gear():
     assert "check the tool, not the gear" in cause.interpretation
     assert cause.p_value < 1e-3
     np.testing.assert_allclose(cause.shift.coefficients, [0.3, 0.1, 0.1], atol=0.05)
+
+
+def test_all_of_the_current_in_one_proportion_is_no_payload():
+    (cause,) = causes_of(scaled)
+    assert (cause.effect, cause.ties) == ("current_scale", ())
+    assert cause.evidence["relative_change"] == pytest.approx(0.15, rel=0.1)
+    assert "magnets that have weakened" in cause.interpretation
+    # what one of two causes explains as well, or both better, is none
+    assert causes_of(lambda *at: scaled(*at) + 2 * heavy(*at))[0].effect != "current_scale"
+    assert causes_of(lambda *at: payload(*at) + 0.5 * thick(*at))[0].effect != "current_scale"
 
 
 def test_an_offset_is_told():

@@ -10,6 +10,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.verdict.brief import brief
+from opamc_cli.storage.sources import other_conditions
 
 
 @pytest.mark.parametrize(
@@ -54,6 +55,29 @@ def test_a_harmless_cause_of_a_small_part_sends_nobody_away_from_the_gear(
     told = brief(judged, Bundle([], {}), cause | {"explained": explained})
     assert told["inspect"].startswith(first)
     assert "colder grease" in told["inspect"]
+
+
+@pytest.mark.parametrize(
+    ("origin", "first"), [(None, "Record again"), ("load", "Record again"), ("joint", "Inspect")]
+)
+def test_of_declared_conditions_that_differ_a_cause_in_the_joint_alone_comes_first(origin, first):
+    """A healthy joint with three times the payload was to be opened."""
+    runs = [
+        SimpleNamespace(info=SimpleNamespace(payload_kg=kg, speed_percent=speed))
+        for kg, speed in ((1.0, 100.0), (3.0, 100.0), (1.0, None))
+    ]
+    unlike = other_conditions(runs[:1], runs[1:])
+    assert unlike == "the target's payload is 3 kg, the baseline's 1 kg"
+    assert other_conditions(runs[::2], runs[1:2]) == unlike
+    assert other_conditions(runs[:2], runs) == ""
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=0.0
+    )
+    cause = {"effect": "x", "interpretation": "y", "origin": origin, "harmless": False}
+    cause |= {"explained": 0.9}
+    told = brief(judged, Bundle([], {}), cause if origin else None, unlike=unlike)["inspect"]
+    assert told.startswith(first)
+    assert (unlike in told) == (first == "Record again")
 
 
 def test_a_sensor_s_noise_beside_friction_is_told():
