@@ -25,8 +25,7 @@ class AngleLine(Ripple):
         """Strongest orders of the residual, from where smooth functions of the angle end."""
         follows = dict.fromkeys(("speed", "direction", "current"), 1.0)
         lowest = min(0.5 * DEGREES[-1] * track.order_resolution, LOWEST_ORDER[track.angle_kind])
-        lines = order_lines(track, residual, 2, lowest)
-        return [{"order": order, **follows} for order, _ in lines]
+        return [{"order": o, **follows} for o, _ in order_lines(track, residual, 2, lowest)]
 
     # All that a line may follow is explained, at any order, and nothing claimed.
     variants, settled, interpretation = Effect.variants, Effect.settled, Effect.interpretation
