@@ -132,7 +132,7 @@ def close(
         *(str(published(path)) for path in outcome.written),
     )
     for entry in outcome.results:
-        if quiet and (entry["fails"] or entry["unconfirmed"]):
+        if quiet and (entry["fails"] or entry["unconfirmed"] or far_from_noise(entry)):
             output.failure(headline(entry))
     # Nothing may be missing, or something of which the sealed data, or nothing here, tell nothing.
     nothing = [entry for entry in outcome.results if entry["verdict"] == "nothing-missing"]

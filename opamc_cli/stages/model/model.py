@@ -32,7 +32,6 @@ from opamc_cli.stages.model.tables import (
 )
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.stages.recordings.mistaken import scaled
-from opamc_cli.stages.report.wording import far_from_noise
 from opamc_cli.storage.files.atomic import ensure_directory, write_json, write_text
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
@@ -274,11 +273,8 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     laid.notes.extend(doubts)
     laid.read.doubts.extend(doubts)
     added = {id(step.term) for step in loop.steps}
-    entry = loop_entry(laid, loop)
-    if (far := far_from_noise(entry)) is not None:
-        entry["doubts"] = [*entry["doubts"], f"axis {axis}: {far}"]
     return _Closed(
-        entry=entry,
+        entry=loop_entry(laid, loop),
         candidates=[
             candidate_row(axis, number, trial, id(trial.term) in added)
             for number, trial in loop.tried

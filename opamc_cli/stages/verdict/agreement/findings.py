@@ -133,7 +133,6 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
     known = [own for own in measured if own.axis in reference.signal]
     found = _exchanged([own for own in known if own.moves], reference)
     found += _all_scaled([own for own in known if own.moves], reference)
-    found += _all_filtered([own for own in known if own.moves], reference)
     told = {(finding.run, finding.axis) for finding in found}
     for own in known:
         if (own.run, own.axis) in told:
@@ -145,7 +144,9 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
             found.append(Finding(own.run, own.axis, why, of_log=of_log))
         elif not own.moves:
             found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
-    return found
+    told = {(finding.run, finding.axis) for finding in found}
+    rest = [own for own in known if own.moves and (own.run, own.axis) not in told]
+    return found + _all_filtered(rest, reference)
 
 
 def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
