@@ -275,7 +275,7 @@ def _opened(
     worth = 1.0 - PRICE * (not any(step.named for step in steps))
     if steps and rmse_after**2 > worth * rmse_before**2:
         # Functions without a name first, then all: steps are never chosen among by the sealed data.
-        hold = rmse_named <= rmse_before
+        hold = rmse_named**2 <= (1.0 - LEAST_SHARE) * rmse_before**2
         why = "does not hold on the sealed data"
         refused = [replace(one.trial, why_not=why) for one in steps if not (one.named and hold)]
         steps = [one for one in steps if one.named and hold]

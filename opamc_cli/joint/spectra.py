@@ -73,16 +73,18 @@ def order_spectrum(
     return bins.orders, power
 
 
-def order_lines(track: Track, residual: Floats, count: int) -> list[tuple[float, float]]:
+def order_lines(
+    track: Track, residual: Floats, count: int, lowest: float | None = None
+) -> list[tuple[float, float]]:
     """Orders that stand out of the noise with their power, strongest first.
 
-    The `count` strongest peaks, and as many of those that stand out most of their surroundings:
-    orders refined by a parabola over the oversampled spectrum, at least 1.5 resolutions apart, and
-    their power in units of white noise's, where they hold 2 % of the residual's power. The
-    residual, (n,) at the full rate, is zero where samples do not count.
+    The `count` strongest peaks, and as many of those that stand out most of their surroundings,
+    from the `lowest` on that a gear may have: orders refined by a parabola over the oversampled
+    spectrum, at least 1.5 resolutions apart, and their power in units of white noise's, where they
+    hold 2 % of the residual's power. The residual, (n,) at the full rate, is 0 where none counts.
     """
     orders, power = order_spectrum(track, residual, highest_folded(track))
-    lowest = max(LOWEST_ORDER[track.angle_kind], 3 * track.order_resolution)
+    lowest = max(lowest or LOWEST_ORDER[track.angle_kind], 3 * track.order_resolution)
     first = int(np.searchsorted(orders, lowest))
     if orders.size - first < 8:
         return []

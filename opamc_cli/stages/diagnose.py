@@ -27,7 +27,12 @@ from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.schemas.tables import SEGMENTS
-from opamc_cli.storage.sources import RunSource, check_comparable, other_robot
+from opamc_cli.storage.sources import (
+    RunSource,
+    check_comparable,
+    other_conditions,
+    other_robot,
+)
 from opamc_cli.storage.tables import read_table
 
 if TYPE_CHECKING:
@@ -170,7 +175,10 @@ def _diagnose(
     starts_at = config.score.day_starts_at
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), starts_at, kept)
     if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
-        refuse_all(unjudged.axes)
+        refuse_all(
+            unjudged.axes,
+            other_conditions(*(side.sources for side in (sides.baseline, sides.target))),
+        )
     scored = score.compare_sides(sides, config, out, models=models)
     decided = verdict.decide(sides, config)
     differing = decided.differing(config.score) if config.joint.explain else []

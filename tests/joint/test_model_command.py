@@ -106,11 +106,12 @@ def test_what_nothing_explains_far_beyond_the_noise_is_said_also_if_quiet(slow_a
     slow = lfilter([1.0], [1.0, -0.95], slow)
     current += white + slow_a / np.std(slow) * slow
     write_run(tmp_path / "run.parquet", 100.0, axis1_current=current, axis1_position=position)
-    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    code = close(tmp_path, "--quiet", model=MODEL)
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
     assert entry["verdict"] == "nothing-missing"
     said = "that are left beyond noise" in capsys.readouterr().err
     assert said == (entry["before"]["rmse_a"] > 3 * entry["noise_a"]) == (slow_a > 0.05)
+    assert code == (5 if said else 0)
 
 
 @pytest.mark.parametrize("hidden", ["ripple", "quadratic_friction"])

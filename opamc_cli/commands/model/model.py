@@ -107,7 +107,7 @@ def close(
     """Find and add what the declared model lacks; writes loop.json and the extended model."""
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages.model import model as stage
-    from opamc_cli.stages.report.wording import FAR_ABOVE_NOISE, beyond_noise, far_from_noise
+    from opamc_cli.stages.report.wording import far_from_noise
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result
@@ -132,11 +132,11 @@ def close(
         *(str(published(path)) for path in outcome.written),
     )
     for entry in outcome.results:
-        left = beyond_noise(entry, FAR_ABOVE_NOISE) is not None or far_from_noise(entry)
-        if quiet and (entry["fails"] or entry["unconfirmed"] or left):
+        if quiet and (entry["fails"] or entry["unconfirmed"] or far_from_noise(entry)):
             output.failure(headline(entry))
-    # Nothing may be missing, or something of which the sealed data hold nothing.
-    unknown = any(e["unconfirmed"] and e["verdict"] == "nothing-missing" for e in outcome.results)
+    # Nothing may be missing, or something of which the sealed data, or nothing here, tell nothing.
+    nothing = [entry for entry in outcome.results if entry["verdict"] == "nothing-missing"]
+    unknown = any(entry["unconfirmed"] or far_from_noise(entry) for entry in nothing)
     _end(outcome, output, ExitCode.NOT_ENOUGH_DATA if unknown else ExitCode.DONE)
 
 

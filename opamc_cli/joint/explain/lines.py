@@ -6,8 +6,9 @@ from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.coupling import Coupling
 from opamc_cli.joint.effects.mains_hum import MainsHum
 from opamc_cli.joint.effects.ripple import Ripple
+from opamc_cli.joint.explain.unnamed import DEGREES
 from opamc_cli.joint.motion.track import Floats, Track
-from opamc_cli.joint.spectra import LEAST_LINE, line_power, order_lines
+from opamc_cli.joint.spectra import LEAST_LINE, LOWEST_ORDER, line_power, order_lines
 
 LOWEST_HZ = 1.0
 HIGHEST_SHARE = 0.48
@@ -21,9 +22,10 @@ class AngleLine(Ripple):
     meaning = "a line over the angle"
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
-        """Strongest orders of the residual."""
+        """Strongest orders of the residual, from where smooth functions of the angle end."""
         follows = dict.fromkeys(("speed", "direction", "current"), 1.0)
-        return [{"order": order, **follows} for order, _ in order_lines(track, residual, count=2)]
+        lowest = min(0.5 * DEGREES[-1] * track.order_resolution, LOWEST_ORDER[track.angle_kind])
+        return [{"order": o, **follows} for o, _ in order_lines(track, residual, 2, lowest)]
 
     # All that a line may follow is explained, at any order, and nothing claimed.
     variants, settled, interpretation = Effect.variants, Effect.settled, Effect.interpretation

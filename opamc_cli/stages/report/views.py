@@ -56,7 +56,8 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
         "why": list(brief.get("evidence") or shown),
         "against": brief.get("against"),
         "more": [*(shown if brief else ()), *(entry.get("cause") or {}).get("why", ())],
-        "state": entry.get("state", "not judged"),
+        # what conditions as unusual may hide is not seen to be healthy
+        "state": "not told" if entry.get("excused") else entry.get("state", "not judged"),
         "health_index": entry.get("health_index"),
         "p_value": entry.get("p_value"),
         "p_adjusted": entry.get("p_adjusted"),

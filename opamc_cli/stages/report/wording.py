@@ -59,7 +59,7 @@ def headline(verdict: Mapping[str, Any]) -> str:
     phrases = {
         "fault": "at fault",
         "changed": "changed",
-        "insufficient-data": "not judged for want of data",
+        "insufficient-data": "not judged",
         "excused": "not told from unusual conditions",
         "healthy": "healthy",
     }
@@ -352,12 +352,14 @@ def unreliable(entry: Mapping[str, Any]) -> list[str]:
     entry
         One object of loop.json's `axes`.
     """
-    reasons = entry.get("fails"), _sealed_apart(entry), far_from_noise(entry), _unconfirmed(entry)
+    # of nothing missing the headline says it
+    far = far_from_noise(entry) if entry.get("verdict") == "closed" else None
+    reasons = entry.get("fails"), _sealed_apart(entry), far, _unconfirmed(entry)
     return [why for why in reasons if why]
 
 
 def far_from_noise(entry: Mapping[str, Any]) -> str | None:
-    """Return that a loop which is called closed leaves far more than noise, where it does.
+    """Return that a loop of which no more is said to lack leaves far more than noise, if it does.
 
     Parameters
     ----------
@@ -365,7 +367,8 @@ def far_from_noise(entry: Mapping[str, Any]) -> str | None:
         One object of loop.json's `axes`.
     """
     noise, left = entry.get("noise_a"), (entry.get("after") or {}).get("rmse_a")
-    if entry.get("verdict") != "closed" or not noise or not left or left <= FAR_ABOVE_NOISE * noise:
+    whole = entry.get("verdict") in ("closed", "nothing-missing")
+    if not whole or not noise or not left or left <= FAR_ABOVE_NOISE * noise:
         return None
     unit = entry.get("unit", "A")
     return (

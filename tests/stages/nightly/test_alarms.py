@@ -50,6 +50,11 @@ def test_a_joint_that_was_judged_again_is_not_said_to_be_unjudged_since():
         "axis 2: not judged since 2026-03-02 (2 nights in a row): no motion"
     ]
     assert said(lost, judged) == ["axis 2: not judged 2026-03-01: no motion"]
+    (told,) = said(judged, lost, lost, lost)
+    assert told.endswith(
+        "no motion; if that is meant to stay: opamc nightly rebaseline r1 --from 2026-03-02 "
+        "--why TEXT"
+    )
     assert said(lost, lost, judged, lost) == [
         "axis 2: not judged from 2026-03-01 to 2026-03-02 (2 nights in a row): no motion",
         "axis 2: not judged since 2026-03-04: no motion",

@@ -82,7 +82,7 @@ def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
         with History(tmp_path / f"{days}.sqlite") as history:
             for row in [*nights["r1"], *nights["r2"]]:
                 history.record_night(row)
-            history.replace_missing(_missing(nights, {"r1", "r2"}, {}, 7))
+            history.replace_missing(_missing(nights, {}, 7))
             (robot, _) = summarise(history).robots
         assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
 

@@ -69,7 +69,7 @@ def test_an_unhealthy_axis_is_explained() -> None:
         ]
     }
     text = shown(verdict_table(verdict))
-    assert text.startswith("Axis 3 at fault; axis 4 not judged for want of data; axis 1 healthy\n")
+    assert text.startswith("Axis 3 at fault; axis 4 not judged; axis 1 healthy\n")
     assert "✕ fault" in text
     assert "< 0.0001" in text
     assert "axis 3:\n  worse than before" in text
@@ -386,7 +386,7 @@ def test_a_faulty_joint_takes_few_lines() -> None:
 def test_what_is_not_judged_says_why_in_a_line() -> None:
     verdict = {"axes": [axis(1, "healthy"), axis(2, "insufficient-data", reasons=["too short"])]}
     lines = [line.plain for line in verdict_lines(verdict)]
-    assert lines == ["Axis 2 not judged for want of data; axis 1 healthy", "axis 2: too short"]
+    assert lines == ["Axis 2 not judged; axis 1 healthy", "axis 2: too short"]
 
 
 def test_few_baseline_sessions_are_no_proof_of_health() -> None:

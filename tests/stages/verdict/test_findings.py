@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from opamc_cli.stages.verdict.agreement.findings import (
+    _all_filtered,
     _all_scaled,
     _coarser,
     _other_steps,
     _other_unit,
 )
-from opamc_cli.stages.verdict.agreement.measured import _changing, _steps
+from opamc_cli.stages.verdict.agreement.measured import _changing, _noise, _steps
 
 
 @pytest.mark.parametrize(
@@ -104,3 +105,27 @@ def test_a_speed_in_turns_a_minute_is_of_another_unit():
     own = SimpleNamespace(axis=2, size={"velocity": 9.55}, steps=(0.0, 0.0))
     usual = SimpleNamespace(size={(2, "velocity"): 1.0}, steps={2: (0.0, 0.0)})
     assert "another unit (degrees or rpm)" in str(_other_unit(own, usual))
+
+
+@pytest.mark.parametrize(
+    ("smooth", "times", "found"),
+    [
+        ((5, 5, 5), 1.0, True),  # a filter over five samples
+        ((1, 1, 1), 3.0, True),
+        ((5, 5, 1), 1.0, False),  # of two joints alone
+        ((1, 1, 1), 1.5, False),
+    ],
+)
+def test_what_all_currents_lose_or_gain_between_samples_is_no_joint_s(smooth, times, found):
+    """A robot with three times the noise was not judged "for want of data"."""
+    white = np.random.default_rng(5).normal(size=(3, 4000))
+    now = [times * np.convolve(one, np.ones(k) / k) for one, k in zip(white, smooth, strict=True)]
+    axes = [
+        SimpleNamespace(run="r", axis=axis, noise=_noise([one])) for axis, one in enumerate(now)
+    ]
+    usual = SimpleNamespace(noise={axis: _noise([one]) for axis, one in enumerate(white)})
+    told = _all_filtered(axes, usual)
+    assert [one.axis for one in told] == ([0, 1, 2] if found else [])
+    assert all(one.of_log and "another filter in drive or log" in one.why for one in told)
+    assert _all_filtered(axes[:1], usual) == []
+    assert _noise([np.full(9, np.nan)]) == 0.0

@@ -11,6 +11,9 @@ from opamc_cli.stages.nightly.alarms.course import JUDGED, day
 from opamc_cli.stages.nightly.alarms.together import kind
 from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
 
+LASTS = 3
+"""Nights after which what keeps a joint from being judged may have been done to it on purpose."""
+
 
 def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
     """Say of a joint which of its nights were not judged, and why."""
@@ -25,6 +28,9 @@ def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) 
             nights, reasons = ([row[of] for row in streak] for of in ("night", "reason"))
             row = f" ({len(streak)} nights in a row)" if len(streak) > 1 else ""
             text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
+            if last is rows[-1] and len(streak) >= LASTS:
+                again = f"opamc nightly rebaseline {first['robot']} --from {first['night']}"
+                text += f"; if that is meant to stay: {again} --why TEXT"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 

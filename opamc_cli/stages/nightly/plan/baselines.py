@@ -56,7 +56,9 @@ class Baselines:
             if alarm is not None:
                 why = (
                     f"the alarm of {alarm.raised} stands on axis {alarm.axis}: no night under it "
-                    f"becomes part of a baseline, and that of {condition} is not complete"
+                    f"becomes part of a baseline, and that of {condition} is not complete; after "
+                    "a repair, or if it is meant to stay: opamc nightly rebaseline ROBOT --from "
+                    "DATE --why TEXT"
                 )
                 return Comparison(program, condition, targets, missing=why)
             inside = not members or night in members

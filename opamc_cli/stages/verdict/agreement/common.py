@@ -47,15 +47,17 @@ def left_alone(
 ) -> dict[int, tuple[str, ...]]:
     """Return the unhealthy axes that are no surer a fault than most others are, with the reason.
 
-    What another program or log does to most joints it does to all, whether or not each shows it.
+    What another program or log does to most joints it does to all, whether or not each shows it;
+    with half of them gone, too few siblings are left to excuse what is not far out.
 
     `far` are those of `far_together`, `foreign` as in `not_sure`.
     """
     index = {entry["axis"]: entry["health_index"] or 0.0 for entry in verdict["axes"]}
     others = {*far, *foreign}
-    if 2 * len(others) <= len({*index, *foreign}):
+    beyond_half = 2 * len(others) - len({*index, *foreign})
+    if beyond_half < 0 or (beyond_half == 0 and not foreign):
         return {}
-    reach = math.inf if foreign else max(index[axis] for axis in far)
+    reach = max(index[axis] for axis in far) if not foreign else math.inf if beyond_half else FAR
     return {
         entry["axis"]: (_LEFT_ALONE.format(", ".join(map(str, sorted(others)))),)
         for entry in verdict["axes"]
@@ -83,9 +85,9 @@ _COMMON = (
     "check unit, sensors, clock, program, payload and speed, and record again, or a new baseline."
 )
 _LEFT_ALONE = (
-    "It differs from the baseline, but axes {}, most of the robot, cannot be compared or lie as "
-    "far: another program, payload or way of logging changes a joint as a fault does; record again "
-    "as for the baseline, or a new baseline."
+    "It differs from the baseline, but axes {}, half of the robot or more, cannot be compared or "
+    "lie as far: another program, payload or way of logging changes a joint as a fault does; "
+    "record again as for the baseline, or a new baseline."
 )
 _ALONE = (
     "too far to be called healthy, though what was compared does not suffice to call it changed; "

@@ -91,6 +91,7 @@ class Reference:
     returning: Mapping[int, float]
     turning: Mapping[int, float]
     changing: Mapping[int, float]
+    noise: Mapping[int, float]
     steps: Mapping[int, tuple[float, float]]
 
 
@@ -118,6 +119,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.turning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.noise for own in runs]) for axis, runs in by_axis.items()},
         {axis: sorted(own.steps for own in runs)[len(runs) // 2] for axis, runs in by_axis.items()},
     )
 
@@ -142,7 +144,9 @@ def findings(measured: Sequence[Measured], reference: Reference) -> list[Finding
             found.append(Finding(own.run, own.axis, why, of_log=of_log))
         elif not own.moves:
             found.append(Finding(own.run, own.axis, _still(own, reference), at_rest=True))
-    return found
+    told = {(finding.run, finding.axis) for finding in found}
+    rest = [own for own in known if own.moves and (own.run, own.axis) not in told]
+    return found + _all_filtered(rest, reference)
 
 
 def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
@@ -161,7 +165,7 @@ def _exchanged(measured: Sequence[Measured], reference: Reference) -> list[Findi
                     f"{what} {one.axis} and {other.axis} each look like the other: are the two "
                     "exchanged?"
                 )
-                found += [Finding(each.run, each.axis, why) for each in (one, other)]
+                found += [Finding(each.run, each.axis, why, of_log=True) for each in (one, other)]
                 break
     return found
 
@@ -182,6 +186,27 @@ def _all_scaled(measured: Sequence[Measured], reference: Reference) -> list[Find
             "another unit (mA for A)? Check the map of `opamc ingest`, and the sensors"
         )
         found += [Finding(run, own.axis, why) for own in axes]
+    return found
+
+
+def _all_filtered(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
+    """Find recordings of two axes or more all of whose currents are smoother, or all noisier."""
+    found = []
+    for run in sorted({own.run for own in measured}):
+        axes = [own for own in measured if own.run == run]
+        usual = np.array([reference.noise[own.axis] for own in axes])
+        noise = np.array([own.noise for own in axes])
+        if len(axes) < 2 or min(*usual, *noise) <= 0:
+            continue
+        times = noise / usual
+        if times.min() < ALL_SCALED and times.max() > 1 / ALL_SCALED:
+            continue
+        why = (
+            f"what the currents of all its axes change by from sample to sample is "
+            f"{np.median(times):.2g} times the baseline's: another filter in drive or log, or "
+            "another noise, which no joint's fault is"
+        )
+        found += [Finding(run, own.axis, why, of_log=True) for own in axes]
     return found
 
 

@@ -63,6 +63,8 @@ class Measured:
     steps: tuple[float, float]
     """Quantiles 0.01 and 0.05 of the sizes of a current's changes, those of nothing left out: both
     are the converter's step where it is no finer than the noise; of the coarsest column."""
+    noise: float
+    """Median size of a current's second differences, mean of its columns: what a filter takes."""
     frozen: tuple[str, float] | None
     """Column that keeps one value while another swings, and from when on in seconds, or None."""
     leaning: float | None = None
@@ -157,6 +159,7 @@ def _measure(run: Run, axis: int, spans: Sequence[tuple[int, int]]) -> dict[str,
         "steps": max(
             (_steps([look[name] for look in looks]) for name in currents), default=(0.0, 0.0)
         ),
+        "noise": float(np.mean([_noise([look[name] for look in looks]) for name in currents] or 0)),
         "frozen": _frozen(
             run, currents, motion, looks, [start for start, _ in stretches] if spans else []
         ),
@@ -289,6 +292,11 @@ def _steps(parts: Sequence[Floats]) -> tuple[float, float]:
     sizes = sizes[sizes > 0]
     smallest, small = np.quantile(sizes, SMALLEST) if sizes.size else (0.0, 0.0)
     return float(smallest), float(small)
+
+
+def _noise(parts: Sequence[Floats]) -> float:
+    bends = np.concatenate([np.abs(np.diff(part[np.isfinite(part)], 2)) for part in parts])
+    return float(np.median(bends)) if bends.size else 0.0
 
 
 def _changes(parts: Sequence[Floats]) -> Floats:

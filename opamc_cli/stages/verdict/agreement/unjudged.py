@@ -136,8 +136,8 @@ def _but_numbers(why: str) -> str:
     return re.sub(r"\d[\d.]*", "#", why)
 
 
-def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
-    """Refuse a diagnosis of which no axis is left.
+def refuse_all(axes: Mapping[int, Sequence[str]], unlike: str = "") -> None:
+    """Refuse a diagnosis of which no axis is left; `unlike` tells of declared conditions.
 
     Raises
     ------
@@ -146,6 +146,7 @@ def refuse_all(axes: Mapping[int, Sequence[str]]) -> None:
     """
     axis, whys = next(iter(axes.items()))
     others = f"; {len(axes) - 1} more axes likewise" if len(axes) > 1 else ""
+    others += f"; {unlike}" if unlike else ""
     msg = f"no axis can be judged; axis {axis}: {' '.join(whys).rstrip('.')}{others}"
     raise NotEnoughDataError(msg)
 

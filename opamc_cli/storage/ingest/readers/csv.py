@@ -23,6 +23,8 @@ BLOCK_BYTES = 1 << 22
 FIELD_MARK = "\x1f"
 """Stands for a separator of more than one character once the text is rewritten."""
 
+GZIP = b"\x1f\x8b"
+
 _CONVERSION = re.compile(r"column #(\d+): Row #(\d+): .*invalid value '(.*)'", re.DOTALL)
 _WIDTH = re.compile(r"Row #(\d+): Expected (\d+) columns, got (\d+)")
 
@@ -226,6 +228,12 @@ class CsvSource:
         return f"{self.path}: cannot be read as a text table ({first_line})"
 
     def _wrong_encoding(self, error: UnicodeDecodeError) -> InputError:
+        with self.path.open("rb") as raw:
+            compressed = self.path.suffix != ".gz" and raw.read(2) == GZIP
+        if compressed:
+            return InputError(
+                f"{self.path}: is compressed by gzip; give it a name that ends in .gz"
+            )
         return InputError(
             f"{self.path}: is not text in {self._map.encoding} (byte {error.start} cannot be "
             "decoded); set encoding, such as latin-1, in the map"
