@@ -149,13 +149,16 @@ def declared_fit(dataset: Dataset, declared: Declared) -> Fit:
         guesses = effect.guesses(track, np.zeros(track.size)) if fixed else []
         if term is not None or len(guesses) == 1:
             terms[place] = term or Term(effect, guesses[0])
+    searched = sorted(set(range(len(declared))) - set(terms))
     fitted = fit_terms(dataset, tuple(terms[place] for place in sorted(terms)))
-    for place in sorted(set(range(len(declared))) - set(terms)):
-        effect = declared[place][0]
-        chain = chain_of(fitted, 0)
-        found = candidates(chain, Pool.of(dataset, {effect.name: effect}), every=True)
-        if not found:
-            continue
-        terms[place] = found[0].term
-        fitted = fit_terms(fitted.dataset, tuple(terms[key] for key in sorted(terms)))
+    # Of several each once more: the first was searched beside none of the others.
+    for place in searched * min(len(searched), 2):
+        effect, dataset = declared[place][0], fitted.dataset
+        beside = tuple(terms[key] for key in sorted(terms) if key != place)
+        chain = chain_of(fit_terms(dataset, beside) if place in terms else fitted, 0)
+        if found := candidates(chain, Pool.of(dataset, {effect.name: effect}), every=True):
+            kept = terms | {place: found[0].term}
+            other = fit_terms(dataset, tuple(kept[key] for key in sorted(kept)))
+            if place not in terms or _left(other) < _left(fitted):
+                terms, fitted = kept, other
     return fitted

@@ -37,9 +37,9 @@ def unnamed_library() -> dict[str, Effect]:
     return {effect.name: effect for effect in effects}
 
 
-def saturated(start: Chain, pool: Pool, steps: int = MOST_STEPS, enough: float = 0.0) -> Chain:
+def saturated(start: Chain, pool: Pool, steps: int = MOST_STEPS) -> Chain:
     """Explain what the declared model leaves by a pool of unnamed functions, as `beam`."""
-    return beam(start, replace(pool, least_share=PRICE), 1, steps, enough)
+    return beam(start, replace(pool, least_share=PRICE), 1, steps)
 
 
 def with_links(pool: Pool) -> Pool:

@@ -272,19 +272,12 @@ def _is_known(line: Term, parent: Chain) -> bool:
     return sum(rest) < HALF * own * len(rest)
 
 
-def beam(
-    start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS, enough: float = 0.0
-) -> Chain:
-    """Follow `width` chains side by side as far as the score falls, `steps` at most.
-
-    None beyond one that leaves no more than is `enough`, a mean square in A^2.
-    """
+def beam(start: Chain, pool: Pool, width: int = CHAINS, steps: int = MOST_STEPS) -> Chain:
+    """Follow `width` chains side by side as far as the score falls, `steps` at most."""
     chains = [start]
     best, width = start, 1 if "beam" in pool.without else width
     known: set[Signature] = set()
     for _ in range(steps):
-        if best.mean_square <= enough:
-            break
         following = [trial.chain for chain in chains for trial in _possible(chain, pool, known)]
         # One of each kind: two lines, or two places, are one idea.
         kinds: dict[tuple[str, ...], Chain] = {}

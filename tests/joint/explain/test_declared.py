@@ -78,6 +78,24 @@ def test_two_effects_are_searched_one_beside_the_other(dataset):
     assert fit.terms[-1].parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.1)
 
 
+@pytest.mark.parametrize("last", ["load_friction", "stribeck"])
+@pytest.mark.parametrize(("curve", "loaded", "strength"), [(0.5, 1.0, 5.0), (1.0, 0.5, 8.0)])
+def test_each_of_two_is_searched_beside_the_other(curve, loaded, strength, last):
+    """A Stribeck speed of 1.4 rad/s, and half of the inertia, made up for what came after them."""
+
+    def both(q, v, a, t):
+        load = np.sin(q) + 0.4 * np.cos(q) + 0.15 * a
+        return curve * stribeck(q, v, a, t) + loaded * np.sign(v) * np.abs(load)
+
+    (first,) = {"load_friction", "stribeck"} - {last}
+    dataset = plain_fit(joint_of("cyclic", both, strength, rate=100.0)).dataset
+    fit = declared_fit(dataset, declared(first, *BASE, last))
+    parameters = fit.terms[0].parameters | fit.terms[-1].parameters
+    assert parameters["stribeck_speed"] == pytest.approx(0.15, rel=0.05)
+    assert parameters["inertia_share"] == 0.75
+    assert fit.rmse(sealed=True) == pytest.approx(0.02, rel=0.02)
+
+
 def test_an_effect_that_cannot_be_shown_is_left_out(dataset):
     fit = declared_fit(dataset, declared(*BASE, "thermal_viscous", "dead_time"))
     assert names_of(fit)[: len(BASE)] == list(BASE)
