@@ -40,18 +40,6 @@ def test_a_smooth_function_that_no_effect_has_is_explained_in_its_domain(effect,
     assert limit.share == pytest.approx(25 / 26, abs=0.03)
 
 
-def test_nothing_is_explained_beyond_what_is_enough():
-    def both(q, v, a, t):
-        return 5 * np.sign(v) * np.sin(9 * np.abs(v)) + np.sin(7 * q) ** 2
-
-    start, found = explained(joint_of("cyclic", both, strength=5.0, rate=100.0))
-    pool = Pool.of(start.fit.dataset, unnamed_library())
-    first = saturated(start, pool, steps=1)
-    assert found.mean_square < first.mean_square < start.mean_square
-    assert saturated(start, pool, enough=first.mean_square).signature == first.signature
-    assert saturated(start, pool, enough=start.mean_square).added == 0
-
-
 @pytest.mark.parametrize("motion", ["one stroke", "cyclic", "steps of torque"])
 def test_of_pure_noise_nothing_can_be_explained(motion):
     start, found = explained(joint_of(motion, None, rate=100.0))
