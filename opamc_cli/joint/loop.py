@@ -111,6 +111,7 @@ class Loop:
     """Named effects before any was dropped for the error that it raised."""
 
 
+FRICTION = ("quadratic_friction", "asymmetric_friction")
 Anew = Callable[[Fit, Sequence[Term]], Fit | None]
 """Fits the declared model again, to the motion as it is differentiated best beside found terms."""
 
@@ -131,11 +132,16 @@ def close_loop(
     loop = _closed(told or before, library, seed, without_rules, before)
     if told is not None and loop.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.
         return _closed(before, library, seed, without_rules, before)
-    again = anew(loop.before, loop.asked) if anew is not None and loop.asked else None
+    # An open Stribeck curve may have taken up such friction, of which a function is left.
+    left = [s for s in loop.steps if s.term.effect.unnamed and s.term.effect.domain == "velocity"]
+    beside = loop.asked or tuple(Term(library[n], {}) for n in FRICTION if left and n in library)
+    again = anew(loop.before, beside) if anew is not None and beside else None
     if again is None:
         return loop
     other = _closed(again, library, seed, without_rules, before)
-    better = other.after.rmse(sealed=False) < loop.after.rmse(sealed=False)
+    # A name takes the place of a function that leaves hardly less.
+    hardly = 1.0 + PRICE * (bool(other.asked) and not loop.asked)
+    better = other.after.rmse(sealed=False) ** 2 < hardly * loop.after.rmse(sealed=False) ** 2
     return other if better and other.rmse_after_a <= loop.rmse_before_a else loop
 
 

@@ -199,10 +199,8 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         child = _best_with(chain, forms)
         if forms[0].effect.follows_load:
             most = None if child.gain_over(chain)[0] >= pool.least_share else 1
-            before = None
-            while child is not before:
-                before = child
-                child = _best_with(chain, _variants(child.terms[-1])[:most], child)
+            while (new := _best_with(chain, _variants(child.terms[-1])[:most], child)) is not child:
+                child = new
         child = child.in_place()
         found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found

@@ -182,7 +182,11 @@ def _unidentified(identified: identify.IdentifyOutcome) -> list[str]:
         if unidentified:
             missed.setdefault(axis, []).append(unidentified)
     return [
-        f"axis {axis}: {sum(counts)} segments of {len(counts)} runs fit no motion of the "
-        "reference cycle"
+        f"axis {axis}: outside the reference cycle, in {_counted(len(counts), 'run')}: "
+        f"{_counted(sum(counts), 'segment')}"
         for axis, counts in sorted(missed.items())
     ]
+
+
+def _counted(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"
