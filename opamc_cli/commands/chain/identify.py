@@ -36,7 +36,9 @@ def identify(
     from opamc_cli.stages.chain import identify as stage
     from opamc_cli.stages.chain.compared.speeds import of_another_speed
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     with output_lock(out), output.steps() as steps:
         outcome = stage.run(

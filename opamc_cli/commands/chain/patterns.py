@@ -27,8 +27,10 @@ def patterns(
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain import patterns as stage
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     with output_lock(out), result(out, *stage.FILES) as staged, output.steps() as steps:
         outcome = stage.run(

@@ -46,11 +46,13 @@ def score(
     from opamc_cli.stages.chain import score as stage
     from opamc_cli.stages.chain.compared import discriminants
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result
 
     if fault_axes and learn is None:
         msg = "--fault-axis labels rows for training; name the model's file with --learn"
         raise UsageError(msg)
+    forgo_pandas()
     output = Output(as_json, quiet)
     with output_lock(out), result(out, *stage.FILES) as staged:
         outcome = stage.run(

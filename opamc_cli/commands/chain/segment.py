@@ -25,7 +25,9 @@ def segment(
     from opamc_cli.config import load_config
     from opamc_cli.stages.chain import segment as stage
     from opamc_cli.storage.files.lock import output_lock
+    from opamc_cli.storage.files.parquet import forgo_pandas
 
+    forgo_pandas()
     output = Output(as_json, quiet)
     settings = load_config(config, overrides or ())
     with output_lock(out), output.steps() as steps:
