@@ -111,7 +111,7 @@ class Loop:
     """Named effects before any was dropped for the error that it raised."""
 
 
-FRICTION = ("quadratic_friction", "asymmetric_friction")
+TAKEN_UP = ("quadratic_friction", "asymmetric_friction")
 Anew = Callable[[Fit, Sequence[Term]], Fit | None]
 """Fits the declared model again, to the motion as it is differentiated best beside found terms."""
 
@@ -134,7 +134,7 @@ def close_loop(
         return _closed(before, library, seed, without_rules, before)
     # An open Stribeck curve may have taken up such friction, of which a function is left.
     left = [s for s in loop.steps if s.term.effect.unnamed and s.term.effect.domain == "velocity"]
-    beside = loop.asked or tuple(Term(library[n], {}) for n in FRICTION if left and n in library)
+    beside = loop.asked or tuple(Term(library[n], {}) for n in TAKEN_UP if left and n in library)
     again = anew(loop.before, beside) if anew is not None and beside else None
     if again is None:
         return loop

@@ -175,10 +175,8 @@ def _diagnose(
     starts_at = config.score.day_starts_at
     sides = Sides(read_side(normal.patterns), read_side(other.patterns), starts_at, kept)
     if {key[0] for key in sides.rows[0]} <= unjudged.axes.keys():
-        refuse_all(
-            unjudged.axes,
-            other_conditions(*(side.sources for side in (sides.baseline, sides.target))),
-        )
+        unlike = other_conditions(sides.baseline.sources, sides.target.sources)
+        refuse_all(unjudged.axes, unlike)
     scored = score.compare_sides(sides, config, out, models=models)
     decided = verdict.decide(sides, config)
     differing = decided.differing(config.score) if config.joint.explain else []

@@ -59,7 +59,7 @@ SMALLEST_WARMTH_C, LARGEST_COLD_FACTOR = 2.0, 2.0
 
 
 class Scale(Effect):
-    """All of the current in one proportion; of two recordings alone is it more than a unit."""
+    """All of the current in one proportion, which one recording by itself cannot show."""
 
     name = "current_scale"
     domain = "load"
