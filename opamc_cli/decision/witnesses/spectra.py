@@ -170,11 +170,13 @@ def clearest_change(cells: Sequence[SpectrumCell], n_baseline: int) -> BandChang
     BandChange or None
         None for fewer than two baseline sessions.
     """
-    found = clearest_of([cell.sessions for cell in cells], n_baseline, LEAST_VARIANCE)
+    seen = [cell.sessions if cell.limited is None else cell.limited for cell in cells]
+    found = clearest_of(seen, n_baseline, LEAST_VARIANCE)
     if found is None:
         return None
-    number, place, change, _ = found
+    number, place, _, _ = found
     cell = cells[number]
+    change = float(change_between(cell.sessions, n_baseline)[0][place])
     frame, bin_number = divmod(place, cell.bins)
     length = 2 / (cell.frames + 1)
     start = frame / max(cell.frames - 1, 1) * (1 - length)

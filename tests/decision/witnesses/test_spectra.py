@@ -50,6 +50,18 @@ def test_the_clearest_change_is_told_by_place_frequency_and_size():
     assert clearest_change([replace(c, sessions=c.sessions[:2]) for c in own], 1) is None
 
 
+def test_what_is_empty_by_chance_is_not_the_clearest_change():
+    own = spectra(Fleet(n_axes=1, n_motions=1, n_baseline=5), 2)[1][0]
+    grown, empty = 2 * own.bins + 3, 7
+    own.sessions[5:, grown] += 4.0
+    limited = own.sessions.copy()
+    own.sessions[5:, empty] -= 9.0
+    limited[5:, empty] -= 1.0
+    alone, beside = (clearest_change([replace(own, limited=one)], 5) for one in (None, limited))
+    assert alone.size_ratio < 1 < beside.size_ratio
+    assert beside.frequency_hz == (3 + 1) * own.bin_hz
+
+
 @pytest.mark.filterwarnings("error")
 def test_the_typical_size_passes_over_motions_that_a_side_lacks():
     whole = np.zeros((4, 6))
