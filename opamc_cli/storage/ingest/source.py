@@ -1,5 +1,6 @@
 """What a foreign recording offers, whatever its format."""
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,9 @@ Name = int | str
 Array = npt.NDArray[Any]
 Block = dict[str, Array]
 
+RATE_NAMES = frozenset(["fs", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency"])
+"""What the samples per second are called in files, but for case, marks and a unit's "Hz"."""
+
 BLOCK_ROWS = 1 << 16
 """Rows that are in memory at a time: 10 MB for 20 channels."""
 
@@ -32,6 +36,18 @@ class Selection:
     """Column of a two-dimensional dataset."""
     dates: bool = False
     """It holds dates and times as text."""
+
+
+@dataclass(frozen=True)
+class Rate:
+    """Where a file holds the rate of a channel."""
+
+    hz: float
+    """Samples per second."""
+    source: str
+    """What a map calls the value."""
+    unit: str
+    """Its unit: a period's where it is one."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +68,8 @@ class Listed:
     """How many values it has, None where all channels have as many."""
     labels: tuple[str, ...] = ()
     """What each column of a two-dimensional one is, such as the names of joints."""
+    rate: Rate | None = None
+    """As the file declares it, None where it does not."""
 
 
 class Source(Protocol):
@@ -82,6 +100,24 @@ class Source(Protocol):
     def remarks(self) -> list[str]:
         """Sentences on what was left out while reading."""
         ...
+
+
+def declared_rate(values: Mapping[str, Any], place: str = "") -> Rate | None:
+    """Find the samples per second among values of a file, by their names.
+
+    `place` is what comes before a name to make it a source.
+
+    Examples
+    --------
+    >>> declared_rate({"unit": "A", "SampleRate_Hz": 2000}, "motor@")
+    Rate(hz=2000.0, source='motor@SampleRate_Hz', unit='Hz')
+    """
+    for name, value in values.items():
+        plain = re.sub(r"[^a-z]", "", name.lower()).removesuffix("hz")
+        found = np.ravel(np.asarray(value))
+        if plain in RATE_NAMES and found.size == 1 and found.dtype.kind in "fiu" and found[0] > 0:
+            return Rate(float(found[0]), place + name, "Hz")
+    return None
 
 
 def missing_channel(path: Path, source: Name, known: list[str]) -> InputError:

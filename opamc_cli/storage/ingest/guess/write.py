@@ -31,7 +31,7 @@ from opamc_cli.storage.ingest.guess.values import (
 from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
 from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s, is_torque
 from opamc_cli.storage.ingest.opening import open_source
-from opamc_cli.storage.ingest.source import Array, Name, Selection, Source
+from opamc_cli.storage.ingest.source import Array, Name, Rate, Selection, Source
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
 from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED
 
@@ -54,6 +54,8 @@ class _Look:
     unused: list[str]
     repeated: list[str]
     """Names that several columns have."""
+    rate: Rate | None
+    """Where the file declares one of all that was chosen."""
 
 
 @dataclass(frozen=True)
@@ -148,8 +150,10 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         # one of a family that is used is named itself
         unused.append(name if pattern in patterns else pattern)
     rest = [name for name in dict.fromkeys(unused) if "/" not in name[1:]]
-    repeated = [each.repeated for each in listed if each.repeated]
-    return _Look(path, layout, choices, time, values, rest, list(dict.fromkeys(repeated)))
+    repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
+    rates = [each.rate for each in listed if each.name in used]
+    rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
+    return _Look(path, layout, choices, time, values, rest, repeated, rate)
 
 
 def _differ_by_axis(paths: Sequence[Path]) -> bool:
@@ -218,6 +222,10 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
     time = look.time
     stamps = look.values.get(time.source) if time is not None else None
     unit = _time_guess(time, stamps)
+    if time is None and (declared := look.rate) is not None:
+        where = f"{{source: {_quoted(declared.source)}, unit: {declared.unit}}}"
+        line = f"sampling_rate_hz: {where}  # {declared.hz:.6g} Hz in {look.path.name}"
+        return _counted(look, declared.source, declared.hz), [line]
     if time is None or stamps is None:
         return None, ["sampling_rate_hz:  # no channel tells it: write the samples per second"]
     if unit is None:
@@ -229,10 +237,9 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
         lines = [f"{line}  # {unit.why}"]
         if rate is None:
             return None, [*lines, "sampling_rate_hz:  # write how many samples make a second"]
-        counted = np.arange(len(stamps)) / rate
         why = "at this rate the positions agree with the speeds"
-        clock = examine(look.path, time.source, counted, rate, 2.5)
-        return clock, [*lines, f"sampling_rate_hz: {rate:g}  # {why}"]
+        lines.append(f"sampling_rate_hz: {rate:g}  # {why}")
+        return _counted(look, time.source, rate), lines
     clocks = [_examined(look.path, time.source, stamps, unit.unit)]
     clocks += [_clock_of(path, look, time, unit.unit) for path in paths[1:LOOKED_AT_FILES]]
     rates = [clock.sampling_rate_hz for clock in clocks]
@@ -254,6 +261,11 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
         why = told if spread > 0 else "an uneven clock is another one in every recording"
         lines.append(f"resample_hz: {middle:g}  # {why}; runs of one rate can be compared")
     return first, lines
+
+
+def _counted(look: _Look, source: Name, rate_hz: float) -> Clock:
+    count = max(map(len, look.values.values()))
+    return examine(look.path, source, np.arange(count) / rate_hz, rate_hz, 2.5)
 
 
 def _time_guess(time: Meant | None, stamps: Array | None) -> Guess | None:

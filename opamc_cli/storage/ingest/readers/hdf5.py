@@ -14,8 +14,10 @@ from opamc_cli.storage.ingest.source import (
     Block,
     Listed,
     Name,
+    Rate,
     Selection,
     check_lengths,
+    declared_rate,
     missing_channel,
     missing_library,
     samples_of,
@@ -56,6 +58,7 @@ class Hdf5Source:
         self.path = path
         self._file = file
         self._separator = struct_separator
+        self._rates: dict[str, Rate | None] = {}
 
     def channels(self) -> list[Listed]:
         """Return the datasets and record fields that hold numbers, one or two-dimensional."""
@@ -67,7 +70,8 @@ class Hdf5Source:
                 unit = dataset.attrs.get("unit", dataset.attrs.get("units"))
                 width = width_of(tuple(dataset.shape))
                 if width is not False:
-                    listed.append(Listed(name, width, None if unit is None else _text(unit)))
+                    unit = None if unit is None else _text(unit)
+                    listed.append(Listed(name, width, unit, rate=self._rate(dataset)))
         return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
@@ -107,6 +111,18 @@ class Hdf5Source:
             raise InputError(msg)
         first = flat[0]
         return first.decode() if isinstance(first, bytes) else first
+
+    def _rate(self, owner: Any) -> Rate | None:
+        """Where the rate is: an attribute of an object, or in the groups that hold it."""
+        place = owner.name.strip("/").replace("/", self._separator)
+        if place not in self._rates:
+            found = declared_rate(owner.attrs, place + ATTRIBUTE_MARK)
+            if found is None and hasattr(owner, "items"):
+                single = {k: v[()] for k, v in owner.items() if getattr(v, "size", 0) == 1}
+                found = declared_rate(single, place + self._separator * bool(place))
+            outer = found is None and place
+            self._rates[place] = self._rate(owner.parent) if outer else found
+        return self._rates[place]
 
     def _column(self, selection: Selection) -> "_Column":
         dataset, field = self._dataset(selection.source)

@@ -6,6 +6,7 @@ piece per variable, so a variable is read whole; only the variables that the map
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from opamc_cli.storage.ingest.source import (
     Name,
     Selection,
     check_lengths,
+    declared_rate,
     missing_channel,
     samples_of,
     width_of,
@@ -64,6 +66,7 @@ class MatSource:
         """Return the variables and struct fields that hold numbers."""
         self._load(set(self._variables))
         listed: list[Listed] = []
+        single: dict[str, Array] = {}
         names = list(self._variables)
         while names:
             name = names.pop(0)
@@ -75,8 +78,13 @@ class MatSource:
                 width = width_of(values.shape)
                 if width is not False:
                     listed.append(Listed(name, width))
+                elif values.size == 1:
+                    single[name] = values
         self._loaded.clear()
-        return listed
+        fields = [(name.rpartition("."), values) for name, values in single.items()]
+        rates = (declared_rate({name: v}, place + dot) for (place, dot, name), v in fields)
+        rate = next((one for one in rates if one is not None), None)
+        return [replace(one, rate=rate) for one in listed]
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:
         """Yield the selected variables block by block."""

@@ -13,6 +13,7 @@ from opamc_cli.storage.ingest.source import (
     Block,
     Listed,
     Name,
+    Rate,
     Selection,
     check_lengths,
     check_mark,
@@ -20,6 +21,9 @@ from opamc_cli.storage.ingest.source import (
     missing_library,
 )
 from opamc_cli.storage.ingest.time.dates import parse_dates
+
+STEP = "wf_increment"
+"""Property of a channel: seconds from sample to sample."""
 
 
 @contextmanager
@@ -54,10 +58,11 @@ class TdmsSource:
             for channel in group.channels():
                 kind = np.dtype(channel.dtype).kind
                 if kind in "fiuM" and len(channel):
-                    unit = channel.properties.get("unit_string")
-                    listed.append(
-                        Listed(f"{group.name}/{channel.name}", unit=unit, dates=kind == "M")
-                    )
+                    name, own = f"{group.name}/{channel.name}", channel.properties
+                    step_s = float(own.get(STEP, 0.0))
+                    rate = Rate(1 / step_s, f"{name}@{STEP}", "s") if step_s > 0 else None
+                    unit = own.get("unit_string")
+                    listed.append(Listed(name, unit=unit, dates=kind == "M", rate=rate))
         return listed
 
     def blocks(self, selections: Mapping[str, Selection]) -> Iterator[Block]:

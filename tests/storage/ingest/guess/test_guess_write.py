@@ -1,12 +1,17 @@
 """Maps that are guessed for recordings, line by line."""
 
+import h5py
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import scipy.io
+from nptdms import ChannelObject, TdmsWriter
 
 from opamc_cli.__main__ import main
 from opamc_cli.errors import InputError
+from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
+from opamc_cli.storage.ingest.map.load import load_map
 
 
 def table(path, columns, head="", separator=","):
@@ -256,3 +261,50 @@ def test_currents_that_lost_their_sign_are_said(tmp_path):
     assert lines_of(path)[0][5].endswith(
         "negative numbers seem to be 65536 too large: log them as signed"
     )
+
+
+def _with_a_rate(kind, path, rate_hz):
+    """Write one current and its position, and beside them how many samples make a second."""
+    t = np.arange(4000) / rate_hz
+    i, q = 2 * np.sin(7 * t), np.cos(t)
+    if kind == "tdms":
+        step = {"wf_increment": 1 / rate_hz, "wf_start_offset": 0.0}
+        with TdmsWriter(path) as writer:
+            named = (("axis1_current", i), ("axis1_position", q))
+            writer.write_segment([ChannelObject("drive", name, x, step) for name, x in named])
+        return
+    if kind == "mat":
+        content = {"axis1_current": i, "axis1_position": q, "Fs": rate_hz}
+        scipy.io.savemat(path, {"log": content})
+        return
+    with h5py.File(path, "w") as file:
+        file["drive/axis1_current"], file["drive/axis1_position"] = i, q
+        if kind == "attribute":
+            file["drive"].attrs["Sample rate [Hz]"] = rate_hz
+        else:
+            file["sampling_rate"] = rate_hz
+
+
+@pytest.mark.parametrize("kind", ["tdms", "mat", "attribute", "dataset"])
+def test_a_rate_that_the_file_declares_is_pointed_to_and_each_file_tells_its_own(kind, tmp_path):
+    ending = kind if kind in ("tdms", "mat") else "h5"
+    paths = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
+    for path, rate_hz in zip(paths, (500.0, 1000.0), strict=True):
+        _with_a_rate(kind, path, rate_hz)
+    guessed = tmp_path / "map.yaml"
+    guessed.write_text(guess_map(paths))
+    assert "# 500 Hz in one" in guessed.read_text()
+    found = ingest.run(paths, load_map(guessed), tmp_path / "out")
+    assert not found.errors
+    assert [one.sampling_rate_hz for one in found.results] == pytest.approx([500.0, 1000.0])
+
+
+def test_channels_of_two_rates_have_none_that_could_be_pointed_to(tmp_path):
+    path = tmp_path / "r.tdms"
+    x = np.sin(np.arange(4000) / 9)
+    named = (("axis1_current", 1e-3), ("axis1_position", 2e-3))
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [ChannelObject("drive", name, x, {"wf_increment": step}) for name, step in named]
+        )
+    assert "sampling_rate_hz:  #" in guess_map([path])
