@@ -194,7 +194,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             for name, column in channels.columns.items()
         }
         clock = _clock(path, source, channels, declared, selections)
-        blocks: Iterable[Block] = convert(source.blocks(selections), channels)
+        blocks: Iterable[Block] = convert(path, source.blocks(selections), channels)
         if clock is not None and clock.clock.kept is not None:
             blocks = _on_grid(blocks, clock.times_s, clock.clock, channels)
         rate = clock.clock.sampling_rate_hz if clock is not None else cast(float, declared)

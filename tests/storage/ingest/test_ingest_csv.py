@@ -238,7 +238,7 @@ NAMED = GOOD + "sampling_rate_hz: 1\nmetadata: "
         ),
         (
             "sampling_rate_hz: 1\ncolumns: {axis1_a: {source: 0, unit: A, unwrap: true}}",
-            "unwrap is for positions",
+            "unwrap: true is for positions",
         ),
         ("time: {source: 1, unit: samples}\n" + GOOD, "time counts samples"),
         ("time: {source: 1, unit: weeks}\n" + GOOD, "units of time: s, ms, us, ns"),

@@ -25,8 +25,6 @@ AGREE_WITHIN = 0.03
 """Relative difference within which a position's steps agree with a speed: those of logs do to
 0.1 %, to 2 % where the speed is noise to a seventh; radians by rpm are 4.7 % from a tenth."""
 
-UNSIGNED = "negative numbers seem to be 65536 too large: log them as signed"
-
 ANGLE_UNITS = {
     ("rad", "rad/s"): 1.0,
     ("deg", "deg/s"): 1.0,
@@ -62,18 +60,6 @@ def current_unit(largest: float) -> Guess:
     if largest > LARGEST_A:
         return Guess("mA", f"largest {largest:.4g}: too many for amperes")
     return Guess("A", f"largest {largest:.3g}")
-
-
-def is_unsigned(values: Float) -> bool:
-    """Return whether signed numbers of 16 bits were written as unsigned ones.
-
-    Small ones of either sign are then near 0 and near 65 536, and none is in between.
-    """
-    known = values[np.isfinite(values)]
-    if not known.size or float(known.min()) < 0 or float(known.max()) >= 1 << 16:
-        return False
-    quarter = np.unique(known // (1 << 14))
-    return bool(np.all(known == np.round(known))) and list(quarter) == [0, 3]
 
 
 def angle_units(

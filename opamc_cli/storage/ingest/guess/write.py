@@ -10,19 +10,18 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.errors import InputError
+from opamc_cli.storage.ingest.convert import UNSIGNED, quarters_of
 from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
 from opamc_cli.storage.ingest.guess.channels import Choice, choose, time_channel
 from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
 from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.guess.values import (
     MOST_TURNS,
-    UNSIGNED,
     Float,
     Guess,
     angle_units,
     are_phases,
     current_unit,
-    is_unsigned,
     rate_from_speed,
     time_unit,
     turns,
@@ -56,6 +55,8 @@ class _Look:
     """Names that several columns have."""
     rate: Rate | None
     """Where the file declares one of all that was chosen."""
+    unsigned: set[Name | tuple[Name, int]]
+    """Keys of `values` that the file has without their sign."""
 
 
 @dataclass(frozen=True)
@@ -136,10 +137,16 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
             break
         time = time_channel(meant)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
-        values = {
-            (c.source, c.index) if c.index is not None else c.source: _values(source, c)
-            for c in [*chosen, *([time] if time else [])]
-        }
+        values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
+    signed = [
+        _key(channel)
+        for kind, choice in choices.items()
+        if kind in (*CURRENTS, "velocity")
+        for channel in choice.by_axis.values()
+    ]
+    unsigned = {key for key in signed if quarters_of(values[key]) == UNSIGNED}
+    for key in unsigned:
+        values[key] = np.where(values[key] < 1 << 15, values[key], values[key] - (1 << 16))
     taken = [*chosen, *([time] if time else [])]
     used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
     unused = []
@@ -153,7 +160,7 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
     repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
-    return _Look(path, layout, choices, time, values, rest, repeated, rate)
+    return _Look(path, layout, choices, time, values, rest, repeated, rate, unsigned)
 
 
 def _differ_by_axis(paths: Sequence[Path]) -> bool:
@@ -326,12 +333,9 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
                 guess = current_unit(largest)
-                if any(is_unsigned(look.values[_key(each)]) for each in channels.values()):
-                    guess = Guess(guess.unit, f"{guess.why}; {UNSIGNED}")
         declared = next(iter(channels.values())).unit
         if declared and _fits(declared, kind):
-            unsigned = f"; {UNSIGNED}" if guess.why.endswith(UNSIGNED) else ""
-            guess = Guess(declared, f"as the file says; largest {largest:.3g}{unsigned}")
+            guess = Guess(declared, f"as the file says; largest {largest:.3g}")
         why = guess.why
         if kind == "position" and turns(largest, guess.unit) > MOST_TURNS:
             count = turns(largest, guess.unit)
@@ -339,6 +343,8 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
         if choice.passed_over:
             why += f"; not {', '.join(choice.passed_over[:3])}"
         extra = ", unwrap: true" if kind == "position" and wraps(positions, guess.unit) else ""
+        if not look.unsigned.isdisjoint(map(_key, channels.values())):
+            extra, why = ", unwrap: 65536", f"{why}; negative numbers are 65536 too large"
         # A line for all axes asks for as many of every kind.
         all_axes = ", optional: true" if every - channels.keys() else ""
         lines += _lines_of(kind, channels, guess.unit, extra, all_axes, why)

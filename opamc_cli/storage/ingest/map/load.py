@@ -80,8 +80,8 @@ def _check_columns(path: Path, channels: IngestMap) -> None:
                 f"units of a {quantity}: {known_units(quantity)}"
             )
             raise ConfigError(msg)
-        if column.unwrap and quantity != "position":
-            msg = f"{path}: columns.{name}.unwrap is for positions, {name} is a {quantity}"
+        if column.unwrap is True and quantity != "position":
+            msg = f"{path}: columns.{name}.unwrap: true is for positions, {name} is a {quantity}"
             raise ConfigError(msg)
     _check_sources(path, channels)
     _check_currents(path, channels)

@@ -12,6 +12,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
 from opamc_cli.storage.ingest.map.load import load_map
+from opamc_cli.storage.runs.run import Run
 
 
 def table(path, columns, head="", separator=","):
@@ -256,11 +257,17 @@ def test_an_encoding_that_is_given_is_taken(tmp_path, capsys):
         assert stopped.value.code == 2
 
 
-def test_currents_that_lost_their_sign_are_said(tmp_path):
-    path = table(tmp_path / "a.csv", {"t": T, "cur_1": np.mod(np.round(3000 * SPEED), 65536)})
-    assert lines_of(path)[0][5].endswith(
-        "negative numbers seem to be 65536 too large: log them as signed"
-    )
+def test_currents_that_lost_their_sign_get_it_back(tmp_path):
+    current = np.round(-3000 * SPEED)
+    path = table(tmp_path / "a.csv", {"t": T, "cur_1": np.mod(current, 65536)})
+    (line,) = [one for one in lines_of(path)[0] if "cur_1" in one]
+    assert "unit: mA, unwrap: 65536}" in line
+    assert line.endswith("for amperes; negative numbers are 65536 too large")
+    guessed = tmp_path / "map.yaml"
+    guessed.write_text(guess_map([path]))
+    (found,) = ingest.run([path], load_map(guessed), tmp_path / "out").results
+    read = Run(found.run).read(["axis1_current"])["axis1_current"]
+    assert read == pytest.approx(current / 1000)
 
 
 def _with_a_rate(kind, path, rate_hz):

@@ -7,7 +7,6 @@ from opamc_cli.storage.ingest.guess.values import (
     angle_units,
     are_phases,
     current_unit,
-    is_unsigned,
     rate_from_speed,
     time_unit,
     wraps,
@@ -119,14 +118,6 @@ def test_units_by_the_range_alone():
 
 def test_currents_of_more_than_sixty_are_in_milliampere():
     assert (current_unit(60.0).unit, current_unit(60.1).unit) == ("A", "mA")
-
-
-def test_signed_numbers_that_were_written_as_unsigned_are_told():
-    signed = np.round(6000 * np.sin(T))
-    assert is_unsigned(np.mod(signed, 65536))
-    for honest in (signed, np.abs(signed), signed + 32768, np.mod(signed, 65536) + 0.5, 11 * T):
-        assert not is_unsigned(honest)
-    assert not is_unsigned(np.array([np.nan]))
 
 
 def test_rates_are_those_of_loggers():
