@@ -250,10 +250,11 @@ def _fit_tables(result: dict[str, Any]) -> Sequence["RenderableType"]:
         "parameters",
     )
     for term in result["terms"]:
-        known = zip(term["coefficients"], term["units"], term["low"], term["high"], strict=True)
+        ends = zip(term["low"], term["high"], strict=True)
+        spans = ["not known" if low is None else f"{low:.3g} .. {high:.3g}" for low, high in ends]
         each = [
-            f"{value:.4g} {unit} ({low:.3g} .. {high:.3g})".replace("  ", " ")
-            for value, unit, low, high in known
+            f"{value:.4g} {unit} ({span})".replace("  ", " ")
+            for value, unit, span in zip(term["coefficients"], term["units"], spans, strict=True)
         ]
         more = [f"{len(each) - MOST_COEFFICIENTS} more"] if len(each) > MOST_COEFFICIENTS else []
         shown = ", ".join(each[:MOST_COEFFICIENTS] + more)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from opamc_cli.joint.fit.model import Fit
-from opamc_cli.joint.motion.track import Floats
+from opamc_cli.joint.motion.track import Bools, Floats
 from opamc_cli.signal.transform.least_squares import SINGULAR_BELOW, eigenvectors
 
 INSEPARABLE = 0.995
@@ -25,6 +25,8 @@ class Certainty:
     """Of the regressors scaled to unit length."""
     inseparable: tuple[tuple[str, ...], ...]
     """Sets of effects that can replace one another within the data."""
+    one: tuple[tuple[str, ...], ...]
+    """Likewise, of which only the sum is known; their coefficients' errors are infinite."""
 
 
 def certainty(fit: Fit) -> Certainty:
@@ -37,21 +39,24 @@ def certainty(fit: Fit) -> Certainty:
     sums = fit.sums
     gram = sums.gram.sum(axis=0)
     scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
-    scaled = gram / np.outer(scale, scale)
-    inverse = np.linalg.pinv(scaled, rcond=SINGULAR_BELOW, hermitian=True)
+    sizes, vectors = eigenvectors(gram / np.outer(scale, scale))
+    largest = sizes.max(initial=1e-300)
+    unknown = sizes <= SINGULAR_BELOW * largest
+    inverse = (vectors / np.where(unknown, np.inf, sizes)) @ vectors.T
     flat = np.concatenate(fit.coefficients) if fit.coefficients else np.zeros(0)
     units = sums.parts.units
     scores = (1 - sums.parts.others) @ (sums.moment - sums.gram @ flat) / scale
     meat = scores.T @ scores * (units / max(units - 1, 1))
-    covariance = inverse @ meat @ inverse
-    errors = np.sqrt(np.maximum(np.diagonal(covariance), 0.0)) / scale
+    errors = np.sqrt(np.maximum(np.diagonal(inverse @ meat @ inverse), 0.0)) / scale
+    held = _held(vectors)
+    errors[held[:, unknown].any(axis=1)] = np.inf
     widths = [values.size for values in fit.coefficients]
-    sizes = np.linalg.eigvalsh(scaled) if flat.size else np.ones(1)
     return Certainty(
         tuple(np.split(errors, np.cumsum(widths)[:-1])) if widths else (),
         float(stdtrit(max(units - 1, 1), 0.975)),
-        float(np.sqrt(sizes[-1] / max(sizes[0], 1e-16 * sizes[-1]))),
-        _inseparable(scaled, fit, widths),
+        float(np.sqrt(largest / max(sizes.min(initial=largest), 1e-16 * largest))),
+        _sets(fit, held[:, sizes <= 1 - INSEPARABLE]),
+        _sets(fit, held[:, unknown]),
     )
 
 
@@ -70,20 +75,14 @@ def drag_t(fit: Fit) -> float:
     return float(np.mean(drags)) / max(error, 1e-300)
 
 
-def _inseparable(scaled: Floats, fit: Fit, widths: list[int]) -> tuple[tuple[str, ...], ...]:
-    """Small eigenvectors of the scaled products name the terms that cancel in them."""
-    if not widths:
-        return ()
-    owner = np.repeat(np.arange(len(widths)), widths)
-    values, vectors = eigenvectors(scaled)
-    sets: list[tuple[str, ...]] = []
-    for value, vector in zip(values, vectors.T, strict=True):
-        if value > 1 - INSEPARABLE:
-            break
-        weights = vector**2
-        members = {
-            fit.terms[owner[i]].effect.name for i in np.flatnonzero(weights > 0.05 * weights.max())
-        }
-        if len(members) > 1:
-            sets.append(tuple(sorted(members)))
-    return tuple(dict.fromkeys(sets))
+def _held(vectors: Floats) -> Bools:
+    """Mark which coefficients each direction, in columns, is made of; (k, k)."""
+    return np.asarray(vectors**2 > 0.05 * (vectors**2).max(axis=0, initial=0.0))
+
+
+def _sets(fit: Fit, held: Bools) -> tuple[tuple[str, ...], ...]:
+    """Name the terms that cancel in each of some directions, in columns."""
+    sizes = [values.size for values in fit.coefficients]
+    names = np.repeat([term.effect.name for term in fit.terms], sizes)
+    sets = (tuple(sorted(set(names[each].tolist()))) for each in held.T)
+    return tuple(dict.fromkeys(one for one in sets if len(one) > 1))

@@ -74,10 +74,14 @@ def leverage(columns: Floats, root: Floats) -> Floats:
     """Squared distance of regressors, (n, k), from zero per direction that a fit could tell; (n,).
 
     `root`, (any, k), is that of their mean products where they were fitted: there it is 1 on the
-    mean. Directions below 1e-7 of the largest got no coefficient.
+    mean. Directions below 1e-7 of the largest got no coefficient; what lies farther out in one of
+    them than it may have where the fit was made is as far from it.
     """
-    scale = np.maximum(np.linalg.norm(root, axis=0), 1e-300)
+    size = np.linalg.norm(root, axis=0)
+    # What nothing excited there is unknown wherever it is anything.
+    scale = np.where(size > 0, size, 1e-150)
     _, sizes, vectors = np.linalg.svd(root / scale, full_matrices=False)
-    told = sizes**2 > SINGULAR_BELOW * sizes.max(initial=0.0) ** 2
-    whitened = columns @ (vectors[told] / sizes[told, None] / scale).T
+    least = math.sqrt(SINGULAR_BELOW) * sizes.max(initial=0.0)
+    told = sizes > least
+    whitened = columns @ (vectors / np.maximum(sizes, least)[:, None] / scale).T
     return np.asarray(np.sum(whitened**2, axis=1) / max(np.count_nonzero(told), 1))

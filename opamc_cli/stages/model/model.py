@@ -66,6 +66,10 @@ DRIVES = (
     "axis {}: the declared {} drives the joint instead of resisting: it makes up for something "
     "that the model lacks; check its parameters, or give them"
 )
+ONE = (
+    "axis {}: on this motion {} are one: their sum is known, each holds a part of it by chance; "
+    "record it both ways and at other speeds before their values are used"
+)
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
@@ -260,6 +264,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         resists = term.effect.resists and not term.effect.at_a_place and term.parameters
         if resists and values[0] < -DRIVEN_T * errors[0]:
             doubts.append(DRIVES.format(axis, term.effect.name))
+    for names in sure.one:
+        if not any(name.startswith("unnamed") for name in names):
+            laid.notes.append(ONE.format(axis, " and ".join(names)))
     named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and not any(one.others_rad for one in laid.read.recordings):
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)

@@ -68,6 +68,7 @@ def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[s
     ):
         units = term.effect.coefficient_units(term.parameters, len(values), unit)
         for k, (value, error) in enumerate(zip(values, errors, strict=True)):
+            low, high = _interval(value, error, known)
             rows.append(
                 {
                     "axis": axis,
@@ -76,9 +77,9 @@ def fit_rows(axis: int, result: Fit, known: Certainty, unit: str) -> list[dict[s
                     "regressor": k,
                     "coefficient": float(value),
                     "unit": units[k],
-                    "standard_error": float(error),
-                    "low": float(value - known.factor * error),
-                    "high": float(value + known.factor * error),
+                    "standard_error": None if low is None else float(error),
+                    "low": low,
+                    "high": high,
                     "condition_number": known.condition_number,
                     "rmse_a": rmse,
                 }
@@ -103,14 +104,23 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
                 "parameters": shown_parameters(term),
                 "coefficients": [float(value) for value in values],
                 "units": term.effect.coefficient_units(term.parameters, len(values), laid.unit),
-                "low": [float(v - known.factor * e) for v, e in zip(values, errors, strict=True)],
-                "high": [float(v + known.factor * e) for v, e in zip(values, errors, strict=True)],
+                "low": [_interval(v, e, known)[0] for v, e in zip(values, errors, strict=True)],
+                "high": [_interval(v, e, known)[1] for v, e in zip(values, errors, strict=True)],
             }
             for term, values, errors in zip(
                 result.terms, result.coefficients, known.standard_errors, strict=True
             )
         ],
     }
+
+
+def _interval(
+    value: float, error: float, known: Certainty
+) -> tuple[float, float] | tuple[None, None]:
+    """Return the ends of a coefficient's interval; None where the data leave it open."""
+    if not np.isfinite(error):
+        return None, None
+    return float(value - known.factor * error), float(value + known.factor * error)
 
 
 def _groups_entry(dataset: Dataset) -> dict[str, Any]:

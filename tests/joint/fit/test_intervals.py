@@ -1,5 +1,7 @@
 """Standard errors that allow for correlation inside a unit, and terms that cannot be told apart."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closing import joint_of, plain_fit
@@ -63,6 +65,20 @@ def test_terms_that_replace_one_another_are_named():
                                                        {"exponent": 0.999}))))  # fmt: skip
     assert twice.condition_number > 30 * lone.condition_number
     assert twice.inseparable == (("sublinear_friction", "viscous"),)
+
+
+def test_what_is_one_on_the_way_that_a_joint_took_is_not_known():
+    recording = joint_of("cyclic", None, rate=100.0)
+    track, grouping = grouped_track([recording], Joint())
+    terms = [Term(LIBRARY[name], {}) for name in ("inertia", "coulomb", "viscous", "offset")]
+    both = certainty(fit_terms(dataset_of(track, grouping), tuple(terms)))
+    one_way = replace(track, moving=track.moving & (track.direction > 0))
+    alone = certainty(fit_terms(dataset_of(one_way, grouping), tuple(terms)))
+    assert both.one == ()
+    assert alone.one == (("coulomb", "offset"),)
+    assert np.isfinite(np.concatenate(both.standard_errors)).all()
+    known = np.isfinite(np.concatenate(alone.standard_errors))
+    assert known.tolist() == [True, False, True, False]
 
 
 def test_nothing_fitted_is_nothing_to_be_certain_of():

@@ -116,3 +116,12 @@ def test_leverage_is_one_on_the_mean_where_a_fit_was_made():
     np.testing.assert_allclose(found, expected * len(design) / 5, rtol=1e-6)
     np.testing.assert_allclose(leverage(3 * design, root), 9 * found, rtol=1e-9)
     assert leverage(np.zeros((4, 0)), np.zeros((0, 0))).tolist() == [0, 0, 0, 0]
+
+
+def test_leverage_is_large_where_the_fit_has_no_coefficient():
+    forth = np.stack([np.ones(50), np.ones(50), np.zeros(50)], axis=1)
+    root = root_of(forth.T @ forth / len(forth))
+    assert leverage(forth, root) == pytest.approx(1.0)
+    back, more = np.array([[1.0, -1.0, 0.0]]), np.array([[1.0, 1.0, 0.01]])
+    assert leverage(back, root) > 1e6
+    assert leverage(more, root) > 1e6

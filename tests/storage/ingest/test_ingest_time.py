@@ -121,6 +121,13 @@ def test_lost_samples_here_and_there_are_no_other_rate(tmp_path):
     assert item.lost is None
 
 
+def test_samples_lost_close_together_are_no_other_rate(tmp_path):
+    rng = np.random.default_rng(0)
+    stamps = np.delete(np.arange(800) / 1000, 300 + rng.choice(100, 34, replace=False))
+    item = ingested(tmp_path, [(f"{t:.3f}", 1) for t in stamps], "{source: t, unit: s}")
+    assert item.sampling_rate_hz == pytest.approx(1000, rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("stamps", "said"),
     [

@@ -295,14 +295,18 @@ def _refuse_two_rates(
         return
     edges = np.linspace(0, len(step), n_stretches + 1).astype(int)
     typical = float(np.median(step))
+    parts = np.split(step, edges[1:-1])
+    middles = np.array([np.median(part) for part in parts])
     rates = np.array(
         [
-            1.0 / part[part <= max_gap_samples * max(typical, float(np.median(part)))].mean()
-            for part in np.split(step, edges[1:-1])
+            1.0 / part[part <= max_gap_samples * max(typical, middle)].mean()
+            for part, middle in zip(parts, middles, strict=True)
         ]
     )
     fast, slow = int(rates.argmax()), int(rates.argmin())
-    if rates[fast] > ONE_RATE_WITHIN * rates[slow]:
+    # Where samples were lost close together most steps are as long as elsewhere.
+    ratios = rates[fast] / rates[slow], middles[slow] / middles[fast]
+    if min(ratios) > ONE_RATE_WITHIN:
         first, last = sorted((fast, slow))
         between = step[edges[first] : edges[last + 1]]
         change = edges[first] + _change(between, 1.0 / rates[first], 1.0 / rates[last])
