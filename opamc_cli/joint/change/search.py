@@ -313,7 +313,7 @@ def _next(
         # Over a short travel another weight looks like a spring, and is what changes.
         ties = ("spring", *(tie for tie in ties if tie != "payload_change"))
         first = "payload_change"
-    if first == "payload_change" and scale >= gains[first]:
+    if first != SCALE.name and scale >= gains[first]:
         ties += (SCALE.name,)
     p_value, shift = sure[first]
     parameters = dict(shift.terms[-1].parameters)

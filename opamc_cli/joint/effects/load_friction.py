@@ -33,9 +33,9 @@ class LoadFriction(Effect):
         return [{"inertia_share": share} for share in (1.0, 0.5, 0.0)]
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """Give the square of the load in its place, or half of the way to the next guesses."""
-        shares = (parameters["inertia_share"] + way for way in (-0.25, 0.25))
-        near = [{"inertia_share": share} for share in shares if 0 <= share <= 1]
+        """Give the square of the load, or shares half of the way to the next guesses, or nearer."""
+        shares = (parameters["inertia_share"] + way for way in (-0.25, 0.25, -0.1, 0.1))
+        near = [{"inertia_share": min(max(share, 0.0), 1.0)} for share in shares]
         return [(parameters | form, (0,)) for form in ({"exponent": 2.0}, *near)]
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:

@@ -46,7 +46,6 @@ class Smooth(Effect):
         covariate: Covariate,
         modified: str,
         needs: tuple[str, ...] = ("position",),
-        follows_model: bool = False,
         constant: bool = True,
         such_as: str = "",
     ) -> None:
@@ -56,8 +55,8 @@ class Smooth(Effect):
         told = name.replace("_", " ")
         such = f": {such_as}" if such_as else ""
         self.meaning = f"a function of {told}{such}; no effect of the library has its form"
-        self.from_motion = not follows_model
         self.changes_in_time = "revisits" in needs or "temperature" in needs
+        self.from_motion = domain != "load" or self.changes_in_time
         self._told = told
         self._covariate = covariate
         self._modified = MODIFIED[modified]
@@ -181,6 +180,7 @@ def time_since_rest(track: Track) -> Floats:
 
 LATE = "a brake that opens late, or friction after a rest"
 DRIVE = "a drive's dead zone, or less torque from each ampere of a large current"
+POLARITY = "another gain of one polarity"
 WARM, AGAIN = ("position", "temperature"), ("position", "revisits")
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), "direction"),
@@ -189,11 +189,10 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, "direction"),
     Smooth("angle_and_speed", "joint-angle", lambda t: t.position_rad, "speed"),
     Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, "direction"),
-    Smooth("load", "load", lambda t: np.abs(t.load_a), "direction", follows_model=True),
+    Smooth("load", "load", lambda t: np.abs(t.load_a), "direction"),
     Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),
-    Smooth(
-        "current", "load", lambda t: np.abs(t.model_a), "sign", follows_model=True, such_as=DRIVE
-    ),
+    Smooth("current", "load", lambda t: np.abs(t.model_a), "sign", such_as=DRIVE),
+    Smooth("size_of_current", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
     Smooth("time", "time", lambda t: t.time_s, "one", AGAIN),
     Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", AGAIN),

@@ -21,6 +21,7 @@ from opamc_cli.signal.motion.smoothing import (
     derivatives,
     measurement_noise,
     noise_gain,
+    quietened,
     smoothing_window,
     taken_noise_gain,
     unstepped,
@@ -165,6 +166,7 @@ def motion_from_velocity(velocity_rad_s: Floats, rate_hz: float) -> Motion:
 def _smoothed(path: Floats, rate_hz: float, window: int, derivative: int) -> Motion:
     """Motion by local polynomials of a position (derivative 2), or of a speed (1): no position."""
     values = [derivatives(path, rate_hz, window, order) for order in range(derivative + 1)]
+    values[-1] = quietened(path, values[-1], rate_hz, window, derivative)
     noise = measurement_noise(path)
     return Motion(
         position_rad=values[0],

@@ -37,6 +37,9 @@ LEAST_SHARE = 0.05
 function without a name, scores that differ by less do not differ."""
 MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
+COARSE = 3
+"""Forms of a load's friction beside each guess; nearer shares of the inertia are for one that is
+found: beside a Stribeck curve that is not, they keep it wrong."""
 TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
 
@@ -116,7 +119,8 @@ def guessed(effect: Effect, dataset: Dataset) -> list[Term]:
     """Every guess of a slow effect, and the smaller forms of each."""
     track = dataset.coarse.track
     terms = [Term(effect, parameters) for parameters in effect.guesses(track, np.zeros(track.size))]
-    return [form for term in terms for form in (term, *_variants(term))]
+    most = COARSE if effect.follows_load else None
+    return [form for term in terms for form in (term, *_variants(term)[:most])]
 
 
 def _variants(term: Term) -> list[Term]:

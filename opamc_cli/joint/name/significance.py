@@ -24,7 +24,7 @@ def p_value(t_value: float, n_parts: int) -> float:
 
 
 def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
-    """Largest held-out gain of an effect on a fit's residual with random signs of its units.
+    """Largest held-out gain of an effect on a fit's residual with half of its units turned.
 
     Share of the residual's sum of squares; mostly below 0.
     """
@@ -38,7 +38,7 @@ def decoy_gain(fit: Fit, term: Term, seed: int) -> float:
     draw = np.random.default_rng(seed)
     gains = []
     for _ in range(DECOYS):
-        signs = draw.choice([-1.0, 1.0], size=fine.units)[fine.unit]
+        signs = draw.permutation(np.resize([-1.0, 1.0], fine.units))[fine.unit]
         left = Sums(gram, moment * signs[:, None], power, fine, np.zeros(gram.shape[-1])).held_out()
         gains.append(1.0 - float(left.sum()) / max(float(power.sum()), 1e-300))
     return max(gains)

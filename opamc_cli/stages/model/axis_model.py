@@ -260,8 +260,7 @@ def _too_little_motion(
         return NotEnoughDataError(msg)
     moving = np.count_nonzero(track.moving)
     msg = (
-        f"{named}: axis {axis} moves for {moving / track.rate_hz:.2g} s in all ({moving} samples), "
-        f"too little to seal a part off; record at least "
-        f"{FEWEST_MOVING / track.rate_hz:.2g} s of motion ({FEWEST_MOVING} samples)"
+        f"{named}: axis {axis} moves in {moving} samples ({moving / track.rate_hz:.3g} s) in all, "
+        f"too few to seal a part off: record at least {FEWEST_MOVING}"
     )
     return NotEnoughDataError(msg)

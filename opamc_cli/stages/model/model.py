@@ -70,6 +70,7 @@ ONE = (
     "axis {}: on this motion {} are one: their sum is known, each holds a part of it by chance; "
     "record it both ways and at other speeds before their values are used"
 )
+ONCE = "axis {}: no place is passed again, so friction at one may be whatever came at that time"
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
@@ -267,6 +268,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     for names in sure.one:
         if not any(name.startswith("unnamed") for name in names):
             laid.notes.append(ONE.format(axis, " and ".join(names)))
+    track = loop.after.dataset.fine.track
+    if "position_drag" in found and "revisits" not in track.channels:
+        laid.notes.append(ONCE.format(axis))
     named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and not any(one.others_rad for one in laid.read.recordings):
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)

@@ -80,11 +80,10 @@ def _inspect(
             )
         return GEAR
     meaning = cause.get("interpretation") or cause.get("effect")
-    if lies_outside(cause):
-        if excuses_little(cause):
-            return f"{GEAR} {SMALLER_PART.format(meaning)}"
-        return f"Check before the gear: {meaning}."
-    return f"Inspect the joint for {meaning}."
+    outside = lies_outside(cause)
+    if excuses_little(cause) if outside else explains_little(cause):
+        return f"{GEAR} {SMALLER_PART.format(meaning)}"
+    return f"Check before the gear: {meaning}." if outside else f"Inspect the joint for {meaning}."
 
 
 def _smoother(judgement: Judgement, bundle: Bundle) -> bool:

@@ -129,9 +129,8 @@ class Decided:
         if not 0 < len(bad) < len(each):
             return None
         shown = ", ".join(self.sides.sessions[1].named(session) for session in bad)
-        if axis in self.alone and len(bad) == 1:
-            return f"Of {len(each)} target sessions only {shown} shows it by itself."
-        return f"At fault by itself, of {len(each)} target sessions: {shown}."
+        shows = "shows it by itself" if len(bad) == 1 else "show it by themselves"
+        return f"Of {len(each)} target sessions only {shown} {shows}."
 
     def files_apart(self, axis: int) -> str | None:
         """Say which of the target's files differ from the others; None if none or all do."""

@@ -98,11 +98,20 @@ def test_numbers_in_few_digits(value: object, text: str) -> None:
 
 
 def test_the_headline_tells_which_joint_shakes_the_others() -> None:
-    for index, said in ((20.1, " (axis 2 by far the most: look there first)"), (20.0, "")):
+    for index, said in ((101.0, " (axis 2 by far the most: look there first)"), (100.0, "")):
         axes = [(1, "fault", 10.0), (2, "fault", index), (3, "healthy", 0.1)]
         found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
         said_of = wording.headline({"axes": found})
         assert said_of == f"Axes 1 and 2 at fault{said}; axis 3 healthy"
+
+
+def test_one_joint_shakes_the_others_whatever_they_are_called() -> None:
+    axes = [(1, "fault", 3e7), (2, "changed", 700.0), (3, "changed", 3600.0)]
+    found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
+    said = wording.headline({"axes": found})
+    assert (
+        said == "Axis 1 at fault (axis 1 by far the most: look there first); axes 2 and 3 changed"
+    )
 
 
 def test_the_headline_tells_the_worst_first() -> None:

@@ -111,7 +111,7 @@ def trend_phrase(
     soon, late = reach
     when = f"{soon} to {late} nights"
     if late > MOST_AHEAD * max(soon, 1):
-        when = f"{soon} nights at the earliest"
+        when = f"{max(soon, 1)} night{'s' * (soon > 1)} at the earliest"
     return (
         f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
         f"night, reaches {level} in {when}"

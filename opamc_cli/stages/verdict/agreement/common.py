@@ -95,6 +95,6 @@ _ALONE = (
 )
 _SMALL = (
     "too far to be called healthy, but what changed for certain is {:.1%}, less than "
-    "score.minimum_effect ({:.1%}); check its sensor's gain and its payload, and lower that limit "
-    "to have it called changed, or record a new baseline if it is meant to stay."
+    "score.minimum_effect ({:.1%}); check its friction, its sensor's gain and its payload, and "
+    "lower that limit to have it called changed, or record a new baseline if it is meant to stay."
 )
