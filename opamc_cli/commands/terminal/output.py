@@ -78,8 +78,10 @@ class Output:
         for failure in failures:
             self.failure(failure)
         if failures and n_done:
-            count = f"{len(failures)} failure{'s' * (len(failures) > 1)}"
-            self.note(f"{count}; all else of {n_done} run{'s' * (n_done > 1)} is done")
+            self.note(
+                f"not used, or in part: {len(failures)}; all else of {n_done} "
+                f"run{'s' * (n_done > 1)} is done"
+            )
             return ExitCode.PARTIAL
         return ExitCode.BAD_INPUT if failures else ExitCode.DONE
 

@@ -38,8 +38,7 @@ function without a name, scores that differ by less do not differ."""
 MOST_STEPS = 16
 """Effects added at most; a measured joint has six lines."""
 COARSE = 3
-"""Forms of a load's friction beside each guess; nearer shares of the inertia are for one that is
-found: beside a Stribeck curve that is not, they keep it wrong."""
+"""Forms of a load's friction beside each guess; nearer shares are for one that is found."""
 TRIED = 4
 """Candidates of a chain that are refined, and fitted jointly: the work of a round is bounded."""
 
@@ -202,9 +201,11 @@ def trials(chain: Chain, pool: Pool, known: set[Signature] | None = None) -> lis
         tried |= signatures
         child = _best_with(chain, forms)
         if forms[0].effect.follows_load:
-            most = None if child.gain_over(chain)[0] >= pool.least_share else 1
-            while (new := _best_with(chain, _variants(child.terms[-1])[:most], child)) is not child:
-                child = new
+            worth = child.gain_over(chain)[0] >= pool.least_share
+            for some in (slice(COARSE), slice(COARSE, None)) if worth else (slice(1),):
+                following = _variants(child.terms[-1])[some]
+                while (new := _best_with(chain, following, child)) is not child:
+                    child, following = new, _variants(new.terms[-1])[some]
         child = child.in_place()
         found.append(Trial.of(chain, child, objection(child, chain, pool)))
     return found

@@ -78,8 +78,7 @@ def worth_their_price(chain: Chain) -> Chain:
 def lowering(chain: Chain) -> Chain:
     """Drop what takes less than PRICE off the mean square error of all open samples, least first.
 
-    Beside corners what is fitted clear of them may raise it (a wind-up by a half); and where one
-    part tells a term alone, leaving that out promises what is none: 63 % of nothing.
+    Beside corners it may rise, and a part that alone tells of a term is extrapolated if left out.
     """
     error = chain.fit.rmse(sealed=False)
     while chain.added:

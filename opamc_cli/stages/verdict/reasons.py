@@ -66,7 +66,7 @@ IN_VAIN = (
     "of a bearing have none of their own there)."
 )
 CANNOT_TELL = (
-    "The current says that the torque's course has changed, not what changed it: another payload, "
+    "The current says that the torque has changed, not what changed it: another payload, "
     "program, controller gain or temperature changes it too. Repeat the recording under the "
     "baseline's conditions before taking the joint apart."
 )
@@ -202,7 +202,7 @@ def _change(
             ]
         first = f"A change {_why_spared(judgement, limits)}: {distance}; keep an eye on it."
     else:
-        first = f"The course of the torque has changed: {distance}."
+        first = f"The torque has changed: {distance}."
     return [
         first,
         _pattern_change(judgement, cells, motions),
