@@ -34,7 +34,7 @@ ADVICE = (
     ),
     (
         {"ripple", "sensor_offset", "sensor_gain", "dead_time"},
-        "log all three phase currents together with the position",
+        "log all three phases with the position, also while a load is held still at several angles",
     ),
     (
         {"ripple", "mains_hum", "elasticity"},

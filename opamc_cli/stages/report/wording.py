@@ -382,7 +382,8 @@ def far_from_noise(entry: Mapping[str, Any]) -> str | None:
 
 def _unconfirmed(entry: Mapping[str, Any]) -> str | None:
     gains = {one.get("effect"): one.get("gain", 0.0) for one in entry.get("rejected", ())}
-    told = [f"{n} ({gains.get(n, 0.0):.0%} of the error)" for n in entry.get("unconfirmed", ())]
+    names = dict.fromkeys(entry.get("unconfirmed", ()))
+    told = [f"{n} ({gains.get(n, 0.0):.0%} of the error)" for n in names]
     if not told:
         return None
     return (
