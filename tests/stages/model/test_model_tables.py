@@ -14,7 +14,7 @@ from opamc_cli.stages.model.tables import ADVICE, MEANINGS, separating_experimen
         ("coulomb", ("stribeck",), "at more speeds, from a fiftieth"),
         ("viscous", ("warmup",), "already warm"),
         ("viscous", ("coulomb",), "at more speeds, from a fiftieth"),
-        ("ripple", ("sensor_gain",), "all three phase currents"),
+        ("ripple", ("sensor_gain",), "all three phases"),
         ("ripple", ("mains_hum",), "at another speed"),
         ("elasticity", ("inertia",), "other accelerations"),
         ("spring", ("coulomb", "gravity"), "more of the travel, through every place"),
