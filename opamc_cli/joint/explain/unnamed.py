@@ -192,7 +192,7 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("load", "load", lambda t: np.abs(t.load_a), "direction"),
     Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),
     Smooth("current", "load", lambda t: np.abs(t.model_a), "sign", such_as=DRIVE),
-    Smooth("size_of_current", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),
+    Smooth("current_size", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
     Smooth("time", "time", lambda t: t.time_s, "one", AGAIN),
     Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", AGAIN),
