@@ -50,11 +50,14 @@ def aligned_windows(agree: Bools, extra: Bools, optional: Bools) -> Ints:
     """
     m, n = agree.shape
     windows = np.full((m, n), MISSING, dtype=np.int64)
-    for start in range(m):
+    begins = agree[:, :1].any(axis=1) | optional[:1].any()
+    for start in np.flatnonzero(begins).tolist():
         # by the segment that is next: what each motion so far is
         states: Mapping[int, tuple[int, ...]] = {start: ()}
         for motion in range(n):
             states = _with_motion(states, start, agree[:, motion], extra, bool(optional[motion]))
+            if not states:
+                break
         if states:
             stop = min(states, key=lambda stop: (-_found(states[stop]), stop))
             if 2 * _found(states[stop]) > n:

@@ -3,6 +3,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from opamc_cli.signal.cycles import alignment
 from opamc_cli.signal.cycles.alignment import MISSING, SMALL, aligned_windows, small
 from opamc_cli.signal.cycles.features import SegmentFeatures
 
@@ -64,3 +65,17 @@ def test_small_is_a_share_of_the_middle_way():
 
 def test_no_segments_have_no_windows():
     assert aligned_windows(np.ones((0, 3), bool), np.ones(0, bool), np.ones(3, bool)).size == 0
+
+
+def test_a_window_that_ends_is_not_followed_to_the_end_of_the_cycle(monkeypatch):
+    """A cycle of 157 motions that nothing holds took four minutes of a diagnosis."""
+    agree = np.zeros((150, 120), dtype=bool)
+    agree[7, 0] = agree[9, 3] = True
+    calls = []
+    followed = alignment._with_motion
+    monkeypatch.setattr(
+        alignment, "_with_motion", lambda *given: calls.append(1) or followed(*given)
+    )
+    windows = alignment.aligned_windows(agree, np.zeros(150, dtype=bool), np.zeros(120, dtype=bool))
+    assert (windows == alignment.MISSING).all()
+    assert len(calls) == 2
