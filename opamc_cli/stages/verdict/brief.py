@@ -81,7 +81,8 @@ def _inspect(
         return GEAR
     meaning = cause.get("interpretation") or cause.get("effect")
     outside = lies_outside(cause)
-    if excuses_little(cause) if outside else explains_little(cause):
+    little = excuses_little(cause) if outside else explains_little(cause)
+    if little:
         return f"{GEAR} {SMALLER_PART.format(meaning)}"
     return f"Check before the gear: {meaning}." if outside else f"Inspect the joint for {meaning}."
 
