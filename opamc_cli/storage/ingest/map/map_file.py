@@ -38,7 +38,7 @@ class ColumnMap(_Strict):
     index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
     scale: Finite = 1.0
     offset: Finite = 0.0
-    unwrap: bool | Positive = False
+    unwrap: Positive | bool = False
     """True: where a turn ends, in `unit`; a number: where the source's values do, before scale."""
     optional: bool = False
 
