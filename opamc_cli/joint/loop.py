@@ -140,7 +140,8 @@ def close_loop(
         return loop
     other = _closed(again, library, seed, without_rules, before)
     better = other.after.rmse(sealed=False) < loop.after.rmse(sealed=False)
-    return other if better and other.rmse_after_a <= loop.rmse_before_a else loop
+    holds = other.rmse_after_a <= loop.rmse_before_a and other.predicts >= loop.predicts
+    return other if better and holds else loop
 
 
 def _closed(

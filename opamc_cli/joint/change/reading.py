@@ -9,7 +9,7 @@ import numpy as np
 from opamc_cli.joint.change.lines import Line
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.mains_hum import MAINS_HZ, MainsHum
-from opamc_cli.joint.effects.ripple import OF_A_SENSOR, read_order
+from opamc_cli.joint.effects.ripple import OF_A_SENSOR, SMALLEST_RATIO, read_order
 from opamc_cli.joint.motion.track import Track
 
 HARMONICS = 12
@@ -20,8 +20,7 @@ flexspline's slow turning moves away from the whole number, no comb is the mesh'
 
 USUAL_POLE_PAIRS = range(2, 13)
 USUAL_RATIO = 100.0
-SMALLEST_RATIO = 30.0
-"""Gear ratio assumed where none is known, and the smallest of strain wave gears."""
+"""Gear ratio assumed where none is known."""
 
 MAINS_HARMONICS = 6
 CIRCULAR_BELOW = 0.5
@@ -94,7 +93,7 @@ class Reading(Cause):
 def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     """Read the lines that grew, strongest first; a stroke tells orders `resolution` apart."""
     other = read_line(lines[0], track, resolution)
-    if other.kind in OF_A_SENSOR:
+    if other.kind in OF_A_SENSOR or 0 < (track.joint.gear_ratio or 0.0) < SMALLEST_RATIO:
         return other
     poles, comb = _comb(lines, track, resolution)
     if comb and track.angle_kind == "electrical":

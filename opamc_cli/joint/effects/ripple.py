@@ -30,6 +30,8 @@ MOST_EXPANDED = 2
 COARSEST = 0.5
 """Of them. With fewer filters than that per octave there is none."""
 ASIDE = (-3.7, -2.3, 2.3, 3.7)
+SMALLEST_RATIO = 30.0
+"""Of strain wave gears: a joint that turns faster has neither flexspline nor wave generator."""
 OF_A_SENSOR = {"1p": "sensor_offset", "2p": "sensor_gain", "6p": "dead_time"}
 """Kinds of orders that errors of the current measurement have, with the effects."""
 
@@ -223,9 +225,9 @@ def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
 
     The flexspline of a gear that turns its flexspline out meets a damaged tooth 2(N+1)/N times per
     turn of the motor; one that is mounted the other way round, with the circular spline turning
-    out, 2(N-1)/N times.
+    out, 2(N-1)/N times. Without a strain wave gear there are none.
     """
-    return ("2(N+1)/N", ratio + 1), ("2(N-1)/N", ratio - 1)
+    return (("2(N+1)/N", ratio + 1), ("2(N-1)/N", ratio - 1)) if ratio >= SMALLEST_RATIO else ()
 
 
 def order_ties(order: float, track: Track) -> list[str]:
@@ -234,7 +236,7 @@ def order_ties(order: float, track: Track) -> list[str]:
     None where orders, as found per revolution of the track's machine angle, have no meaning.
     """
     ratio = track.joint.gear_ratio
-    if track.angle_kind != "motor" or not ratio:
+    if track.angle_kind != "motor" or not ratio or ratio < SMALLEST_RATIO:
         return []
     lines = [(float(k), f"kinematic error (order {k})") for k in (2, 4)]
     for (formula, teeth), k in product(meshes(ratio), (1, 2, 3)):
@@ -286,11 +288,10 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
     healthy = "many healthy gears have it, compare with an earlier recording"
     rotor = "check rotor and wave generator" if compared else healthy
     generator = "check the wave generator" if compared else healthy
-    known = [
-        (1, "rotor", f"eccentricity, once per motor revolution: {rotor}"),
-        (2, "generator", f"kinematic error, twice per wave generator turn: {generator}"),
-        (4, "generator", f"kinematic error, four times per wave generator turn: {generator}"),
-    ]
+    known = [(1, "rotor", f"eccentricity, once per motor revolution: {rotor}")]
+    for k, often in ((2, "twice"), (4, "four times")) if not ratio or meshes(ratio) else ():
+        text = f"kinematic error, {often} per wave generator turn: {generator}"
+        known.append((k, "generator", text))
     if poles:
         known += [
             (k * poles, f"{k}p", f"electrical, {k}p per motor revolution: check drive and sensors")

@@ -260,7 +260,8 @@ def _too_little_motion(
         return NotEnoughDataError(msg)
     moving = np.count_nonzero(track.moving)
     msg = (
-        f"{named}: axis {axis} moves in {moving} samples ({moving / track.rate_hz:.3g} s) in all, "
-        f"too few to seal a part off: record at least {FEWEST_MOVING}"
+        f"{named}: of axis {axis} {moving} samples ({moving / track.rate_hz:.3g} s) count, in "
+        "motion and clear of reversals and of the recording's ends, too few to seal a part off: "
+        f"record at least {FEWEST_MOVING}"
     )
     return NotEnoughDataError(msg)

@@ -266,8 +266,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         if resists and values[0] < -DRIVEN_T * errors[0]:
             doubts.append(DRIVES.format(axis, term.effect.name))
     for names in sure.one:
-        if not any(name.startswith("unnamed") for name in names):
-            laid.notes.append(ONE.format(axis, " and ".join(names)))
+        known = [name for name in names if not name.startswith("unnamed")]
+        if len(known) > 1:
+            laid.notes.append(ONE.format(axis, " and ".join(known)))
     track = loop.after.dataset.fine.track
     if "position_drag" in found and "revisits" not in track.channels:
         laid.notes.append(ONCE.format(axis))

@@ -53,6 +53,12 @@ def test_lines_are_read_in_the_frame_that_they_can_be_told_to_turn_in(
     assert reading.kind in ("mesh", "unknown")
 
 
+def test_a_planetary_gear_has_no_flexspline():
+    reading = read_lines([line(2.0, 2.0), line(4.0), line(6.0)], track_of(ratio=9.0), 0.02)
+    assert reading.kind == "unknown"
+    assert "flexspline" not in reading.interpretation
+
+
 def test_what_was_measured_is_told_with_its_error():
     strong, harmonic = line(2.021, 2.001, 0.003, 9.0), line(4.04, growth=30.0)
     reading = read_lines([strong, harmonic, line(3.3)], MOTOR, 0.02)

@@ -90,6 +90,14 @@ def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
     assert reading in read_order(order, track).text
 
 
+@pytest.mark.parametrize("order", [2.0, 4.0, 20 / 9, 16 / 9])
+def test_a_joint_without_a_strain_wave_gear_has_none_of_its_lines(order):
+    _, track = track_of(Joint(9.0, 21))
+    assert "unknown periodic source" in read_order(order, track).text
+    assert order_ties(order, track) == []
+    assert "eccentricity" in read_order(1.0, track).text
+
+
 @pytest.mark.parametrize(
     ("order", "effects"),
     [(5.0, ("sensor_offset",)), (10.0, ("sensor_gain",)), (30.0, ("dead_time",)), (17.3, ())],

@@ -108,12 +108,14 @@ def _layout(rows: list[list[str]], separator: str, decimal: str) -> tuple[float,
         return None
     data = [rows[place] for place in filled if place >= start]
     numbers = sum(_is_number(cell, decimal) for row in data for cell in row) / len(data)
+    # a separator at the end of each row makes a column that has no name
+    widths = {width, width - 1} if not any(row[-1] for row in data) else {width}
     # above the numbers stand names, and under them units
     titles: list[int] = []
     for place in range(start - 1, -1, -1):
         if not rows[place]:
             continue
-        if not _could_be_titles(rows[place], width):
+        if not _could_be_titles(rows[place], widths):
             break
         titles.insert(0, place)
     titles = titles[-2:]
@@ -122,9 +124,9 @@ def _layout(rows: list[list[str]], separator: str, decimal: str) -> tuple[float,
     return numbers, Layout(separator, decimal, header, skip, max(len(titles) - 1, 0), "")
 
 
-def _could_be_titles(row: list[str], width: int) -> bool:
+def _could_be_titles(row: list[str], widths: set[int]) -> bool:
     named = [cell for cell in row if cell]
-    return len(row) == width and len(named) >= max(1, width // 3)
+    return len(row) in widths and len(named) >= max(1, len(row) // 3)
 
 
 def _holds_numbers(row: list[str], decimal: str) -> bool:

@@ -54,6 +54,9 @@ TOLD_BY_UNIT = ("current", *LOGGED)
 UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
 """Such as `Current J1 [mA]`, `time (ms)`."""
 
+COUNTED = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*[*x·]?\s*(\D\S*)")
+"""Such as `0.1 deg`."""
+
 AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
 
 
@@ -74,6 +77,8 @@ class Meant:
     """It is not a controller's wish."""
     unit: str | None
     """As the file declares it."""
+    scale: float = 1.0
+    """So many of it, as of `0.1 deg`."""
 
 
 def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
@@ -92,12 +97,12 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
             continue
         name = str(channel.name)
         bare, unit = _without_unit(name)
-        unit = channel.unit or unit
+        scale, unit = counted_unit(channel.unit or unit)
         if channel.width is not None:
             quantity = _quantity(bare, unit)
             if quantity and quantity != "time":
                 found += [
-                    Meant(quantity, k, name, name, k, _is_measured(name), unit)
+                    Meant(quantity, k, name, name, k, _is_measured(name), unit, scale)
                     for k in range(channel.width)
                 ]
             continue
@@ -106,7 +111,7 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
         if quantity is None or has_placeholder(name):
             continue
         measured = _is_measured(pattern)
-        found.append(Meant(quantity, number, pattern, name, None, measured, unit))
+        found.append(Meant(quantity, number, pattern, name, None, measured, unit, scale))
     if {"a", "b", "c"} <= {each.quantity for each in found}:
         return found
     # what ends in `_a` and has no `_b` and `_c` beside it is in ampere
@@ -118,8 +123,23 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
 def _without_unit(name: str) -> tuple[str, str | None]:
     """Return a name without the unit in brackets at its end, and that unit."""
     found = UNIT.search(name)
-    known = found is not None and any(conversion(found[1], quantity) for quantity in CONVERSIONS)
+    unit = counted_unit(found[1])[1] if found is not None else None
+    known = unit is not None and any(conversion(unit, quantity) for quantity in CONVERSIONS)
     return (name[: found.start()], found[1]) if found is not None and known else (name, None)
+
+
+def counted_unit(unit: str | None) -> tuple[float, str | None]:
+    """Return how many of a unit one stands for, and that unit.
+
+    Examples
+    --------
+    >>> counted_unit("0.1 deg"), counted_unit("mA"), counted_unit("1/min")
+    ((0.1, 'deg'), (1.0, 'mA'), (1.0, '1/min'))
+    """
+    found = COUNTED.fullmatch(unit or "")
+    many = float(found[1]) if found is not None and found[1].count(".") < 2 else 0.0
+    known = found is not None and any(conversion(found[2], one) for one in CONVERSIONS)
+    return (many, found[2]) if found is not None and known and many > 0 else (1.0, unit)
 
 
 def _quantity(pattern: str, unit: str | None) -> str | None:

@@ -83,7 +83,9 @@ def angle_units(
         off = {units: abs(ratio / expected - 1) for units, expected in ANGLE_UNITS.items()}
         units = min(off, key=lambda units: (off[units], units[0] != by_range))
         if off[units] < AGREE_WITHIN:
-            why = f"largest {largest:.3g}; its steps agree with the speed"
+            # of one unit they agree whichever it is
+            told = "" if ANGLE_UNITS[units] != 1.0 else ", by the range alone"
+            why = f"largest {largest:.3g}{told}; its steps agree with the speed"
             return Guess(units[0], why), Guess(units[1], f"largest {fastest:.3g}; as the position")
     speed = "deg/s" if fastest > LARGEST_RAD else "rad/s"
     doubt = ""

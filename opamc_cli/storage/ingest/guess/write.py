@@ -333,18 +333,22 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
                 guess = current_unit(largest)
-        declared = next(iter(channels.values())).unit
+        declared, scale = next((one.unit, one.scale) for one in channels.values())
         if declared and _fits(declared, kind):
             guess = Guess(declared, f"as the file says; largest {largest:.3g}")
+        else:
+            scale = 1.0
         why = guess.why
-        if kind == "position" and turns(largest, guess.unit) > MOST_TURNS:
-            count = turns(largest, guess.unit)
+        if kind == "position" and turns(scale * largest, guess.unit) > MOST_TURNS:
+            count = turns(scale * largest, guess.unit)
             why += f": {count:.3g} turns; a motor's needs scale: 1 / gear ratio"
         if choice.passed_over:
             why += f"; not {', '.join(choice.passed_over[:3])}"
-        extra = ", unwrap: true" if kind == "position" and wraps(positions, guess.unit) else ""
+        scaled = {axis: scale * values for axis, values in positions.items()}
+        extra = ", unwrap: true" if kind == "position" and wraps(scaled, guess.unit) else ""
         if not look.unsigned.isdisjoint(map(_key, channels.values())):
             extra, why = ", unwrap: 65536", f"{why}; negative numbers are 65536 too large"
+        extra += f", scale: {scale:g}" if scale != 1.0 else ""
         # A line for all axes asks for as many of every kind.
         all_axes = ", optional: true" if every - channels.keys() else ""
         lines += _lines_of(kind, channels, guess.unit, extra, all_axes, why)

@@ -63,7 +63,7 @@ def test_a_table_of_everything(tmp_path):
         "columns:",
         "axis{n}_current: {source: cur_{n}, unit: A} # largest 3; not target_cur_#",
         "axis{n}_position: {source: q_{n}, unit: deg} "
-        "# largest 57.3; its steps agree with the speed",
+        "# largest 57.3, by the range alone; its steps agree with the speed",
         "axis1_velocity: {source: qd_1, unit: deg/s} # largest 115; as the position",
         "axis1_temperature: {source: temp_1, unit: degC} # largest 31.4",
         "# not used: set_point, target_cur_#, mode_#",
@@ -137,6 +137,15 @@ def test_units_that_a_file_declares_are_believed_and_decimal_commas_read(tmp_pat
         "axis1_temperature: {source: temp_1, unit: degC} # largest 2",
         "# not used: q_#",
     ]
+
+
+def test_tenths_of_a_degree_are_scaled(tmp_path):
+    time = np.arange(200) / 100
+    angle = 300 * np.sin(3 * time)
+    rows = [f"{t:.2f},{a:.0f},{t}" for t, a in zip(time, angle, strict=True)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time [s],position [0.1 deg],current [A]", *rows]))
+    assert "unit: deg, scale: 0.1}  # as the file says" in guess_map([path])
 
 
 def test_dates_are_a_clock_and_a_start(tmp_path):

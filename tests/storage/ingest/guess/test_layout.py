@@ -36,6 +36,13 @@ def test_layouts(tmp_path, text, expected):
     assert text_layout(path) == Layout(*expected, "utf-8")
 
 
+def test_a_separator_that_ends_each_row_makes_no_column(tmp_path):
+    path = tmp_path / "log.txt"
+    path.write_text("12 December\t17:15\n\nt\tangle\tcurrent\n0\t1,5\t2,5\t\n1\t1,6\t2,5\t\n")
+    found = text_layout(path)
+    assert (found.separator, found.decimal, found.header, found.skip_rows) == ("tab", ",", True, 2)
+
+
 def test_too_few_numbers_are_no_table(tmp_path):
     path = tmp_path / "log.csv"
     for text in ("1,2\n", "a,b,1\na,b,2\n", "a,b\nc,d\n"):

@@ -90,6 +90,16 @@ def test_a_unit_in_brackets_at_the_end_of_a_name_is_its_unit_and_no_word_of_it()
     assert only("current [1]").unit is None
 
 
+def test_a_unit_that_is_counted_in_has_a_scale():
+    names = ("motor_pos [0.1 deg]", "J1 current (1e-3 A)", "speed [1/min]")
+    found = meanings([Listed(name) for name in names])
+    assert [(one.quantity, one.unit, one.scale) for one in found] == [
+        ("position", "deg", 0.1),
+        ("current", "A", 1e-3),
+        ("velocity", "1/min", 1.0),
+    ]
+
+
 def test_a_name_without_a_word_means_what_its_unit_is_one_of():
     found = [only(n) for n in ("A1.I_eff [A]", "A1 Ieff (mA)", "J2 Winkel [deg]", "n_3 [rpm]")]
     assert [(each.quantity, each.number) for each in found] == [
