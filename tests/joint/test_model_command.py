@@ -540,11 +540,12 @@ def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path,
 
 
 @pytest.mark.long
-def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp_path, capsys):
+@pytest.mark.parametrize("dry", [0.15, 0.0])
+def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp_path, capsys, dry):
     t = np.arange(6000) / 250.0
     q = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1)
     beside = 0.7 * np.sin(1.9 * t + 2) + 0.3 * np.sin(3.7 * t)
-    current = 0.5 * np.sin(q) + 0.15 * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
+    current = 0.5 * np.sin(q) + dry * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
     current += 0.2 * np.gradient(np.gradient(q)) * 250**2
     current += 0.02 * np.random.default_rng(1).normal(size=t.size)
     pairs = [(-current, q)]
