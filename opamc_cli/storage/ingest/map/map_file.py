@@ -5,7 +5,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, StrictBool
 
 from opamc_cli.errors import InputError
 from opamc_cli.storage.ingest.formats import FORMATS, format_by_ending, known_endings
@@ -38,7 +38,7 @@ class ColumnMap(_Strict):
     index: Annotated[int, Field(ge=0)] | Annotated[str, Field(pattern="^«n.*»$")] | None = None
     scale: Finite = 1.0
     offset: Finite = 0.0
-    unwrap: Positive | bool = False
+    unwrap: Positive | StrictBool = False
     """True: where a turn ends, in `unit`; a number: where the source's values do, before scale."""
     optional: bool = False
 

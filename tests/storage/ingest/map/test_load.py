@@ -28,6 +28,7 @@ def test_a_map_is_read(tmp_path):
         ("axis1_d: {source: x, unit: A}", RATE, "is not a column of a run"),
         ("axis1_a: {source: x, unit: rad}", RATE, "units of a current"),
         ("axis1_a: {source: x, unit: A, unwrap: true}", RATE, "unwrap: true is for positions"),
+        ("axis1_a: {source: x, unit: A, unwrap: 0}", RATE, "should be greater than 0"),
         ("axis1_a: {source: x, unit: A, scale: 0}", RATE, "scale is 0"),
         (A + ", axis1_b: {source: x, unit: A}", RATE, "are both of 'x'"),
         ("axis1_position: {source: x, unit: rad}", RATE, "names no current"),
