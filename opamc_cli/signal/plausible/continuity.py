@@ -55,8 +55,9 @@ def leaps(position: Floats) -> Leaps | None:
 
     Notes
     -----
-    Steps are held against the median of nine, so that a missing sample looks like a step twice as
-    large as those beside it. Where as many values are held, samples came late and none is missing.
+    Steps are held against the median of nine and against both neighbours, so that a missing sample
+    looks like a step twice as large as those beside it. Where as many values are held, samples came
+    late and none is missing.
     """
     steps = np.diff(position)
     steps = steps[np.isfinite(steps)]
@@ -77,7 +78,9 @@ def leaps(position: Floats) -> Leaps | None:
         np.quantile(np.abs(times - 1.0), 0.9) > STEADY
     ):
         return None
-    large = times > LEAPS
+    # a stroke of fewer than nine steps is faster than their median, but next to steps as fast
+    beside = np.convolve(steps, (0.5, 0.0, 0.5), "same")
+    large = (times > LEAPS) & (np.abs(steps) > LEAPS * np.abs(beside))[moving]
     places = int(np.count_nonzero(large))
     if places < FEWEST or np.count_nonzero(times < HELD) > places / 2:
         return None

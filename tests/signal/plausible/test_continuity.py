@@ -36,6 +36,13 @@ def test_a_value_that_is_held_and_made_up_for_is_no_loss():
     assert leaps(late) is None
 
 
+def test_a_stroke_shorter_than_the_median_lacks_no_sample():
+    """Logged at 60 Hz, its steps of 3.5 to 6.8 mrad passed for twice a median of 3.5."""
+    stroke = [-6.8, -4.3, -1.5, 0.6, 3.5, 5.0, 6.4, 6.8, 5.3, 3.0, 0.7, -0.6]
+    steps = np.concatenate([np.diff(SWING[500:2501]), np.multiply(stroke, 1e-3)])
+    assert leaps(np.cumsum(np.tile(steps, 4))) is None
+
+
 @pytest.mark.parametrize("wrap", [1.0, 360.0, 4096.0])
 def test_an_angle_that_wraps_leaps_back_by_one_size(wrap):
     turning = np.linspace(0, 5.5, PLACE.size) * wrap % wrap
