@@ -457,6 +457,7 @@ def test_too_little_motion_to_seal_anything_off(folder, capsys):
         (1.0, 30 / np.pi, "axis1_velocity seems to be in rpm"),
         (1.0, 0.5 / np.pi, "axis1_velocity seems to be in rev/s"),
         (180 / np.pi, 1.0, "axis1_position seems to be in deg"),
+        (0.5 / np.pi, 1.0, "axis1_position seems to be in rev"),
         (
             1.0,
             -1.0,

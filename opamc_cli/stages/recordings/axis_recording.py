@@ -19,9 +19,8 @@ from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import Array
 from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
 
-UNITS = {180 / np.pi: "deg/s", 30 / np.pi: "rpm", 0.5 / np.pi: "rev/s", np.pi / 180: "deg"}
-"""Ratio of speed to the position's rate of change, and what one of the two is then likely in."""
 SAME_RATIO = 0.03
+"""By which a speed over the position's rate of change may miss the ratio of two units."""
 
 MOST_MISSING = 0.5
 """Share of a channel's samples that may lack a number: beyond it more is bridged than recorded."""
@@ -190,21 +189,49 @@ def _check_units(run: Run, axis: int, position: Array | None, velocity: Array | 
         )
         raise InputError(msg)
     ratio = speed_ratio(position, velocity, run.sampling_rate_hz)
-    for known, unit in UNITS.items():
-        if ratio is not None and abs(ratio / known - 1) < SAME_RATIO:
-            name, asked = ("position", "rad") if unit == "deg" else ("velocity", "rad/s")
-            msg = (
-                f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
-                f"axis{axis}_position: axis{axis}_{name} seems to be in {unit}; convert it to "
-                f"{asked}, or name its unit in the map of opamc ingest"
-            )
-            raise InputError(msg)
+    for units in fitting_units(ratio or 1.0):
+        name = "position" if units["position"] != "rad" else "velocity"
+        asked = next(iter(LOGGED[name].units))
+        msg = (
+            f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
+            f"axis{axis}_position: axis{axis}_{name} seems to be in {units[name]}; convert it to "
+            f"{asked}, or name its unit in the map of opamc ingest"
+        )
+        raise InputError(msg)
     if ratio is not None and ratio < 0:
         msg = (
             f"{run.path}: axis{axis}_velocity is {ratio:.3g} times the rate of change of "
             f"axis{axis}_position: one of them has the wrong sign; correct the map of opamc ingest"
         )
         raise InputError(msg)
+
+
+def fitting_units(
+    ratio: float, position: str = "rad", velocity: str = "rad/s"
+) -> list[dict[str, str]]:
+    """Return units, one of them as it was taken, in which a speed would be its position's.
+
+    Parameters
+    ----------
+    ratio : float
+        Of the speed to the position's rate of change, 1 where they agree.
+    position, velocity : str
+        Units that both were taken to be in.
+
+    Examples
+    --------
+    >>> fitting_units(57.3, "deg", "rad/s")
+    [{'position': 'rad', 'velocity': 'rad/s'}, {'position': 'deg', 'velocity': 'deg/s'}]
+    """
+    taken = {"position": position, "velocity": velocity}
+    if abs(ratio - 1.0) < SAME_RATIO:
+        return []
+    return [
+        taken | {name: unit}
+        for name, times in (("position", ratio), ("velocity", 1.0 / ratio))
+        for unit, one in LOGGED[name].units.items()
+        if abs(one.factor / LOGGED[name].units[taken[name]].factor / times - 1.0) < SAME_RATIO
+    ]
 
 
 def _seconds(run: Run) -> float | None:

@@ -26,6 +26,7 @@ from opamc_cli.storage.ingest.map.map_file import (
     rate_hz,
 )
 from opamc_cli.storage.ingest.map.units import (
+    ALIASES,
     ISO8601,
     LATEST_S,
     SAMPLES,
@@ -421,6 +422,7 @@ def _write(
         if (key := _limited(name, info.current_unit)) is not None
     }
     n_samples = 0
+    apart: list[str] = []
     groups = _row_groups(blocks, schema)
     with closing(groups), write_run(run, info, schema) as writer:
         for table in groups:
@@ -431,6 +433,8 @@ def _write(
                     of_position = quantity_of(name) == "position"
                     rate = info.sampling_rate_hz
                     sizes[name].add(strided_speed(values, rate) if of_position else values)
+            if n_samples == 0:  # a minute and more
+                apart = _units_apart(path, channels, info.sampling_rate_hz, table)
             n_samples += table.num_rows
             writer.write_table(table)
         if n_samples == 0:
@@ -443,7 +447,7 @@ def _write(
                     f"value in {n_samples} rows; name another source in the map"
                 )
                 raise InputError(msg)
-        doubts = []
+        doubts = apart
         for name, size in sizes.items():
             source = channels.columns[name].source
             speed = "the speed of " if quantity_of(name) == "position" else ""
@@ -453,6 +457,31 @@ def _write(
                 raise InputError(msg)
             doubts += [doubt] if size.doubt() else []
     return _Written(n_samples, {name: n for name, n in missing.items() if n}, tuple(doubts))
+
+
+def _units_apart(path: Path, channels: IngestMap, rate_hz: float, table: pa.Table) -> list[str]:
+    """Say which axes' speeds are not their positions', but would be in another unit."""
+    joints = [name.removesuffix("_velocity") for name in table.column_names if "_vel" in name]
+    joints = [joint for joint in joints if f"{joint}_position" in table.column_names]
+    found: dict[str, list[str]] = {}
+    if joints:  # scipy takes as long to load as all else, and most logs have no speed
+        from opamc_cli.signal.motion.reported import unwrapped
+        from opamc_cli.signal.motion.signs import speed_ratio
+        from opamc_cli.stages.recordings.axis_recording import fitting_units
+    for joint in joints:
+        names = [f"{joint}_position", f"{joint}_velocity"]
+        position, velocity = (table.column(name).to_numpy() for name in names)
+        ratio = speed_ratio(unwrapped(position), velocity, rate_hz)
+        declared = [channels.columns[name].unit for name in names]
+        units = [ALIASES.get(unit, unit) for unit in declared]
+        fit = [" and ".join(each.values()) for each in fitting_units(ratio or 1.0, *units)]
+        if fit:
+            said = (
+                f"is {ratio:.2g} times the rate of change of its position, in the map's units "
+                f"({' and '.join(declared)}); {', or '.join(fit)} would agree: correct the map"
+            )
+            found.setdefault(said, []).append(joint.removeprefix("axis"))
+    return [f"{path}: the speed of axis {', '.join(axes)} {said}" for said, axes in found.items()]
 
 
 def _limited(name: str, current_unit: str) -> str | None:

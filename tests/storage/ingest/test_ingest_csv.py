@@ -358,6 +358,37 @@ def test_what_few_joints_do_is_said(tmp_path):
     assert "beyond 200 A" in doubt
 
 
+@pytest.mark.parametrize(
+    ("units", "times", "fit"),
+    [
+        (("°", "rad/s"), "57", "rad and rad/s, or deg and deg/s"),
+        (("rev", "rad/s"), "0.16", "rad and rad/s, or rev and rev/s"),
+        (("rad", "rpm"), "0.1", "rad and rad/s"),
+        (("rad", "rad/s"), None, None),
+    ],
+)
+def test_units_of_position_and_speed_that_contradict_each_other_are_said(
+    tmp_path, units, times, fit
+):
+    t = np.arange(1000) / 100
+    joint = (np.cos(t), np.sin(2 * t), 2 * np.cos(2 * t))
+    np.savetxt(tmp_path / "r.csv", np.column_stack(joint * 2), delimiter=",")
+    lines = [
+        f"  axis{n}_{channel}: {{source: {3 * (n - 1) + k}, unit: {unit}}}\n"
+        for n in (1, 2)
+        for k, (channel, unit) in enumerate(
+            zip(("current", "position", "velocity"), ("A", *units), strict=True)
+        )
+    ]
+    text = "sampling_rate_hz: 100\nheader: false\ncolumns:\n" + "".join(lines)
+    doubts = run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts
+    said = (
+        f"{tmp_path / 'r.csv'}: the speed of axis 1, 2 is {times} times the rate of change of its "
+        f"position, in the map's units ({' and '.join(units)}); {fit} would agree: correct the map"
+    )
+    assert doubts == ((said,) if fit else ())
+
+
 def test_a_wrist_that_passes_half_a_turn_is_no_wonder(tmp_path):
     t = np.arange(1000) / 100
     wrapped = (4 * t + np.pi) % (2 * np.pi) - np.pi
