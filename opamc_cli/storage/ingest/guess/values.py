@@ -92,7 +92,10 @@ def angle_units(
     if ratio is not None and rate_hz:
         power = round(math.log10(ratio))
         tenfold = power and abs(ratio / 10.0**power - 1) < AGREE_WITHIN
-        blame = ": the unit of the time may be wrong" if tenfold else ""
+        gear, side = max((ratio, "position"), (1 / ratio, "speed"))
+        geared = round(gear) > 1 and abs(gear / round(gear) - 1) < AGREE_WITHIN
+        blame = f": the {side} may be the motor's" if geared else ""
+        blame += " or the unit of the time wrong" if tenfold else ""
         doubt = f" (its steps are {ratio:.3g} of the speed{blame})"
     return (
         Guess(by_range, f"largest {largest:.3g}, by the range alone{doubt}"),

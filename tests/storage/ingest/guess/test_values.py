@@ -146,8 +146,16 @@ def test_a_speed_that_is_ten_times_too_large_is_of_a_wrong_clock_and_no_rpm():
     for scale in (1.0, 180 / np.pi):
         found = angle_units({1: scale * ANGLE}, {1: scale * SPEED}, 25.0)
         assert found[0].why.endswith(
-            "alone (its steps are 0.1 of the speed: the unit of the time may be wrong)"
+            "(its steps are 0.1 of the speed: the speed may be the motor's or the unit of the time "
+            "wrong)"
         )
+
+
+@pytest.mark.parametrize(("times", "side"), [(1 / 121, "speed"), (5.05, "position"), (1.2, None)])
+def test_a_speed_that_is_a_whole_gear_ratio_off_may_be_of_the_motor(times, side):
+    why = angle_units({1: ANGLE}, {1: SPEED / times}, 250.0)[0].why
+    blame = f": the {side} may be the motor's" if side else ""
+    assert why.endswith(f"(its steps are {times:.3g} of the speed{blame})")
 
 
 def test_coarse_logs_agree_with_their_speed():
