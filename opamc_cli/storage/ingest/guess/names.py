@@ -57,6 +57,13 @@ UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
 COUNTED = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*[*x·]?\s*(\D\S*)")
 """Such as `0.1 deg`."""
 
+PERCENT = re.compile(r"%|per[ _]?cent|pct|prozent|\$(curr|vel_axis)_act", re.I)
+"""Of what is counted in shares of a rated value, unless the file declares a unit; the variables are
+of KUKA's KR C."""
+
+KUKAS_ANGLE = re.compile(r"\$?AXIS_ACT(_MEAS)?\.A", re.I)
+"""Of a KR C's joint angles, `$AXIS_ACT.A1`: degrees by the controller's manual."""
+
 AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
 
 
@@ -97,7 +104,10 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
             continue
         name = str(channel.name)
         bare, unit = _without_unit(name)
-        scale, unit = counted_unit(channel.unit or unit)
+        unit = channel.unit or unit or ("deg" if KUKAS_ANGLE.match(name) else None)
+        scale, unit = counted_unit(unit)
+        if PERCENT.search(f"{name} {unit}") and not _is_known(unit):
+            unit = "%"
         if channel.width is not None:
             quantity = _quantity(bare, unit)
             if quantity and quantity != "time":
@@ -123,9 +133,12 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
 def _without_unit(name: str) -> tuple[str, str | None]:
     """Return a name without the unit in brackets at its end, and that unit."""
     found = UNIT.search(name)
-    unit = counted_unit(found[1])[1] if found is not None else None
-    known = unit is not None and any(conversion(unit, quantity) for quantity in CONVERSIONS)
+    known = found is not None and _is_known(counted_unit(found[1])[1])
     return (name[: found.start()], found[1]) if found is not None and known else (name, None)
+
+
+def _is_known(unit: str | None) -> bool:
+    return unit is not None and any(conversion(unit, quantity) for quantity in CONVERSIONS)
 
 
 def counted_unit(unit: str | None) -> tuple[float, str | None]:
@@ -138,7 +151,7 @@ def counted_unit(unit: str | None) -> tuple[float, str | None]:
     """
     found = COUNTED.fullmatch(unit or "")
     many = float(found[1]) if found is not None and found[1].count(".") < 2 else 0.0
-    known = found is not None and any(conversion(found[2], one) for one in CONVERSIONS)
+    known = found is not None and _is_known(found[2])
     return (many, found[2]) if found is not None and known and many > 0 else (1.0, unit)
 
 
@@ -152,7 +165,8 @@ def _quantity(pattern: str, unit: str | None) -> str | None:
     if phase:
         return PHASES[phase[1].lower()]
     for quantity, known in WORDS.items():
-        if any(word in known for word in words):
+        # shares of a rated current are compared as well, those of an angle or a speed are no motion
+        if any(word in known for word in words) and not (unit == "%" and quantity in LOGGED):
             return quantity
     if unit is None or is_torque(unit):
         return None  # a torque may be of anything

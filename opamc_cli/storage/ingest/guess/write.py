@@ -32,7 +32,7 @@ from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s, 
 from opamc_cli.storage.ingest.opening import open_source
 from opamc_cli.storage.ingest.source import Array, Name, Rate, Selection, Source
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
-from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED
+from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED, Conversion
 
 LOOKED_AT_ROWS = 1 << 16
 """Rows whose values are looked at: minutes of a robot's log."""
@@ -138,6 +138,10 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         time = time_channel(meant)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
+    logged = choices.get("temperature", Choice("temperature", {}, ()))
+    cold = {n: one for n, one in logged.by_axis.items() if _is_cold(values[_key(one)], one)}
+    for axis in cold:
+        del logged.by_axis[axis]
     signed = [
         _key(channel)
         for kind, choice in choices.items()
@@ -149,7 +153,7 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         values[key] = np.where(values[key] < 1 << 15, values[key], values[key] - (1 << 16))
     taken = [*chosen, *([time] if time else [])]
     used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
-    unused = []
+    unused = [f"{each.source} (below -273.15 °C: no sensor?)" for each in cold.values()]
     for name in (each.name for each in listed if each.name not in used):
         if isinstance(name, int):
             continue
@@ -161,6 +165,12 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
     return _Look(path, layout, choices, time, values, rest, repeated, rate, unsigned)
+
+
+def _is_cold(values: Array, channel: Meant) -> bool:
+    """Return whether most of a temperature's samples are below absolute zero."""
+    unit = conversion(channel.unit or "degC", "temperature") or Conversion(1.0)
+    return bool(np.mean(unit.factor * channel.scale * values + unit.offset < -273.15) > 0.5)
 
 
 def _differ_by_axis(paths: Sequence[Path]) -> bool:
@@ -322,6 +332,8 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
             float(np.nanmax(np.abs(look.values[_key(channel)]), initial=0.0))
             for channel in channels.values()
         )
+        declared, scale = next((one.unit, one.scale) for one in channels.values())
+        torque = next(iter(channels.values())).quantity == "torque"
         match kind:
             case "position":
                 guess = position
@@ -329,11 +341,14 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
                 guess = speed
             case _ if kind in LOGGED:
                 guess = Guess(next(iter(LOGGED[kind].units)), f"largest {largest:.3g}")
-            case _ if next(iter(channels.values())).quantity == "torque":
+            case _ if declared == "%":  # refused until somebody writes what the rated one is
+                what, unit = ("torque", "Nm") if torque else ("current", "A")
+                why = f"largest {largest:.3g}; per cent of a rated {what} that the file does not "
+                guess = Guess('"%"', f"{why}tell: write unit: {unit}, scale: rated / 100")
+            case _ if torque:
                 guess = Guess("Nm", f"largest {largest:.3g}; a torque stands for the current")
             case _:
                 guess = current_unit(largest)
-        declared, scale = next((one.unit, one.scale) for one in channels.values())
         if declared and _fits(declared, kind):
             guess = Guess(declared, f"as the file says; largest {largest:.3g}")
         else:

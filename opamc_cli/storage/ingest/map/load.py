@@ -75,9 +75,12 @@ def _check_columns(path: Path, channels: IngestMap) -> None:
             raise ConfigError(msg)
         quantity = quantity_of(name)
         if conversion(column.unit, quantity) is None:
+            rated = "; for per cent write A or Nm and scale: rated / 100, or A and scale: 0.01 if "
+            rated += "the rated one is not known: what is compared is relative"
             msg = (
                 f"{path}: columns.{name}.unit is {column.unit!r}; "
                 f"units of a {quantity}: {known_units(quantity)}"
+                f"{rated if column.unit == '%' else ''}"
             )
             raise ConfigError(msg)
         if column.unwrap is True and quantity != "position":

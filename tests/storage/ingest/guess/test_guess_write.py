@@ -8,7 +8,7 @@ import scipy.io
 from nptdms import ChannelObject, TdmsWriter
 
 from opamc_cli.__main__ import main
-from opamc_cli.errors import InputError
+from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.stages.recordings import ingest
 from opamc_cli.storage.ingest.guess.write import guess_map
 from opamc_cli.storage.ingest.map.load import load_map
@@ -146,6 +146,34 @@ def test_tenths_of_a_degree_are_scaled(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["time [s],position [0.1 deg],current [A]", *rows]))
     assert "unit: deg, scale: 0.1}  # as the file says" in guess_map([path])
+
+
+def test_per_cent_of_what_the_file_does_not_tell_is_left_open_and_refused(tmp_path, capsys):
+    path = table(tmp_path / "a.csv", {"t": T, "J1 Torque %": SPEED, "J2 Torque %": SPEED})
+    (line,) = [one for one in lines_of(path)[0] if "Torque" in one]
+    assert line == (
+        'axis{n}_current: {source: "J{n} Torque %", unit: "%"} # largest 2; per cent of a rated '
+        "torque that the file does not tell: write unit: Nm, scale: rated / 100"
+    )
+    guessed = tmp_path / "map.yaml"
+    guessed.write_text(guess_map([path]))
+    with pytest.raises(ConfigError, match=r"unit is '%'; .*for per cent write A or Nm and scale"):
+        load_map(guessed)
+    guessed.write_text(guess_map([path]).replace('unit: "%"', "unit: A, scale: 0.01"))
+    (found,) = ingest.run([path], load_map(guessed), tmp_path / "out").results
+    read = Run(found.run).read(["axis2_current"])["axis2_current"]
+    assert read == pytest.approx(0.01 * SPEED)
+
+
+def test_a_temperature_below_absolute_zero_is_of_no_sensor(tmp_path):
+    temperatures = {"temp_1": 31.4 + 0 * T, "temp_2": -3276.8 + 0 * T, "temp_3 [K]": 0 * T - 1}
+    columns = {"t": T, **{f"cur_{n}": SPEED for n in (1, 2, 3)}, **temperatures}
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns))
+    assert lines[-2:] == [
+        "axis1_temperature: {source: temp_1, unit: degC} # largest 31.4",
+        "# not used: temp_2 (below -273.15 °C: no sensor?), "
+        "temp_3 [K] (below -273.15 °C: no sensor?)",
+    ]
 
 
 def test_dates_are_a_clock_and_a_start(tmp_path):

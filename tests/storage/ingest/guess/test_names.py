@@ -110,3 +110,20 @@ def test_a_name_without_a_word_means_what_its_unit_is_one_of():
     ]
     # neither a torque nor a time is told by its unit: it may be of anything
     assert meanings([Listed("M_1 [Nm]"), Listed("x_1 [s]"), Listed("tool 1 [A]")]) == []
+
+
+def test_per_cent_are_of_a_current_or_torque_and_no_motion():
+    names = ("J1 Torque %", "A1 Strom [%]", "torque_pct_2", "CurrentPercent3", "J1 Torque [Nm] %")
+    assert [only(name).unit for name in names] == ["%"] * 5
+    assert only("current_1", unit="%").unit == "%"
+    # a unit that the file declares is believed
+    assert only("torque_percent_1", unit="Nm").unit == "Nm"
+    assert meanings([Listed("speed_percent"), Listed("Override %"), Listed("J1 Pos %")]) == []
+
+
+def test_kukas_angles_are_degrees_and_its_currents_per_cent():
+    found = only("$AXIS_ACT.A1")
+    assert (found.quantity, found.number, found.unit) == ("position", 1, "deg")
+    assert only("$TORQUE_AXIS_ACT[1]").quantity == "torque"
+    assert only("$CURR_ACT[1]").unit == "%"
+    assert meanings([Listed("$AXIS_ACT.E1"), Listed("$OV_PRO")]) == []  # an outer axis may be in mm
