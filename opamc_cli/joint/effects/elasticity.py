@@ -15,6 +15,9 @@ large, and of opposite signs."""
 SHORTEST = 5
 """Samples of a cubic's window."""
 
+MOST_DAMPED = 0.25
+"""Of a critical damping of 1: a gear's is below 0.2."""
+
 
 class Elasticity(Effect):
     """Response of a sprung load to the acceleration: what it adds to the rigid model.
@@ -52,7 +55,7 @@ class Elasticity(Effect):
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """From slow swaying to what the grid can show; damped more, nothing rings."""
-        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, 0.25)}
+        return {"resonance_hz": (1.0, _highest(track)), "damping": (0.005, MOST_DAMPED)}
 
     def form_of(self, parameters: Parameters) -> str:
         """Tell from where it is seen."""
@@ -77,8 +80,11 @@ class Elasticity(Effect):
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
 
-        Seen from the link, friction of the motor comes sooner: what comes later is a delay.
+        Seen from the link, friction of the motor comes sooner: what comes later is a delay. What
+        is damped as much as may be rings no more: it is a lag.
         """
+        if parameters.get("damping", 0.0) > 0.99 * MOST_DAMPED:
+            return False
         least = -LATE if self.form_of(parameters) else -1.0
         return bool(least * coefficients[0] < coefficients[1] < coefficients[0])
 

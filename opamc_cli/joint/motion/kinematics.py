@@ -19,6 +19,7 @@ from opamc_cli.signal.motion.smoothing import (
     blurred,
     clear_of_corners,
     derivatives,
+    less_late,
     measurement_noise,
     noise_gain,
     quietened,
@@ -147,11 +148,11 @@ def motion_from_position(
     asked = smoothing is not None and smoothing.from_velocity
     if velocity_rad_s is not None and (asked or (smoothing is None and window > SHORTEST_WINDOW)):
         size = float(np.sqrt(np.mean(motion.velocity**2)))
-        agrees = size > 0 and float(np.std(velocity_rad_s - motion.velocity)) < 0.1 * size
-        own = window if asked else smoothing_window(velocity_rad_s, rate_hz, derivative=1)
+        speed = less_late(velocity_rad_s, motion.velocity, motion.acceleration, rate_hz)
+        agrees = size > 0 and float(np.std(speed - motion.velocity)) < 0.1 * size
+        own = window if asked else smoothing_window(speed, rate_hz, derivative=1)
         if agrees and (asked or own < window):
-            cleaner = _smoothed(velocity_rad_s, rate_hz, own, 1)
-            return replace(cleaner, position_rad=motion.position_rad)
+            return replace(_smoothed(speed, rate_hz, own, 1), position_rad=motion.position_rad)
     return motion
 
 

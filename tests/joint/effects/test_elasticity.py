@@ -27,6 +27,12 @@ def test_what_the_link_lacks_are_its_accelerations_own_rates_of_change(factor):
     np.testing.assert_allclose(rise[inner], expected[inner], atol=0.02 * w / unit)
 
 
+def test_what_is_damped_as_much_as_may_be_is_a_lag_and_no_gear():
+    coefficients = np.array([0.1, 0.05])
+    assert Elasticity().plausible(coefficients, {"resonance_hz": 9.0, "damping": 0.2})
+    assert not Elasticity().plausible(coefficients, {"resonance_hz": 9.0, "damping": 0.25})
+
+
 @pytest.mark.parametrize("sign", [1.0, pytest.param(-1.0, marks=pytest.mark.long)])
 def test_a_soft_gear_is_named_where_the_position_is_the_link_s(sign):
     """A current that lacks as much is rounded off, not wound up."""

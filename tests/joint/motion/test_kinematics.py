@@ -59,6 +59,28 @@ def test_ways_to_differentiate_are_windows_that_fit_and_speeds_that_were_logged(
     assert [one.window_s for one in smoothings([short])] == [0.01, 0.02]
 
 
+@pytest.mark.parametrize("lag_s", [0.0, 0.01, 0.03])
+def test_the_lag_of_a_logged_speed_is_taken_off(lag_s):
+    """A drive's filter of first order; the position's steps are coarse, so that the speed is used.
+
+    A speed that is not late stays as it is.
+    """
+    decay = np.exp(-1 / (lag_s * RATE)) if lag_s else 0.0
+    late = np.empty_like(SPEED)
+    late[0] = SPEED[0]
+    for n in range(1, late.size):
+        late[n] = decay * late[n - 1] + (1 - decay) * SPEED[n]
+    steps = np.round(PLACE / 1e-4) * 1e-4
+    found = motion_from_position(steps, late, RATE)
+    alone = motion_from_position(steps, None, RATE)
+    inside = slice(50, -50)
+    assert found.window < alone.window
+    off = np.std((found.velocity - SPEED)[inside]) / np.std(SPEED)
+    assert off < 0.005
+    off = np.std((found.acceleration + 2.25 * PLACE)[inside]) / 2.25
+    assert off < 0.01
+
+
 def test_motion_is_the_derivative_of_what_was_logged():
     inside = slice(50, -50)
     found = motion_from_position(PLACE, None, RATE)
