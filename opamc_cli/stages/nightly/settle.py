@@ -4,6 +4,8 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import date, timedelta
+from itertools import accumulate
+from operator import or_
 
 from opamc_cli import __version__
 from opamc_cli.config.cell import CellConfig
@@ -181,11 +183,25 @@ def _missing(
                     text += f", as in the {weeks} weeks before; this weekday is not said again"
                 if not night:
                     text += f"; {HOW_TO_END}"
-                for index in said_in(gap, [""] * len(gap), remind_after):
+                # a free Saturday is no news that the robot is dead on Monday, too
+                reach = accumulate((_records_on(n, gap[0], lacking, own) for n in gap), or_)
+                for index in said_in(gap, [str(one) for one in reach], remind_after):
                     known = gap[0] <= gone.get(robot, "") <= gap[index]
                     if not known and weeks < REST_WEEKS:
                         yield Event(gap[index], robot, None, "missing", text)
                 gap = []
+
+
+def _records_on(night: str, begin: str, lacking: set[str], own: set[str]) -> bool:
+    """Return whether a robot has recorded on a night's weekday in the weeks before a gap begins.
+
+    And lacked none of these. A weekday that it has not had yet may be free; within a week comes
+    one that it has had.
+    """
+    day = date.fromisoformat(night)
+    weeks = {(day - timedelta(7 * n)).isoformat() for n in range(1, REST_WEEKS + 1)}
+    before = {one for one in weeks if one < begin}
+    return not own.isdisjoint(before) and lacking.isdisjoint(before)
 
 
 def _weeks_before(night: str, lacking: set[str], own: set[str]) -> int:

@@ -121,11 +121,25 @@ def test_the_weekday_on_which_a_robot_rests_is_not_said_for_ever():
     # so with weekends, but not with what goes on after them, nor with another day
     weekends = [day for day in range(1, 70) if day % 7 not in (0, 6)]
     assert [time for time, _ in missing(weekends)] == [f"2026-03-{n:02d}" for n in (7, 14, 21, 28)]
-    assert len(missing([day for day in rests if day != 57])) == 5
+    assert len({text for _, text in missing([day for day in rests if day != 57])}) == 5
     assert len(missing([day for day in rests if day != 53])) == 5
     # weeks without any file are no habit
     back = [day for day in range(1, 70) if not 7 <= day < 42 and day != 49]
     assert missing(back)[-1] == ("2026-04-19", "no file of 2026-04-19; others have some")
+
+
+def test_a_robot_that_is_dead_after_its_free_day_is_said_again_once():
+    """Off on Saturday 7 March, dead from Monday on: nothing was said until Saturday 14."""
+
+    def times(own):
+        return [time[-2:] for time, _ in missing(own, days=17)]
+
+    assert times(range(1, 6)) == ["07", "09", "16"]
+    # dead from Friday on is said once, whatever days follow
+    assert times([*range(1, 6), *range(8, 12)]) == ["07", "13"]
+    assert times([*range(1, 6), *range(8, 13)]) == ["07", "14", "16"]
+    # of a Saturday that used to have files it is said that there are none, and no more then
+    assert times([*range(7), *range(8, 13)]) == ["08", "14"]
 
 
 @pytest.mark.long
