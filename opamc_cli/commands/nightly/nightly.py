@@ -203,13 +203,19 @@ def acknowledge(
     why = _reason(why)
 
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
+        _check_known(history, loaded, robot)
         if axis is None:
             last = max((night for _, night in history.nights()), default="")
-            own = max((night for name, night in history.nights() if name == robot), default="")
-            if not own or own == last:
+            own = {night for name, night in history.nights() if name == robot}
+            if own == {""} or not last:
+                why_not = f"{robot} has files that tell no night" if own else "no night is known"
+                msg = f"{why_not}; there is nothing to acknowledge"
+                raise UsageError(msg)
+            if last in own:
                 msg = f"{robot} lacks no file of the last night; name the joint by --axis"
                 raise UsageError(msg)
-            text = f"no files since {own}, acknowledged: {why}"
+            since = f"files since {max(own)}" if own else "file at all"
+            text = f"no {since}, acknowledged: {why}"
             return Declared(_now(), robot, None, "gone", last, why), text
         standing = [
             alarm
@@ -248,12 +254,7 @@ def rebaseline(
     why = _reason(why)
 
     def said(history: Any, loaded: "CellConfig") -> tuple[Declared, str]:
-        known = {name for name, _ in history.nights()}
-        known |= set() if loaded.robots == "auto" else set(loaded.robots)
-        if robot not in known:
-            has = f"it has {', '.join(sorted(known)[:8])}" if known else "no night is known yet"
-            msg = f"{robot} is none of the cell's robots; {has}"
-            raise UsageError(msg)
+        _check_known(history, loaded, robot)
         begun = [of for name, of in begun_anew(history.declared()) if name == robot]
         if undo and night not in begun:
             has = f"there are {', '.join(begun)}" if begun else "there is none"
@@ -270,6 +271,16 @@ def rebaseline(
         return Declared(_now(), robot, None, "rebaselined", night, why), text
 
     _declare(cell, said, Output(as_json, quiet))
+
+
+def _check_known(history: Any, loaded: "CellConfig", robot: str) -> None:
+    """Refuse a name that is none of the cell's: it is mistyped."""
+    known = {name for name, _ in history.nights()}
+    known |= set() if loaded.robots == "auto" else set(loaded.robots)
+    if robot not in known:
+        has = f"it has {', '.join(sorted(known)[:8])}" if known else "no night is known yet"
+        msg = f"{robot} is none of the cell's robots; {has}"
+        raise UsageError(msg)
 
 
 def _declare(path: Path, said: Callable[..., Any], output: Output) -> None:

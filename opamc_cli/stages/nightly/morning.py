@@ -4,11 +4,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
-from shlex import quote
 from typing import Any
 
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.alarms.commands import ACKNOWLEDGE, REBASELINE, to_copy
 from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, said_of_unnamed, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
@@ -156,7 +156,7 @@ def tell(
         if robot.broken and not said_now:
             of = robot.failure
             why = f"{of.night} could not be judged: {of.why}" if of else "no recording"
-            standing_lines.append(f"{robot.name} {why}")
+            standing_lines.append(f"{robot.name} {to_copy(why, [robot.name], cell)}")
     told_now = {(event.robot, event.text) for event in news}
     standing_lines += [
         f"{robot.name} {event.text}"
@@ -173,7 +173,7 @@ def tell(
             robots = said.setdefault((OVER[event.kind], event.text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
-    lines += [f"{some(robots)} {text}" for (_, text), robots in said.items()]
+    lines += [f"{some(of)} {to_copy(text, of, cell)}" for (_, text), of in said.items()]
     strays: dict[str, list[str]] = {}
     unnamed: dict[str, str] = {}
     others: dict[str, list[str]] = {}
@@ -206,12 +206,9 @@ def _alarm_lines(
     yield f"{_place(robot, joint)}: {how}, not as it was since {alarm.since}"
     yield f"  {robot.text_of(joint)}"
     where = out / joint.report if joint.report else out / files.PAGE
-    of_robot, of_cell = quote(robot.name), f"--why TEXT --cell {quote(str(cell))}"
-    yield (
-        f"  see {where}; silence it with: opamc nightly acknowledge {of_robot} "
-        f"--axis {joint.axis} {of_cell}"
-    )
-    yield f"  after a repair: opamc nightly rebaseline {of_robot} --from DATE {of_cell}"
+    silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
+    yield to_copy(f"  see {where}; silence it with: {silence}", [robot.name], cell)
+    yield to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell)
 
 
 def _place(robot: RobotSummary, joint: JointSummary) -> str:

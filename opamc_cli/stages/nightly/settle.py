@@ -12,6 +12,7 @@ from opamc_cli.config.cell import CellConfig
 from opamc_cli.config.models import digest
 from opamc_cli.decision.trend.alarm import LATELY
 from opamc_cli.decision.trend.chart import LIMIT
+from opamc_cli.stages.nightly.alarms.commands import ACKNOWLEDGE
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.plan.baselines import NIGHTS_AGAIN
@@ -29,7 +30,7 @@ OF_NIGHT = frozenset({files.VERDICT, files.REPORT})
 REST_WEEKS = 4
 """Weeks in a row after which a weekday without files, such as Sunday, is the robot's habit."""
 
-HOW_TO_END = "if they are to have none: opamc nightly acknowledge ROBOT --why TEXT"
+HOW_TO_END = f"if they are to have none: {ACKNOWLEDGE}"
 """What ends that a robot counts as missing, beside its files."""
 
 
@@ -168,7 +169,9 @@ def _missing(
         if not own and by_robot[robot]:
             continue  # all its files tell no night, which is said
         if not own:
-            yield Event(nights[0] if nights else "", robot, None, "missing", "no file at all")
+            if robot not in gone:
+                first, text = min(nights, default=""), f"no file at all; {HOW_TO_END}"
+                yield Event(first, robot, None, "missing", text)
             continue
         lacking = {night for night in nights if night > min(own)} - own
         gap: list[str] = []

@@ -356,7 +356,9 @@ def summarise(
                 last.get(name),
                 undated.get(name),
                 missing.get(name, ""),
-                name in last and name not in undated and last[name].night < gone.get(name, ""),
+                name in gone
+                and name not in undated
+                and (name not in last or last[name].night < gone[name]),
                 name in last
                 and last[name].status == "baseline"
                 and complete.get(name, "9999") < last[name].night,

@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 import shutil
 import sqlite3
 from datetime import date, timedelta
@@ -25,7 +26,7 @@ from opamc_cli.storage.runs.writing import save_run
 from tests.stages.nightly.changed_logs import add_night, set_clock, states
 
 KEY = json.dumps({"version": "1", "config": "", "baseline": "", "files": []})
-GONE = "if they are to have none: opamc nightly acknowledge ROBOT --why TEXT"
+GONE = "if they are to have none: opamc nightly acknowledge"
 
 
 def test_a_clock_that_tells_no_night_is_said_until_it_is_set(cell, logs, opamc):
@@ -87,13 +88,15 @@ def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
     for name in ("r1", "r4", "r5"):
         shutil.rmtree(logs / name / night(4))
     said = opamc("nightly", cell, "--quiet").out
-    assert said == f"r1, r4, r5 no file of {night(4)}; others have some; {GONE}\n"
-    for index in range(5, 12):
+    end = f"{GONE} ROBOT --why TEXT --cell {cell}"
+    assert said == f"r1, r4, r5 no file of {night(4)}; others have some; {end}\n"
+    for index in range(5, 15):
         path = shutil.copytree(logs / "r3" / night(4), logs / "r3" / night(index))
         set_clock(path / "cycle.parquet", f"{night(index)}T22:00:00+00:00")
         said = opamc("nightly", cell, "--quiet").out
         gone = f"r1, r4, r5 no file of {night(4)} to {night(index)}; others have some"
-        assert (gone in said) == (index == 11)  # the alarm's remind_after: a week
+        # the first weekday that they are known to have had, then the alarm's remind_after
+        assert (gone in said) == (index in (7, 14))
 
 
 def missing(own, days=70):
@@ -157,6 +160,43 @@ def test_a_renamed_robot_is_reminded_of_until_somebody_says_that_it_is_gone(cell
     path = shutil.copytree(logs / "r1" / night(3), logs / "r1" / night(12))
     set_clock(path / "cycle.parquet", f"{night(12)}T22:00:00+00:00")
     assert f"r1 no file of {night(13)}" in opamc("nightly", cell, "--quiet").out
+
+
+def test_a_robot_that_never_had_a_file_is_acknowledged_by_the_line_that_says_so(cell, logs, opamc):
+    """The command of the morning's line works as it stands, whatever the robot is called."""
+    cell.write_text(cell.read_text() + "robots: {r1: {}, r3: {}, KR 6 Süd: {}}\n")
+    first = opamc("nightly", cell, "--quiet")
+    assert first.code == ExitCode.PARTIAL
+    command = f"opamc nightly acknowledge 'KR 6 Süd' --why TEXT --cell {cell}"
+    assert first.out == f"KR 6 Süd no file at all; if they are to have none: {command}\n"
+    ended = opamc(*shlex.split(command)[1:])
+    assert (ended.code, ended.out) == (0, "KR 6 Süd no file at all, acknowledged: TEXT\n")
+    for _ in range(2):
+        again = opamc("nightly", cell)
+        assert again.code == ExitCode.DONE
+        assert again.out.startswith("1 robot without recordings, acknowledged; 2 robots healthy")
+    # until it has some
+    shutil.copytree(logs / "r1" / night(3), logs / "KR 6 Süd" / night(3))
+    set_clock(logs / "KR 6 Süd" / night(3) / "cycle.parquet", f"{night(3)}T22:00:06+00:00")
+    shutil.copytree(logs / "KR 6 Süd" / night(3), logs / "KR 6 Süd" / night(5))
+    set_clock(logs / "KR 6 Süd" / night(5) / "cycle.parquet", f"{night(5)}T22:00:06+00:00")
+    assert "acknowledged" not in opamc("nightly", cell).out
+
+
+def test_a_robot_that_is_none_of_the_cell_s_is_not_acknowledged(cell, logs, opamc):
+    opamc("nightly", cell, "--quiet")
+    said = {
+        ("r7",): "r7 is none of the cell's robots; it has r1, r3",
+        ("r7", "--axis", 1): "r7 is none of the cell's robots; it has r1, r3",
+        ("r1",): "r1 lacks no file of the last night; name the joint by --axis",
+    }
+    for of, sentence in said.items():
+        ended = opamc("nightly", "acknowledge", *of, "--why", "x", "--cell", cell)
+        assert (ended.code, ended.sentences) == (ExitCode.USAGE, [f"opamc: {sentence}"])
+    shutil.copytree(logs / "r3" / night(4), logs / "r4" / "2061-01-01")
+    opamc("nightly", cell, "--quiet")
+    ended = opamc("nightly", "acknowledge", "r4", "--why", "x", "--cell", cell)
+    assert "r4 has files that tell no night; there is nothing to acknowledge" in ended.err
 
 
 def test_a_silent_cell_is_said_again(tmp_path):

@@ -7,6 +7,7 @@ from typing import Any
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import LATELY, recurring
+from opamc_cli.stages.nightly.alarms.commands import REBASELINE
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
 from opamc_cli.stages.nightly.alarms.together import kind
 from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
@@ -29,8 +30,8 @@ def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) 
             row = f" ({len(streak)} nights in a row)" if len(streak) > 1 else ""
             text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
             if last is rows[-1] and len(streak) >= LASTS:
-                again = f"opamc nightly rebaseline {first['robot']} --from {first['night']}"
-                text += f"; if that is meant to stay: {again} --why TEXT"
+                again = REBASELINE.replace("DATE", first["night"])
+                text += f"; if that is meant to stay: {again}"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from opamc_cli.stages.nightly.alarms.commands import REBASELINE
 from opamc_cli.stages.nightly.inputs.baseline_name import baseline_name
 from opamc_cli.stages.nightly.inputs.recordings import Recording, some
 from opamc_cli.stages.nightly.plan.planned import Comparison, Situation
@@ -57,8 +58,7 @@ class Baselines:
                 why = (
                     f"the alarm of {alarm.raised} stands on axis {alarm.axis}: no night under it "
                     f"becomes part of a baseline, and that of {condition} is not complete; after "
-                    "a repair, or if it is meant to stay: opamc nightly rebaseline ROBOT --from "
-                    "DATE --why TEXT"
+                    f"a repair, or if it is meant to stay: {REBASELINE}"
                 )
                 return Comparison(program, condition, targets, missing=why)
             inside = not members or night in members
@@ -82,7 +82,7 @@ class Baselines:
         if gone and len(left) < LEAST_NIGHTS:
             why = (
                 f"the recordings of the baseline's nights {gone} {how}; put them back, or begin a "
-                "new baseline with `opamc nightly rebaseline`"
+                f"new baseline: {REBASELINE}"
             )
             return Comparison(program, condition, targets, (), "", why, tuple(members), True)
         if gone:
