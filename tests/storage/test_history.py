@@ -4,7 +4,7 @@ import sqlite3
 from contextlib import closing, suppress
 
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import Event, NightRow
+from opamc_cli.storage.history.rows import Declared, Event, NightRow
 
 KEY = '{"version": "1", "config": "c", "baseline": "b", "files": []}'
 
@@ -89,3 +89,14 @@ def test_verdicts_of_two_programs_that_are_others_are_both_kept(tmp_path):
         assert history.events(untold=True) == []
         history.record_night(night, events=both[:1])
         assert history.events() == both
+
+
+def test_an_alarm_that_was_acknowledged_is_news_if_it_stands_again(tmp_path):
+    """Without a start between: nobody but the declaration knows that it was silent."""
+    stands = Event("2026-03-02 lift", "r1", 2, "stands", "")
+    with History(tmp_path / "history.sqlite") as history:
+        history.tell([stands, Event("2026-03-02 lift", "r1", 1, "stands", "")])
+        history.declare(Declared("t", "r1", 2, "acknowledged", "2026-03-04", "gear"), "known")
+        assert history.untold([stands]) == [stands]
+        told = {(one.axis, one.kind) for one in history.told(("stands", "known"))}
+        assert told == {(1, "stands"), (2, "known")}

@@ -197,7 +197,7 @@ def acknowledge(
     as_json: Json = False,
     quiet: Quiet = False,
 ) -> None:
-    """Silence the alarm of a joint until it is over, or of a robot that it has no files."""
+    """Silence a joint's alarm until it is over or at fault, or that a robot has no files."""
     from opamc_cli.storage.history.rows import Declared
 
     why = _reason(why)
@@ -225,7 +225,8 @@ def acknowledge(
         if not standing:
             msg = f"no alarm stands on axis {axis} of {robot}; `opamc history` shows what does"
             raise UsageError(msg)
-        night = max(alarm.raised for alarm in standing)
+        # what is silenced is what was there until now
+        night = max(night for name, night in history.nights() if name == robot)
         text = f"axis {axis}: alarm since {standing[0].since} acknowledged: {why}"
         return Declared(_now(), robot, axis, "acknowledged", night, why), text
 

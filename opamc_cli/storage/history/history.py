@@ -431,6 +431,12 @@ class History:
         with self.transaction():
             self._put("declared", [said])
             self._put("event", [Event(said.time, said.robot, said.axis, said.kind, text)])
+            if said.kind == "acknowledged":  # if nights raise it once more, that is news
+                self._db.execute(
+                    "UPDATE OR REPLACE told SET kind = 'known' "
+                    "WHERE (robot, axis, kind) = (?, ?, 'stands')",
+                    (said.robot, said.axis),
+                )
             if said.kind == "rebaselined":  # what its nights say from now on is news
                 of = "WHERE robot = ? AND time >= ? AND kind"
                 place = (said.robot, said.night)

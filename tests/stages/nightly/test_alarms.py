@@ -144,6 +144,38 @@ def test_an_acknowledged_alarm_is_another_after_a_new_baseline():
     assert acknowledged(known, new) == [None]
 
 
+def test_an_acknowledged_alarm_is_raised_once_more_by_nights_at_fault_where_none_was():
+    """Acknowledged at effect 0.05, a joint that became a fault was silent for 14 mornings."""
+    states = ["healthy"] * 8 + ["changed"] * 8 + ["healthy", "fault", "fault", "fault"]
+    series = nights_of(states, [*0.1 * np.sin(np.arange(8)), *[3.0] * 12])
+    for row in series:
+        row["effect"] = {"changed": 0.05, "fault": 0.5}.get(row["state"], 0.0)
+
+    def alarm(until, *nights):
+        declared = [
+            Declared(f"{night}T09", "r1", 2, "acknowledged", night, "gear") for night in nights
+        ]
+        found = settle_robot("r1", series[:until], (), declared, AlarmConfig(), 0.4, 6)
+        said = [(one.time[-2:], one.text) for one in found.events if one.kind == "alarm"]
+        return found.alarms[0], said
+
+    known, more = "2026-03-14", "acknowledged on 2026-03-14 at effect 0.05, and at fault since"
+    # a lone night at fault is not enough
+    assert [alarm(until, known)[0].acknowledged for until in (14, 17, 18)] == ["gear"] * 3
+    for until in (19, 20):
+        stands, said = alarm(until, known)
+        assert stands.acknowledged is None
+        assert stands.text.startswith(f"{more} 2026-03-19; at fault, effect 0.50")
+        assert [time for time, _ in said] == [stands.raised[-2:], "19"]
+        assert said[1][1].startswith(f"axis 2: {more} 2026-03-19; at fault, effect 0.50")
+    # acknowledged again, or with a fault among its nights, it is silent
+    for nights in ((known, "2026-03-19"), ("2026-03-18",)):
+        assert alarm(20, *nights)[0].acknowledged == "gear"
+    # one gross night is enough
+    series[17]["effect"] = 1.0
+    assert alarm(18, known)[0].acknowledged is None
+
+
 def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():
     alarm = AlarmRow("r1", "", 0, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
     joints = [

@@ -2,14 +2,14 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from opamc_cli.config.cell import AlarmConfig
-from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, nights_to_go
+from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, episodes, nights_to_go
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
-from opamc_cli.stages.nightly.alarms.not_judged import said_in
+from opamc_cli.stages.nightly.alarms.not_judged import is_own_fault, said_in
 from opamc_cli.stages.nightly.alarms.trend import FALLEN, trend_of, trend_phrase
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, begun_anew
 
@@ -69,13 +69,24 @@ def alarm_of(
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)
+    spans = [(found.raised, last, "")]
+    if known is not None:
+        after = sum(row["night"] <= known.night for row in rows)
+        spans = [(found.raised, after, "")]
+        anew = _raised_anew(rows[:last], nights, own[0], after, joint.rule)
+        if anew is not None:
+            effects = [row["effect"] or 0.0 for row in rows[:after] if row["state"] in JUDGED]
+            how = f"acknowledged on {known.time[:10]} at effect {effects[-1]:.2f}, and at fault"
+            spans.append((anew, last, f"{how} since {rows[anew]['night']}; "))
+            known, text = None, spans[-1][-1] + text
     # later nights do not change what was said in earlier ones
-    said = told(found.raised)[1]
-    events = [Event(first["night"], robot, axis, "alarm", f"{joint.name}: {said}")]
-    dates = [row["night"] for row in rows[found.raised : last]]
-    for index in said_in(dates, [""] * len(dates), joint.rule.remind_after)[1:]:
-        if known is None or dates[index] < known.night:
-            said = f"{joint.name}: alarm since {since}; {told(found.raised + index)[1]}"
+    events = []
+    for begin, stop, why in spans:
+        said = f"{joint.name}: {why}{told(begin)[1]}"
+        events.append(Event(rows[begin]["night"], robot, axis, "alarm", said))
+        dates = [row["night"] for row in rows[begin:stop]]
+        for index in said_in(dates, [""] * len(dates), joint.rule.remind_after)[1:]:
+            said = f"{joint.name}: alarm since {since}; {why}{told(begin + index)[1]}"
             events.append(Event(dates[index], robot, axis, "reminder", said))
     if ended:
         how = f"no sign of it in {joint.rule.of} judged nights"
@@ -108,13 +119,33 @@ def _acknowledged(
     return next(
         (
             one
-            for n, one in enumerate(declared)
+            for n, one in reversed([*enumerate(declared)])
             if (one.kind, one.axis) == ("acknowledged", axis)
             and raised <= one.night < until
             and in_force(declared[:n]) == in_force(declared)
         ),
         None,
     )
+
+
+def _raised_anew(
+    rows: Sequence[Mapping[str, Any]],
+    nights: Sequence[Night],
+    begin: int,
+    after: int,
+    rule: AlarmConfig,
+) -> int | None:
+    """Return the night that raises an acknowledged alarm once more; None without one.
+
+    Nights at fault alone do, by the same rule, and only if none that was acknowledged, from `begin`
+    until `after`, was at fault: else they are what was there.
+    """
+    fault = [is_own_fault(row) for row in rows]
+    if any(fault[begin:after]):
+        return None
+    later = [replace(nights[index], signal=fault[index]) for index in range(after, len(rows))]
+    found = episodes(later, rule.nights, rule.of)
+    return after + found[0].raised if found else None
 
 
 def _own(nights: Sequence[Night], found: Episode, among: int) -> list[int]:

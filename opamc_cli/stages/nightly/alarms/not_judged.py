@@ -72,7 +72,7 @@ def _coming_back(
     """Yield nights at fault, as runs without another, those within a month together."""
     judged = [row for row in rows if row["state"] in JUDGED]
     times: list[list[Mapping[str, Any]]] = []
-    for fault, run in groupby(judged, key=_is_own_fault):
+    for fault, run in groupby(judged, key=is_own_fault):
         nights = list(run) if fault else []
         if nights and times and day(nights[0]["night"]) - day(times[-1][-1]["night"]) > LATELY:
             yield times
@@ -82,7 +82,8 @@ def _coming_back(
         yield times
 
 
-def _is_own_fault(row: Mapping[str, Any]) -> bool:
+def is_own_fault(row: Mapping[str, Any]) -> bool:
+    """Return whether a night is at fault by what is the joint's own."""
     return row["state"] == "fault" and not row["harmless"]
 
 
