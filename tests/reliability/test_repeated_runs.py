@@ -59,6 +59,22 @@ def test_a_run_twice_in_the_baseline_counts_once(opamc, baseline, tonight, tmp_p
     assert verdict["baseline"]["runs"] == ["night-0", "night-1", "night-2"]
 
 
+def test_a_copy_beside_a_target_s_run_is_a_note(opamc, baseline, tonight, tmp_path):
+    """Exit code 4 said that something was not judged, and nothing was lost."""
+    folder = tmp_path / "target"
+    folder.mkdir()
+    copied(tonight, folder / "night.parquet")
+    copied(tonight, folder / "night (copy).parquet")
+    ended = opamc(
+        *("diagnose", "--baseline", baseline, "--target", folder, "--out", tmp_path / "out"),
+        *("--set", "joint.explain=false"),
+    )
+    assert ended.code == ExitCode.DONE
+    assert "is the same recording as the target's" in ended.err
+    assert "; nothing is missing by it" in ended.err
+    assert len(json.loads((tmp_path / "out" / "verdict.json").read_text())["target"]["runs"]) == 1
+
+
 def begun(source, to, started_at):
     """Write the same samples with another time, as a logger that is stuck does."""
     with Run(source) as run:
@@ -75,12 +91,14 @@ def test_samples_of_the_baseline_with_another_time_are_no_night(opamc, baseline,
     assert "stuck.parquet: left out, its samples are those of the baseline's" in sentence
     copied(tonight, folder / "tonight.parquet")
     copied(tonight, folder / "twice.parquet")
+    begun(tonight, folder / "tonight-again.parquet", "2026-03-20T22:00:00Z")
     ended = opamc("diagnose", "--baseline", baseline, "--target", folder, *at, "--quiet")
     assert ended.code == ExitCode.PARTIAL
     first, second = ended.sentences
-    assert "twice.parquet: left out, is the same recording as" in first
+    assert "tonight-again.parquet: left out, its samples are those of" in first
     assert second == sentence
     verdict = json.loads((tmp_path / "out" / "verdict.json").read_text())
+    assert "twice.parquet is the same recording as the target's" in "".join(verdict["notes"])
     assert verdict["baseline"]["runs"] == ["night-0", "night-1", "night-2"]
     assert verdict["target"]["runs"] == ["tonight"]
 

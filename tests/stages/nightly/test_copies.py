@@ -4,6 +4,7 @@ import json
 import shutil
 import sqlite3
 
+import cell_logs
 import numpy as np
 import pytest
 from cell_logs import night
@@ -21,6 +22,36 @@ def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc
     assert ended.code == ExitCode.PARTIAL
     assert f"r1 {night(4)}: {stuck}: is a copy of {logs / 'r1' / night(3)}" in ended.out
     assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
+
+
+def test_a_file_that_was_copied_is_no_loss_and_hides_none(cell, logs, opamc):
+    """Four copies were four sentences "in part not judged", though all was judged."""
+    for index in (2, 4):
+        path = logs / "r1" / night(index)
+        shutil.copy(path / "cycle.parquet", path / "cycle (copy).parquet")
+    ended = opamc("nightly", cell, "--quiet")
+    assert (ended.code, ended.out) == (ExitCode.DONE, "")
+
+    def runs(robot):
+        with sqlite3.connect(cell.parent / "nightly" / "history.sqlite") as db:
+            return db.execute(
+                "SELECT n_runs, notes FROM verdict JOIN night USING (robot, night) "
+                "WHERE robot = ? AND night = ? LIMIT 1",
+                (robot, night(4)),
+            ).fetchone()
+
+    count, notes = runs("r1")
+    assert (count, "nothing is missing by it" in notes) == (1, True)
+    # beside a baseline of two recordings a night a copy is no second one
+    for index in range(4):
+        cell_logs.record(logs / "r1" / night(index) / "second.parquet", 500, 50 + index)
+    assert f"r1 {night(4)}: in part not judged: 1 recording" in opamc("nightly", cell).out
+    # one that says to have begun at another time stays, for the diagnosis to say what is missing
+    stuck = logs / "r3" / night(4) / "stuck.parquet"
+    shutil.copy(stuck.with_name("cycle.parquet"), stuck)
+    set_clock(stuck, f"{night(4)}T23:00:00+00:00", scale=1)
+    opamc("nightly", cell)
+    assert runs("r3") == (2, "[]")
 
 
 def test_a_logger_that_writes_its_samples_anew_is_stuck_all_the_same(cell, logs, opamc):

@@ -1,6 +1,6 @@
-"""Recordings of an earlier night that a logger which is stuck has written again."""
+"""Recordings that are there twice: of an earlier night, by a logger which is stuck, or by hand."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from opamc_cli.stages.nightly.inputs.recordings import Recording
@@ -35,3 +35,17 @@ def without_copies(recordings: Sequence[Recording]) -> list[Recording]:
             one = replace(one, facts=Facts(error=error))
         found.append(one)
     return found
+
+
+def twins(recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Recording]]:
+    """Yield each recording that is one of its own night once more, and that one, by their paths.
+
+    Somebody has copied a file. One that says to have begun at another time is none of these: its
+    logger was stuck, and what it should hold is missing.
+    """
+    first: dict[tuple[str, str, str | None], Recording] = {}
+    for one in sorted(recordings, key=lambda one: one.log.path):
+        if not one.facts.error:
+            key = one.night, one.facts.samples or one.sha256, one.facts.started_at
+            if first.setdefault(key, one) is not one:
+                yield one, first[key]

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
-from opamc_cli.stages.nightly.inputs.copies import without_copies
+from opamc_cli.stages.nightly.inputs.copies import twins, without_copies
 from opamc_cli.stages.nightly.inputs.recordings import Recording
 from opamc_cli.stages.nightly.plan.baselines import Baselines, Series
 from opamc_cli.stages.nightly.plan.planned import PlannedNight, RobotPlan, Situation
@@ -25,6 +25,8 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         What is known besides.
     """
     recordings = without_copies(recordings)
+    twin_of = {one.log.path: (one, first) for one, first in twins(recordings)}
+    recordings = [one for one in recordings if one.log.path not in twin_of]
     usable = [one for one in recordings if not one.facts.error]
     fixed = {one.sha256 for one in now.fixed}
     judged = [one for one in usable if one.sha256 not in fixed]
@@ -45,7 +47,12 @@ def plan_robot(robot: str, recordings: Sequence[Recording], now: Situation) -> R
         programs_of.setdefault(night, []).append(program)
     for night in sorted({one.night for one in recordings}):
         broken = tuple(broken_of.get(night, ()))
-        notes: list[str] = []
+        notes = [
+            f"left out: {one.log.path} is the same recording as {first.log.path}; nothing is "
+            "missing by it"
+            for one, first in twin_of.values()
+            if one.night == night
+        ]
         comparisons = []
         for program in sorted(programs_of.get(night, ())):
             condition, targets = series[program, night]

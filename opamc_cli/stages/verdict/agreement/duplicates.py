@@ -22,9 +22,9 @@ class Repeated:
     baseline: set[Path] = field(default_factory=set)
     target: set[Path] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
-    """One sentence for each of the baseline's."""
+    """One sentence for each of which nothing is missing."""
     errors: list[InputError] = field(default_factory=list)
-    """One for each of the target's, which is not judged."""
+    """One for each of the target's that may stand for another recording, which is not judged."""
 
 
 def repeated(
@@ -33,8 +33,9 @@ def repeated(
     """Find the runs that are given twice.
 
     A copy, a link, or the same samples written by another program are equal. Of equal recordings,
-    the first name of one side is kept, and the target's rather than the baseline's: but for one
-    that says to have begun at another time, as a logger that is stuck repeats what it knows.
+    the first name of one side is kept, and the target's rather than the baseline's. One of the
+    target that says to have begun at another time is an error: a logger that is stuck repeats what
+    it knows.
 
     Parameters
     ----------
@@ -55,7 +56,12 @@ def repeated(
         first = judged.setdefault(key, path)
         if first != path:
             found.target.add(path)
-            found.errors.append(InputError(f"{path}: left out, is the same recording as {first}"))
+            if _begun(path) == _begun(first):
+                where = f"target's {path} is the same recording as the target's {first}"
+                found.notes.append(f"left out: the {where}; nothing is missing by it")
+            else:
+                why = f"left out, its samples are those of {first}; was it recorded?"
+                found.errors.append(InputError(f"{path}: {why}"))
     known: dict[str, Path] = {}
     healthy = [path for _, path in find_runs(baseline)]
     for key, path in _hashed(healthy, remembered(_hash_of_currents, kept)):
