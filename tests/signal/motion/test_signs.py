@@ -34,8 +34,9 @@ def test_a_current_without_its_sign():
     assert lacks_sign(friction[:69], v[:69]) is False
     assert lacks_sign(friction[:70], v[:70]) is True
     moving = np.abs(v) > 0
+    rests = np.cumsum(~moving)
     for n_rest, found in ((9, None), (10, True)):
-        chosen = moving | (np.cumsum(~moving) <= n_rest)
+        chosen = moving | ((rests > 20) & (rests <= 20 + n_rest))  # between the two ways
         assert lacks_sign(friction[chosen], v[chosen]) is found
     # less than a third of the largest speed is neither rest nor way
     slow = np.where(v == 0, 0.29, v)
@@ -84,6 +85,14 @@ def test_a_current_that_never_comes_near_zero_has_not_changed_its_sign():
     lifted = coupled - coupled.min()
     assert lacks_sign(lifted + 0.49 * step, v) is True
     assert lacks_sign(lifted + 0.51 * step, v) is False
+
+
+def test_a_load_that_friction_takes_near_zero_once_has_its_sign():
+    """Its current grows with the speed where the axis that bears it moves alike."""
+    v, _ = held_joint()
+    current = 2.0 + 50 * np.gradient(np.abs(np.tile(v, 3)))
+    current[-70:-50] -= 2.0 * np.hanning(20)
+    assert lacks_sign(current, np.tile(v, 3)) is False
 
 
 def test_an_overshoot_of_resampling_is_no_sign():
