@@ -211,11 +211,11 @@ def find_slow_causes(
         if cause is None:
             break
         last = cause.shift.terms[-1].effect.name
-        own = dict(zip(population.names, population.mean, strict=True)).get(last, 0.0)
-        if last in FRICTION and own > 0:  # of a negative friction a share says nothing
-            cause = replace(cause, evidence={"relative_change": cause.shift.coefficients[-1] / own})
-        if last == SCALE.name:
-            cause = replace(cause, evidence={"relative_change": cause.shift.coefficients[-1]})
+        own = cause.shift.coefficients[-1]
+        # dry and viscous friction share it as the travel happens to tell them from one another
+        change = grease.whole if last in FRICTION else own
+        if last == SCALE.name or (last in FRICTION and change * own > 0):
+            cause = replace(cause, evidence={"relative_change": change})
         found.append(cause)
         gone |= {cause.effect, cause.shift.terms[-1].effect.name, *cause.ties}
         if cause.effect == "thermal_viscous":

@@ -464,10 +464,11 @@ def _interpretation(cause: Cause) -> str:
     meaning = ANY_FRICTION if unsure and own != LESS_FRICTION else own
     if change is None:
         return meaning
+    what = "the current" if cause.effect == SCALE.name else "the joint's friction"
     if change >= MUCH:
-        return f"{meaning}; it has grown much"
+        return f"{meaning}; {what} has grown much"
     way = "grown" if change > 0 else "fallen"
-    return f"{meaning}; it has {way} by {abs(change):.0%}"
+    return f"{meaning}; {what} has {way} by {abs(change):.0%}"
 
 
 def _why(cause: Cause, change: Change) -> list[str]:

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 import sessions
-from sessions import COEFFICIENTS, LIBRARY, TERMS, units_of
+from closing import moved
+from sessions import COEFFICIENTS, LIBRARY, RATE, TERMS, units_of
 
 from opamc_cli.joint.change import search
 from opamc_cli.joint.change.search import find_slow_causes
@@ -44,6 +45,14 @@ def thick(q, v, a, t):
 
 def stiff(q, v, a, t):
     return 1.5 * q + 0.5
+
+
+def of_friction(extra):
+    """By which share a joint has more friction in all, as root mean square on its way."""
+    q, v, _ = moved("cyclic", RATE, 16.0)
+    own = COEFFICIENTS[3] * np.sign(v) + COEFFICIENTS[4] * v
+    before, after = (np.mean(one[np.abs(v) > 0.1] ** 2) for one in (own, own + extra(q, v, 0, 0)))
+    return np.sqrt(after / before) - 1
 
 
 def test_healthy_sessions_have_no_cause():
@@ -93,7 +102,7 @@ def test_friction_that_grows_with_the_speed_may_be_grease_where_no_temperature_i
     assert cause.effect == "thermal_viscous"
     assert cause.parameters == {}
     assert "no temperature was logged" in cause.interpretation
-    assert cause.evidence["relative_change"] == pytest.approx(0.15 / COEFFICIENTS[4], rel=0.3)
+    assert cause.evidence["relative_change"] == pytest.approx(of_friction(thick), rel=0.3)
     assert "viscous" in cause.ties
     # By a factor of two at most.
     assert causes_of(lambda q, v, a, t: 0.5 * v)[0].effect == "viscous"
@@ -105,13 +114,13 @@ def test_friction_that_grows_with_the_speed_may_be_grease_where_no_temperature_i
 
 @pytest.mark.parametrize("change", [0.5, -0.5])
 def test_of_friction_it_is_known_by_how_much_it_has_grown(change):
-    (cause,) = causes_of(
-        lambda q, v, a, t: change * COEFFICIENTS[3] * np.sign(v),
-        library=only("coulomb"),
-        noise_a=0.001,
-        spread=0.0,
-    )
-    assert cause.evidence["relative_change"] == pytest.approx(change, rel=0.05)
+    """Of all of it, dry and viscous: how they share is not sure (a brake's 67 % were 316 %)."""
+
+    def more(q, v, a, t):
+        return change * COEFFICIENTS[3] * np.sign(v)
+
+    (cause,) = causes_of(more, library=only("coulomb"), noise_a=0.001, spread=0.0)
+    assert cause.evidence["relative_change"] == pytest.approx(of_friction(more), rel=0.05)
 
 
 def test_friction_that_has_grown_at_all_speeds_is_no_grease():
@@ -172,11 +181,15 @@ def test_dry_friction_changes_by_no_more_than_the_temperature_can_do(colder, dry
 )
 def test_friction_that_falls_is_warmth_first_where_that_can_be(colder, effect, word):
     """Grease amount and seals were to be checked where a hall was 22 degrees warmer."""
-    (cause,) = causes_of(lambda q, v, a, t: -0.2 * np.sign(v), colder=colder)
+
+    def less(q, v, a, t):
+        return -0.2 * np.sign(v)
+
+    (cause,) = causes_of(less, colder=colder)
     assert cause.effect == effect
     assert word in cause.interpretation
     assert cause.shift.falls == pytest.approx(0.2, abs=0.03)
-    assert cause.evidence["relative_change"] == pytest.approx(-0.4, abs=0.06)
+    assert cause.evidence["relative_change"] == pytest.approx(of_friction(less), abs=0.06)
 
 
 @pytest.mark.parametrize(("dry", "wet"), [(-0.08, -0.3), (0.0, -0.6), (-0.3, -0.3)])

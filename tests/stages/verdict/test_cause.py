@@ -57,9 +57,9 @@ def test_a_ground_flexspline_is_a_ripple_near_its_passage():
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (0.5, "meaning; it has grown by 50%"),
-        (-0.3, "meaning; it has fallen by 30%"),
-        (30.0, "meaning; it has grown much"),
+        (0.5, "meaning; the joint's friction has grown by 50%"),
+        (-0.3, "meaning; the joint's friction has fallen by 30%"),
+        (30.0, "meaning; the joint's friction has grown much"),
         (None, "meaning"),
     ],
 )
@@ -78,8 +78,8 @@ def test_of_friction_it_is_said_whether_it_has_grown(change, said):
     [
         ("sublinear_friction", ("coulomb",), "friction, in a form that the recordings do not tell"),
         ("coulomb", ("viscous", "offset"), "friction, in a form that the recordings do not tell"),
-        ("sublinear_friction", ("spring",), "meaning; it has grown by 50%"),
-        ("spring", ("coulomb",), "meaning; it has grown by 50%"),
+        ("sublinear_friction", ("spring",), "meaning; the joint's friction has grown by 50%"),
+        ("spring", ("coulomb",), "meaning; the joint's friction has grown by 50%"),
     ],
 )
 def test_of_forms_of_friction_that_tie_none_is_claimed(effect, ties, said):
@@ -90,7 +90,7 @@ def test_of_forms_of_friction_that_tie_none_is_claimed(effect, ties, said):
     )  # fmt: skip
     told = cause._entry(Change((found,), 1.0, False))["interpretation"]
     assert told.startswith(said)
-    assert told.endswith("; it has grown by 50%")
+    assert told.endswith("; the joint's friction has grown by 50%")
 
 
 def test_friction_that_has_fallen_for_no_warmth_sends_nobody_to_the_grease():
@@ -99,7 +99,7 @@ def test_friction_that_has_fallen_for_no_warmth_sends_nobody_to_the_grease():
         ties=("hysteresis",), evidence={"relative_change": -0.4},
     )  # fmt: skip
     told = cause._entry(Change((found,), 1.0, False))["interpretation"]
-    assert told == f"{LESS_FRICTION}; it has fallen by 40%"
+    assert told == f"{LESS_FRICTION}; the joint's friction has fallen by 40%"
     assert not any(word in told for word in ("grease", "seals"))
 
 
