@@ -16,6 +16,7 @@ from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
 from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.errors import ExitCode, InputError
+from opamc_cli.joint.change.search import SCALE
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
@@ -34,6 +35,11 @@ AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
 course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
 cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
+
+NO_PAYLOAD = (
+    "Another payload is unlikely: all other joints are healthy, and those further out carry the "
+    "same tool. All of this joint's current in one proportion explains as much."
+)
 
 MOST_FILES = 16
 """Of the target, the last ones: to judge one by itself takes a tenth of a second a joint."""
@@ -321,7 +327,8 @@ def content(
     axes = []
     for axis, judgement in decided.judgements.items():
         in_vain = causes.get(axis) == {}
-        cause = believed(judgement, causes.get(axis) or None, config.score)
+        cause = among_siblings(axis, causes.get(axis) or None, decided.judgements, config.score)
+        cause = believed(judgement, cause, config.score)
         final = with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
@@ -418,6 +425,34 @@ def policy_of(config: ScoreConfig) -> Policy:
         permutations=config.permutations,
         seed=config.seed,
     )
+
+
+def among_siblings(
+    axis: int,
+    cause: Mapping[str, Any] | None,
+    judgements: Mapping[int, Judgement],
+    config: ScoreConfig,
+) -> Mapping[str, Any] | None:
+    """Put another scale of the current before another payload that no other joint knows of.
+
+    Axes are counted from the base: those further out carry the same tool.
+    """
+    if cause is None or cause["effect"] != "payload_change" or SCALE.name not in cause["ties"]:
+        return cause
+    others = {other: one for other, one in judgements.items() if other != axis}
+    calm = all(one.state == "healthy" and not is_excused(one, config) for one in others.values())
+    if not calm or max(others, default=0) < axis:
+        return cause
+    return {
+        **cause,
+        "effect": SCALE.name,
+        "domain": SCALE.domain,
+        "origin": SCALE.origin,
+        "harmless": False,
+        "interpretation": SCALE.meaning,
+        "ties": ["payload_change", *(tie for tie in cause["ties"] if tie != SCALE.name)],
+        "why": [*cause["why"], NO_PAYLOAD],
+    }
 
 
 def believed(

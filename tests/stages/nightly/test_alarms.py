@@ -467,7 +467,7 @@ def test_a_joint_that_something_outside_it_changed_is_told_by_cause_and_again_af
     ]
     assert found[0].text.startswith(
         "axis 2: changed in 9 nights from 2026-03-03 to 2026-03-12 by what lies outside the joint "
-        "(sensor_gain and payload_change): check it, or rebaseline"
+        "(sensor gain and payload change): check it, or rebaseline"
     )
 
 

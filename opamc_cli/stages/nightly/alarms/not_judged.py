@@ -117,7 +117,7 @@ def outside(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
     found = [row for row in rows if row["state"] == "changed" and row["harmless"]]
     nights, causes = ([row[of] for row in found] for of in ("night", "cause"))
     for index in said_in(nights, causes, remind_after):
-        named = " and ".join(dict.fromkeys(causes))
+        named = " and ".join(dict.fromkeys(causes)).replace("_", " ")
         text = (
             f"{name}: changed in {_span(nights)} by what lies outside the joint ({named}): check "
             "it, or rebaseline if it is meant to stay; a fault that looks alike would not be told"
