@@ -63,7 +63,7 @@ def brief(
         "evidence": [*([which] if which else []), *_evidence(judgement, bundle, unit)][
             :MOST_EVIDENCE
         ],
-        "against": _against(judgement, cause, in_vain),
+        "against": f"{_against(judgement, cause, in_vain)} {_tie(cause)}".strip(),
     }
 
 
@@ -170,14 +170,20 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
         )
     if cause is not None and explains_little(cause):
         return "The named cause explains less than half of the change."
-    if cause is not None and cause.get("ties"):
-        return f"The recordings cannot tell it from: {cause['ties'][0]}."
+    if _tie(cause):
+        return ""
     if in_vain:
         return "No effect of the library explains it: repeat under the baseline's conditions."
     return (
         "Another payload, program, gain or temperature looks alike: repeat under the same "
         "conditions."
     )
+
+
+def _tie(cause: Mapping[str, Any] | None) -> str:
+    """Name the nearest of what a cause may be instead, whatever else speaks against it."""
+    ties = [] if cause is None else cause.get("ties", [])
+    return f"The recordings cannot tell it from: {ties[0].replace('_', ' ')}." if ties else ""
 
 
 def _besides(others: Sequence[Mapping[str, Any]]) -> str:

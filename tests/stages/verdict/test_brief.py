@@ -130,3 +130,15 @@ def test_that_a_cause_was_sought_in_vain_is_said():
     )
     told = [brief(judged, Bundle([], {}), None, in_vain=sought)["against"] for sought in (1, 0)]
     assert ["No effect of the library" in one for one in told] == [True, False]
+
+
+@pytest.mark.parametrize(("common", "first"), [(0.0, ""), (1.0, "The other joints moved too")])
+def test_what_a_cause_cannot_be_told_from_is_said_beside_all_else(common, first):
+    """Order 2.003 was tooth damage to whoever read the terminal alone."""
+    judged = SimpleNamespace(
+        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=common
+    )
+    cause = {"effect": "ripple", "interpretation": "a tooth", "origin": "joint", "share": 0.9}
+    told = brief(judged, Bundle([], {}), cause | {"ties": ["kinematic_error", "x"]})["against"]
+    assert told.startswith(first)
+    assert told.endswith("The recordings cannot tell it from: kinematic error.")
