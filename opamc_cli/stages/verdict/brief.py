@@ -14,6 +14,7 @@ from opamc_cli.stages.verdict.reasons import (
     CURRENT_LAG,
     IN_SPIKES,
     IN_THE_SUM,
+    OF_SENSORS,
     SENSOR_NOISE,
     SMALLER_PART,
     excuses_little,
@@ -181,9 +182,11 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
 
 
 def _tie(cause: Mapping[str, Any] | None) -> str:
-    """Name the nearest of what a cause may be instead, whatever else speaks against it."""
-    ties = [] if cause is None else cause.get("ties", [])
-    return f"The recordings cannot tell it from: {ties[0].replace('_', ' ')}." if ties else ""
+    """Name the nearest of what a cause may be instead, unless the sensors prove it."""
+    known = cause or {}
+    if not known.get("ties") or not OF_SENSORS.isdisjoint(known.get("evidence", ())):
+        return ""
+    return f"The recordings cannot tell it from: {known['ties'][0].replace('_', ' ')}."
 
 
 def _besides(others: Sequence[Mapping[str, Any]]) -> str:

@@ -142,3 +142,5 @@ def test_what_a_cause_cannot_be_told_from_is_said_beside_all_else(common, first)
     told = brief(judged, Bundle([], {}), cause | {"ties": ["kinematic_error", "x"]})["against"]
     assert told.startswith(first)
     assert told.endswith("The recordings cannot tell it from: kinematic error.")
+    proven = cause | {"ties": ["ripple"], "evidence": {"times_in_the_sum": 9.0}, "others": []}
+    assert "tell it from" not in brief(judged, Bundle([], {}), proven)["against"]
