@@ -22,6 +22,9 @@ SMALLEST_RATIO = 2.0
 SIDE_LOBES = 4.0
 NEIGHBOURHOOD = 12
 """Resolutions to either side over which the growth of the neighbours is taken."""
+FLOOR = 3.0
+"""Of the surroundings' power, added to all of a tapered spectrum: without it noise's scatter would
+be the measure of what lies far above it."""
 MAIN_LOBES = 1.5, 2.5
 """Resolutions to either side that a line takes, with what a lag makes of it; of tapered strokes."""
 
@@ -143,10 +146,15 @@ def grown_lines(spectra: OrderSpectra, between: float = 0.0, most: int = 6) -> l
         return []
     spacing = float(orders[1] - orders[0])
     around = 2 * int(NEIGHBOURHOOD * spectra.resolution / spacing) + 1
-    floor = 1e-12 * spectra.before.mean() + 1e-300
+    usual = spectra.before.mean(axis=0)
+    floor = FLOOR * median_filter(usual, around) if spectra.tapered else 1e-12 * usual.mean()
+    floor = floor + 1e-300
     sides = [uniform_filter1d(one, OVERSAMPLING, axis=1) for one in (spectra.before, spectra.after)]
     before, after = (np.log(side + floor) for side in sides)
-    _, p_values = moderated_t(before, after, between)
+    shares = np.mean(
+        [(one.mean(axis=0) / (one.mean(axis=0) + floor)) ** 2 for one in sides], axis=0
+    )
+    _, p_values = moderated_t(before, after, between * shares)
     trials = max((orders[-1] - orders[0]) / spectra.resolution, 1.0)
     p_values = np.minimum(p_values * trials, 1.0)
     growth = after.mean(axis=0) - before.mean(axis=0)
