@@ -212,8 +212,7 @@ def find_slow_causes(
             break
         last = cause.shift.terms[-1].effect.name
         own = cause.shift.coefficients[-1]
-        # dry and viscous friction share it as the travel happens to tell them from one another
-        change = grease.whole if last in FRICTION else own
+        change = grease.whole if last in FRICTION else own  # of dry and viscous friction together
         if last == SCALE.name or (last in FRICTION and change * own > 0):
             cause = replace(cause, evidence={"relative_change": change})
         found.append(cause)

@@ -22,8 +22,7 @@ MOSTLY = 0.5
 
 COURSE_TURNS = {"motor": 1.0, "joint": 0.05}
 """Turns of the machine angle between corners of that load's course: of a ripple, whose lowest order
-that matters is one a turn of the motor, next to nothing is in it. With 2.5 a third more of an arm's
-load was left; the same was named."""
+that matters is one a turn of the motor, next to nothing is in it (2.5: a third more was left)."""
 
 LOST = 2.0
 """Phases whose torque axis was followed wrongly leave this many times the usual residual."""
@@ -46,9 +45,8 @@ class Compared:
     def sums(self, terms: Sequence[Term], fine: bool = False, taken: Floats | None = None) -> Sums:
         """Products of regressors with one another and the current, over each unit.
 
-        On the coarse grid, or at the full rate: there, what smoothing took from the acceleration
-        stands beside the terms, for it is no effect. A current `taken`, (n,) on the grid, is taken
-        out first.
+        On the coarse grid, or at the full rate, where what smoothing took from the acceleration
+        stands beside the terms: it is no effect. A current `taken`, (n,), is taken out first.
         """
         blur = self.track.blur
         beside = [] if not fine or blur is None else [blur]

@@ -14,7 +14,6 @@ LATE = 0.2
 large, and of opposite signs."""
 SHORTEST = 5
 """Samples of a cubic's window."""
-
 MOST_DAMPED = 0.25
 """Of a critical damping of 1: a gear's is below 0.2."""
 
@@ -80,13 +79,11 @@ class Elasticity(Effect):
     def plausible(self, coefficients: Floats, parameters: Parameters) -> bool:
         """Inertia is positive, and damping moves its torque by less than an eighth of a turn.
 
-        Seen from the link, friction of the motor comes sooner: what comes later is a delay. What
-        is damped as much as may be rings no more: it is a lag.
+        What comes later, seen from the link, is a delay; what is damped as much as may be, a lag.
         """
-        if parameters.get("damping", 0.0) > 0.99 * MOST_DAMPED:
-            return False
+        rings = parameters.get("damping", 0.0) < 0.99 * MOST_DAMPED
         least = -LATE if self.form_of(parameters) else -1.0
-        return bool(least * coefficients[0] < coefficients[1] < coefficients[0])
+        return bool(rings and least * coefficients[0] < coefficients[1] < coefficients[0])
 
 
 def _highest(track: Track) -> float:

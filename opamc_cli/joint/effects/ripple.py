@@ -23,8 +23,7 @@ FILTERS_PER_OCTAVE = {1000.0: 2.0, 150.0: 1.0}
 """From which power of a line on, in units of white noise's: each of their columns must earn its
 keep. Every other filter, and every fourth, are the smaller forms."""
 RIDGE = 1e-3
-"""Of an answer's regressors: a hundred filters that are nearly alike cancel one another into any
-offset or friction on a motion that repeats (docs/loop.md)."""
+"""Of an answer's regressors: a hundred filters nearly alike cancel into whatever repeats."""
 MOST_EXPANDED = 2
 """Lines of a round whose answer is tried: each is some fifty regressors."""
 COARSEST = 0.5

@@ -19,10 +19,9 @@ itself charges for those that are of no use."""
 EXACT = 0.9
 """Share of its domain's curve, of the ceiling, or of what drift explains, that counts as all."""
 HALF = 0.5
-"""Share of its domain's curve from which on a form has the name approximately, below it none; of
-what a line takes, that lines beside it take where it is none; and of the error, beside functions
-without a name, that must go for another window of the motion: with 0.6 they make up for a short
-window's noise."""
+"""Share of its domain's curve from which a form has the name approximately; of what a line takes,
+that lines beside it take where it is none; and of the error, beside functions without a name, that
+must go for another window of the motion: with 0.6 they make up for a short window's noise."""
 
 
 @dataclass(frozen=True)
