@@ -89,7 +89,8 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
 
     from opamc_cli.stages.report import wording
 
-    unhealthy = doubtful(verdict)
+    most = wording.far_most(verdict)  # the joint to look at first comes first
+    unhealthy = sorted(doubtful(verdict), key=lambda entry: entry.get("axis") != most)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
         lines = [Text(wording.headline(verdict), style=_style_of(verdict))]
     else:

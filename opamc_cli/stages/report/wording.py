@@ -67,7 +67,7 @@ def headline(verdict: Mapping[str, Any]) -> str:
         "healthy": "healthy",
     }
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
-    most = _far_most(verdict, [*states.get("fault", ()), *states.get("changed", ())])
+    most = far_most(verdict)
     for place, axes in enumerate(states.values()):
         if most in axes:
             parts[place] += f" (axis {most} by far the most: look there first)"
@@ -79,12 +79,12 @@ def headline(verdict: Mapping[str, Any]) -> str:
     return text[0].upper() + text[1:]
 
 
-def _far_most(verdict: Mapping[str, Any], axes: Sequence[int]) -> int | None:
+def far_most(verdict: Mapping[str, Any]) -> int | None:
     """Return the axis that lies BY_FAR as far off as all others: it shakes them."""
     found = [
         (float(one.get("health_index") or 0.0), int(one["axis"]))
         for one in verdict.get("axes", ())
-        if int(one["axis"]) in axes
+        if one.get("state") in ("fault", "changed") and not one.get("excused")
     ]
     *_, second, first = [(0.0, 0), (0.0, 0), *sorted(found)]
     return first[1] if len(found) > 1 and first[0] > BY_FAR * max(second[0], 0.0) else None

@@ -383,6 +383,16 @@ def test_a_faulty_joint_takes_few_lines() -> None:
     ]
 
 
+def test_the_joint_to_look_at_first_comes_first() -> None:
+    known = {"inspect": "Look.", "evidence": [], "against": "little"}
+    pair = [
+        axis(number, "fault", p_adjusted=1e-9, distance={"ratio": 4.0}, brief=known, health_index=i)
+        for number, i in ((1, 9.0), (2, 900.0))
+    ]
+    titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
+    assert [title[:6] for title in titles] == ["Axis 2", "Axis 1"]
+
+
 def test_what_is_not_judged_says_why_in_a_line() -> None:
     verdict = {"axes": [axis(1, "healthy"), axis(2, "insufficient-data", reasons=["too short"])]}
     lines = [line.plain for line in verdict_lines(verdict)]
