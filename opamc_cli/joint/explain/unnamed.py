@@ -189,7 +189,7 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("angle_and_direction", "joint-angle", lambda t: t.position_rad, "direction"),
     Smooth("angle_and_speed", "joint-angle", lambda t: t.position_rad, "speed"),
     Smooth("travel_since_reversal", "joint-angle", travel_since_reversal, "direction"),
-    Smooth("load", "load", lambda t: np.abs(t.load_a), "friction"),
+    Smooth("load", "load", lambda t: np.abs(t.load_a), "direction"),
     Smooth("time_since_rest", "time", time_since_rest, "direction", such_as=LATE),
     Smooth("current", "load", lambda t: np.abs(t.model_a), "sign", such_as=DRIVE),
     Smooth("current_size", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),

@@ -73,7 +73,7 @@ def track():
         ("speed_and_direction", lambda t: np.abs(t.velocity), lambda t: [1.0], 0),
         ("angle", lambda t: t.position_rad, lambda t: [1.0], 0),
         ("angle_and_direction", lambda t: t.position_rad, lambda t: [t.direction], 0),
-        ("load", lambda t: np.abs(t.load_a), lambda t: [t.direction, t.velocity], 0),
+        ("load", lambda t: np.abs(t.load_a), lambda t: [t.direction], 0),
         ("acceleration", lambda t: t.acceleration, lambda t: [1.0], 1),
         ("time", lambda t: t.time_s, lambda t: [1.0], 0),
         ("time_and_speed", lambda t: t.time_s, lambda t: [t.direction, t.velocity], 0),
