@@ -34,7 +34,8 @@ class _RunByDefault(TyperGroup):
 
 app = typer.Typer(
     cls=_RunByDefault,
-    help="Look after a cell of robots night by night: `opamc nightly cell.yaml`.",
+    help="Look after a cell of robots night by night: `opamc nightly cell.yaml`, with the options "
+    "of `opamc nightly run --help`.",
     no_args_is_help=True,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
