@@ -27,6 +27,25 @@ def test_delay_of_the_phase_sensors_does_not_turn_the_torque_axis():
     assert np.ptp(track.electrical_rad - field) < 0.3
 
 
+@pytest.mark.parametrize(("off", "aligned"), [(1.0, True), (1.02, False)])
+def test_an_angle_that_zero_errors_scatter_follows_the_position_where_the_ratio_is_right(
+    off, aligned
+):
+    """By half a radian, as those of a joint that creeps under little load do."""
+    rate, ratio = 500.0, 200.0
+    time_s = np.arange(5000) / rate
+    position = 0.9 * np.sin(1.3 * time_s)
+    speed = np.gradient(position) * rate
+    path = ratio * position + 0.4
+    scattered = path + 0.45 * np.random.default_rng(5).normal(size=path.size)
+    every, blur = np.ones(path.size, dtype=bool), np.zeros((path.size, 2))
+    angle = PhaseAngle(scattered, ratio * speed, speed, every, every, 5, np.ones(1), blur)
+    electrical, _ = angle.aligned_with(position, speed, off * ratio, rate)
+    rest = np.exp(2j * (electrical - path))
+    assert (np.abs(rest.mean()) > 0.99) == aligned
+    assert (electrical is scattered) != aligned
+
+
 def test_the_angle_follows_a_position_of_unknown_ratio_through_half_turns_lost():
     rate, ratio, lag_s = 1000.0, 812.7, 0.0021
     rng = np.random.default_rng(12)
