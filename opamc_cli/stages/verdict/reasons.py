@@ -82,6 +82,7 @@ def reasons(
     *,
     in_vain: bool = False,
     siblings: int = 0,
+    warmer_c: float | None = None,
 ) -> list[str]:
     """Sentences that explain one joint's state.
 
@@ -101,6 +102,8 @@ def reasons(
         Whether a cause was sought, and none found.
     siblings
         How many other joints of the robot were judged.
+    warmer_c
+        By how much the log says that it was warmer than ever in the baseline, if it does.
 
     Returns
     -------
@@ -114,7 +117,7 @@ def reasons(
     unhealthy = judgement.state != "healthy"
     unit = current_unit(chain(*sources.values()))
     sentences = [
-        *_change(judgement, bundle, motions, limits or ScoreConfig(), unit),
+        *_change(judgement, bundle, motions, limits or ScoreConfig(), unit, warmer_c),
         _certainty(judgement),
         _rest(judgement, sources),
         *_siblings(judgement),
@@ -176,6 +179,7 @@ def _change(
     motions: Sequence[Mapping[str, Any]],
     limits: ScoreConfig,
     unit: str,
+    warmer_c: float | None,
 ) -> list[str]:
     cells = bundle.cells
     distance = (
@@ -183,11 +187,14 @@ def _change(
         "healthy session does"
     )
     if is_excused(judgement, limits):
+        logged = ""
+        if warmer_c is not None:
+            logged = f" (logged: {abs(warmer_c):.0f} °C {'warmer' if warmer_c > 0 else 'colder'})"
         first = (
             f"It differs from its baseline (p {_p(judgement.p_adjusted)}, "
             f"{judgement.distance_ratio:.3g} times as far as a healthy session), but no more than "
-            "conditions as unusual as its other joints' may move it: a fault that looks alike "
-            "would not be told; record under the baseline's conditions."
+            f"conditions as unusual as its other joints' may move it{logged}: a fault that looks "
+            "alike would not be told; record under the baseline's conditions."
         )
     elif judgement.state == "healthy":
         if judgement.p_adjusted <= SUSPICION < judgement.p_alone:

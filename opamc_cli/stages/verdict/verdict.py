@@ -16,7 +16,7 @@ from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
 from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.errors import ExitCode, InputError
-from opamc_cli.joint.change.search import SCALE
+from opamc_cli.joint.change.search import SCALE, SMALLEST_WARMTH_C
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
@@ -358,9 +358,11 @@ def content(
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
         others = sum(math.isfinite(one.p_value) for one in decided.judgements.values()) - 1
+        warmer = _warmer_c(axis, *decided.sides.rows)
         said = reasons(
-            final, bundle, motions, runs, cause, config.score, in_vain=in_vain, siblings=others
-        )
+            *(final, bundle, motions, runs, cause, config.score),
+            in_vain=in_vain, siblings=others, warmer_c=warmer,
+        )  # fmt: skip
         files = decided.files_apart(axis)
         for told in (files, which):  # after what the state does not tell
             if told:
@@ -501,6 +503,23 @@ def with_cause(
 
 def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
     return {str(run) for key, rows in part.items() if key[0] == axis for run in rows.runs}
+
+
+def _warmer_c(
+    axis: int, before: Mapping[Key, PatternRows], after: Mapping[Key, PatternRows]
+) -> float | None:
+    """Return how much warmer a joint was than ever in its baseline; None where that is not so."""
+    usual, now = (
+        np.concatenate(
+            [[], *(one.rows["temperature_c"] for key, one in part.items() if key[0] == axis)]
+        ).astype(float)
+        for part in (before, after)
+    )
+    usual, now = usual[np.isfinite(usual)], now[np.isfinite(now)]
+    if not usual.size or not now.size or usual.min() <= np.mean(now) <= usual.max():
+        return None
+    warmer = float(np.mean(now) - np.mean(usual))
+    return warmer if abs(warmer) >= SMALLEST_WARMTH_C else None
 
 
 def _not_compared(axis: int, decided: Decided) -> dict[str, list[str]]:

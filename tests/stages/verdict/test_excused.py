@@ -1,16 +1,19 @@
 """A joint that differs, but no more than conditions may move it, is not passed over in silence."""
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import judge
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.chain.compared.pattern_rows import PatternRows
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.reasons import is_excused, reasons
-from opamc_cli.stages.verdict.verdict import exit_code
+from opamc_cli.stages.verdict.verdict import _warmer_c, exit_code
 from tests.decision import known_fleet
 
 SAID = "It differs from its baseline (p 0.001, 3 times as far as a healthy session), but no more"
@@ -46,9 +49,31 @@ def test_its_first_reason_says_that_a_fault_may_look_alike(differing):
         }
         for cell in bundle.cells
     ]
-    first, *_ = reasons(one, bundle, entries, {"baseline": [], "target": []})
+    sides = {"baseline": [], "target": []}
+    first, *_ = reasons(one, bundle, entries, sides)
     assert first.startswith(SAID)
-    assert "a fault that looks alike would not be told" in first
+    assert "may move it: a fault that looks alike would not be told" in first
+    cold, *_ = reasons(one, bundle, entries, sides, warmer_c=-12.2)
+    assert "may move it (logged: 12 °C colder): a fault" in cold
+
+
+@pytest.mark.parametrize(
+    ("usual", "now", "said"),
+    [
+        ((15.0, 19.0), (7.0, 9.0), -9.0),
+        ((15.0, 19.0), (15.0, 17.0), None),  # as it has been
+        ((16.0, 18.0), (18.0, 19.0), None),  # hardly beyond
+        ((15.0, math.nan), (25.0, math.nan), 10.0),
+        ((math.nan, math.nan), (25.0, 25.0), None),
+    ],
+)
+def test_warmth_is_said_where_the_baseline_never_had_it(usual, now, said):
+    before, after = (
+        {(2, 0, 4, 1): PatternRows({"temperature_c": np.array(side)}, np.ones((2, 24)), np.ones(2))}
+        for side in (usual, now)
+    )
+    assert _warmer_c(2, before, after) == said
+    assert _warmer_c(3, before, after) is None
 
 
 def test_it_does_not_end_as_health_does_and_a_fault_still_wins():
