@@ -280,11 +280,12 @@ def _one(
         raise ValueError(msg)
 
     electrical = None
+    seen_turns: tuple[float, ...] = ()
     if phases is not None and phase_angle is not None:
         electrical = phase_angle.angle_rad
         if logged:
-            electrical, lag_s = phase_angle.aligned_with(
-                motion.position_rad, motion.velocity, turns, rate
+            electrical, lag_s, seen_turns = phase_angle.aligned_with(
+                motion.position_rad, motion.velocity, rate
             )
             if abs(lag_s) * rate <= 1:
                 # Sensors' filters and channels read in turn come to this, no clock does.
@@ -363,6 +364,7 @@ def _one(
         others=others,
         other_axes=beside,
         guessed_s=() if logged or phase_angle is None else phase_angle.guessed_s,
+        turns=seen_turns,
     )
 
 

@@ -104,7 +104,9 @@ class Track:
     reference: "Reference | None" = None
     """What regressors are measured by, where it is not to be that of these recordings."""
     guessed_s: tuple[float, ...] = ()
-    """Lengths of gaps without current in which the motion, of phases alone, is a guess."""
+    turns: tuple[float, ...] = ()
+    """Lengths of gaps without current in which the motion, of phases alone, is a guess; electrical
+    radians per joint radian that phases beside a position tell."""
 
     @property
     def size(self) -> int:
@@ -283,6 +285,7 @@ def joined(pieces: Sequence[Track]) -> Track:
         kernel=max((piece.kernel for piece in pieces), key=len),
         evenly_smooth=all(piece.evenly_smooth for piece in pieces),
         guessed_s=sum((piece.guessed_s for piece in pieces), ()),
+        turns=sum((piece.turns for piece in pieces), ()),
     )
 
 

@@ -37,6 +37,13 @@ GUESSED = (
     "axis {}: what was turned without current (gaps: {}, {:.1f} s in all) is a guess, and so is "
     "the place: log the position to be certain"
 )
+OTHER_RATIO = (
+    "axis {}: beside the position the phases turn by {:.5g} electrical radians per radian, but "
+    "joint.gear_ratio and joint.pole_pairs make {:.5g}: correct the wrong one, or the position's "
+    "unit"
+)
+RATIO_DOUBT = 0.002
+"""By how much a ratio may differ: 38 recordings of three strangers tell it to 0.04 % at worst."""
 
 
 @dataclass(frozen=True)
@@ -145,6 +152,13 @@ def lay(
     guessed_s = fit.dataset.fine.track.guessed_s
     if guessed_s:
         read.notes.append(GUESSED.format(axis, len(guessed_s), sum(guessed_s)))
+    turns = np.array(fit.dataset.fine.track.turns)
+    if turns.size and joint.gear_ratio and joint.pole_pairs:
+        stated = joint.gear_ratio * joint.pole_pairs
+        worst = turns[np.argmax(np.abs(turns - stated))]
+        if abs(worst - stated) > RATIO_DOUBT * stated:
+            read.doubts.append(OTHER_RATIO.format(axis, worst, stated))
+            read.notes.append(read.doubts[-1])
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
     return AxisModel(axis, fit, ways.fit_anew, declared, allowed, read)
 

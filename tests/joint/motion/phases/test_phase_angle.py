@@ -27,23 +27,24 @@ def test_delay_of_the_phase_sensors_does_not_turn_the_torque_axis():
     assert np.ptp(track.electrical_rad - field) < 0.3
 
 
-@pytest.mark.parametrize(("off", "aligned"), [(1.0, True), (1.02, False)])
-def test_an_angle_that_zero_errors_scatter_follows_the_position_where_the_ratio_is_right(
-    off, aligned
+@pytest.mark.parametrize(("other", "aligned"), [(0.0, True), (0.02, False)])
+def test_an_angle_that_zero_errors_scatter_follows_the_position_where_that_moves_with_it(
+    other, aligned
 ):
     """By half a radian, as those of a joint that creeps under little load do."""
     rate, ratio = 500.0, 200.0
     time_s = np.arange(5000) / rate
     position = 0.9 * np.sin(1.3 * time_s)
     speed = np.gradient(position) * rate
-    path = ratio * position + 0.4
+    path = ratio * (position + other * np.sin(2.1 * time_s)) + 0.4
     scattered = path + 0.45 * np.random.default_rng(5).normal(size=path.size)
     every, blur = np.ones(path.size, dtype=bool), np.zeros((path.size, 2))
     angle = PhaseAngle(scattered, ratio * speed, speed, every, every, 5, np.ones(1), blur)
-    electrical, _ = angle.aligned_with(position, speed, off * ratio, rate)
+    electrical, _, turns = angle.aligned_with(position, speed, rate)
     rest = np.exp(2j * (electrical - path))
     assert (np.abs(rest.mean()) > 0.99) == aligned
     assert (electrical is scattered) != aligned
+    assert turns == (pytest.approx((ratio,), rel=2e-4) if aligned else ())
 
 
 def test_the_angle_follows_a_position_of_unknown_ratio_through_half_turns_lost():
@@ -59,7 +60,8 @@ def test_the_angle_follows_a_position_of_unknown_ratio_through_half_turns_lost()
     followed = path + np.cumsum(slips) + 0.05 * rng.normal(size=9000)
     every, blur = np.ones(9000, dtype=bool), np.zeros((9000, 2))
     angle = PhaseAngle(followed, np.gradient(path) * rate, speed, every, every, 5, np.ones(1), blur)
-    electrical, lag = angle.aligned_with(position, speed, None, rate)
+    electrical, lag, turns = angle.aligned_with(position, speed, rate)
+    assert turns == pytest.approx((ratio,), rel=1e-4)
     assert lag == pytest.approx(lag_s, abs=5e-5)
     rest = (electrical - path)[100:-100]
     assert np.ptp(rest) < 0.1
