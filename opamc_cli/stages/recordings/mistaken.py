@@ -40,6 +40,7 @@ def mistaken(run: Run, axis: int, recording: Recording) -> list[str]:
         *_clipped(run, axis, recording),
         *_spiked(run, axis, recording),
         *missing(run, f"axis{axis}_position"),
+        *_twice(run, axis, recording),
     ]
     x, q = recording.current_a, recording.position_rad
     if x is None or q is None or recording.phases_a is not None:
@@ -103,6 +104,19 @@ def _spiked(run: Run, axis: int, recording: Recording) -> list[str]:
         "count in every error; take them out"
         for name, places in found.items()
         if places.size
+    ]
+
+
+def _twice(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say which other joints have this one's very positions: two encoders' last digits differ."""
+    q = recording.position_rad
+    if q is None or not np.nanmax(np.abs(np.diff(q)), initial=0.0):
+        return []
+    return [
+        f"{run.path}: axis{axis}_position and axis{other}_position hold the same numbers: one "
+        "joint's position in two columns? Correct the map of opamc ingest"
+        for other, values in recording.others_rad.items()
+        if np.array_equal(values, q, equal_nan=True)
     ]
 
 

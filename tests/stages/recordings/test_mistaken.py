@@ -96,6 +96,15 @@ def test_another_joints_position_is_named(model, capsys):
     assert "axis1_current follows the motion of axis2_position" in said
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-7], ids=["copied", "in step"])
+def test_one_position_in_two_columns_is_said(model, capsys, noise):
+    """Joints that move in step differ in the last digits, and may be what they are called."""
+    other = OWN.position + noise * np.random.default_rng(1).normal(size=OWN.position.size)
+    assert model(axis1_current=OWN.current, axis1_position=OWN.position, axis2_position=other) == 0
+    said = "axis1_position and axis2_position hold the same numbers" in capsys.readouterr().err
+    assert said == (noise == 0)
+
+
 def test_a_speed_of_another_joint_is_refused(model, capsys):
     speed = np.gradient(OTHER.position) * RATE
     code = model(axis1_current=OWN.current, axis1_position=OWN.position, axis1_velocity=speed)
