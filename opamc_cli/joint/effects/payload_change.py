@@ -81,10 +81,6 @@ class PayloadChange(Effect):
         starts = [start for start in track.starts_s if early < start <= late]
         return parameters | {"since_s": float(np.median(starts or (early, late)))}
 
-    def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
-        """Allow that the inertia's step is too small to see."""
-        return [(parameters | {"inertia": 0.0}, (0, 1))]
-
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
         held = "a payload held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
