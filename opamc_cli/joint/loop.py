@@ -65,11 +65,6 @@ class Step:
         """Whether the step is an effect of the library."""
         return not self.term.effect.unnamed
 
-    @property
-    def is_shift(self) -> bool:
-        """Whether it is what any lag between the channels makes of the model."""
-        return self.term.effect.unnamed and self.term.effect.from_terms
-
 
 @dataclass(frozen=True)
 class Loop:
@@ -299,7 +294,9 @@ def _opened(
     predicts = r2_after > 0 and rmse_after <= TWICE * after.rmse(sealed=False)
     predicts |= r2_after > 1 - ROUNDING
     # Where a form holds a part of its curve, or a function stands beside the names, more lacks.
-    whole = not any(one.approximate and not one.is_shift for one in steps)
+    # But for what any lag between the channels makes of the model.
+    of_parts = [one for one in steps if one.named or not one.term.effect.from_terms]
+    whole = not any(one.approximate for one in of_parts)
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts and whole else "partial"
     else:

@@ -147,6 +147,17 @@ def test_a_declared_ratio_that_phases_beside_a_position_deny_is_doubted(off, tmp
     assert entry["after"]["rmse_a"] < 1.2 * made.noise_rms
 
 
+@pytest.mark.parametrize("viscous", [0.3, -0.3])
+def test_a_declared_viscous_friction_that_drives_is_doubted(viscous, tmp_path, capsys):
+    position, speed, acceleration = moved("one stroke", rate=100.0)
+    current = 0.2 * acceleration + np.sin(position) + 0.9 * np.sign(speed) + viscous * speed
+    current += np.random.default_rng(7).normal(0.0, 0.02, speed.size)
+    write_run(tmp_path / "run.parquet", 100.0, axis1_current=current, axis1_position=position)
+    close(tmp_path, "--quiet", model=MODEL)
+    said = "the declared viscous drives the joint" in capsys.readouterr().err
+    assert said == (viscous < 0)
+
+
 @pytest.mark.parametrize("declared", ["coulomb, stribeck", "coulomb, viscous, stribeck"])
 def test_a_declared_friction_that_drives_is_doubted(declared, tmp_path, capsys):
     """A Stribeck curve below zero stood for a viscous friction, and nothing was said to lack."""
@@ -461,7 +472,17 @@ def test_too_little_motion_to_seal_anything_off(folder, capsys):
     )
     assert close(folder, "--axis", "1") == 5
     said = capsys.readouterr().err
-    assert "too few to seal a part off: record at least 240" in said
+    assert "too few: record at least 240" in said
+    write_run(
+        folder / "run.parquet",
+        250.0,
+        axis1_current=made.current[:75],
+        axis1_position=made.position[:75],
+    )
+    assert close(folder, "--axis", "1") == 5
+    said = capsys.readouterr().err
+    assert "too few: record at least 240" in said
+    assert "does not move" not in said
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def _headline(result: Mapping[str, Any]) -> str:
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
     if share is not None and wording.ceiling_known(result):
-        reached = f"{share:.0%} of what can be explained"
+        reached = f"{share:.0%} of what can be explained{' has a name' if functions else ''}"
     elif result.get("verdict") == "closed":
         reached = "what is left is noise"
     if words:

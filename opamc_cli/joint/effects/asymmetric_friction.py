@@ -15,6 +15,11 @@ class AsymmetricFriction(Effect):
     meaning = "friction that differs between directions: check bearing preload and seal lips"
     from_motion = True
 
+    def untestable(self, track: Track) -> str | None:
+        """Of one way alone it is any friction, of either sign."""
+        one = np.unique(track.direction[track.moving]).size < 2
+        return "the joint moves one way alone" if one else super().untestable(track)
+
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Half the difference of dry (a constant) and of lubricant friction."""
         return stack(np.ones(track.size), np.abs(track.velocity))

@@ -22,18 +22,25 @@ class Stribeck(Effect):
     resists = True
     from_motion = True
 
+    def untestable(self, track: Track) -> str | None:
+        """Where the joint never goes slowly, what friction falls from is nowhere seen."""
+        low, high = self.limits(track)["stribeck_speed"]
+        return "the joint never goes slowly" if 4 * low > high else super().untestable(track)
+
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:
         """Stribeck speeds from 1.5 % to 60 % of the top speed, both exponents."""
-        top = track.speed_scale
+        low, high = self.limits(track)["stribeck_speed"]
         return [
             {"stribeck_speed": speed, "exponent": exponent}
             for exponent in (2.0, 1.0)
-            for speed in geometric(0.015 * top, 0.6 * top, 11)
+            for speed in geometric(1.5 * low, high / 1.2, 11)
         ]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
-        """1 % to 70 % of the top speed: beyond it the fall is a straight line."""
-        return {"stribeck_speed": (0.01 * track.speed_scale, 0.7 * track.speed_scale)}
+        """Half of the slowest speed to 70 % of the top: beyond it the fall is a straight line."""
+        slowest = np.min(np.abs(track.velocity[track.moving]), initial=track.speed_scale)
+        low = max(0.01 * track.speed_scale, 0.5 * float(slowest))
+        return {"stribeck_speed": (low, 0.7 * track.speed_scale)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
         """Direction times the fall with speed."""

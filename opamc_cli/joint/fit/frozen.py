@@ -1,7 +1,7 @@
 """A fitted model applied to other recordings: nothing is estimated."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -46,11 +46,6 @@ class Applied:
         """Share of the current's variance that the model explains; negative if it adds to it."""
         rows = self.judged & among
         return r2_of(self.current_a[rows], self.residual_a[rows])
-
-    def is_opposed(self, among: Bools | bool = True) -> bool:
-        """Whether the model explains most of the negative of the current, and less of itself."""
-        negative = replace(self, residual_a=self.residual_a - 2 * self.current_a)
-        return negative.r2(among) > max(0.5, self.r2(among))
 
 
 def why_not_applied(term: Term, track: Track) -> str | None:

@@ -17,7 +17,7 @@ from opamc_cli.joint.loop import Anew
 from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
-from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
@@ -148,7 +148,7 @@ def lay(
     ways = Ways(recordings, joint, on)
     fit = ways.best_fit()
     if fit is None:
-        raise _too_little_motion(recordings, joint, axis, named)
+        raise too_little_motion(grouped_track(recordings, joint)[0], axis, named, FEWEST_MOVING)
     guessed_s = fit.dataset.fine.track.guessed_s
     if guessed_s:
         read.notes.append(GUESSED.format(axis, len(guessed_s), sum(guessed_s)))
@@ -256,26 +256,21 @@ def _refuse_copies(runs: Sequence[Run], recordings: Sequence[Recording]) -> None
             raise InputError(msg)
 
 
-def _too_little_motion(
-    recordings: list[Recording], joint: Joint, axis: int, named: str
-) -> NotEnoughDataError:
-    track, _ = grouped_track(recordings, joint)
-    if not is_moving(track):
-        travel, share = np.ptp(track.position_rad), np.mean(np.diff(track.position_rad) != 0)
-        msg = (
-            f"{named}: axis {axis} does not move (travel {travel:.2g} rad); give runs in which it "
-            "does"
-        )
-        if travel > SHORTEST_TRAVEL_RAD and share < HELD:
-            msg = (
-                f"{named}: the position of axis {axis} changes in {share:.0%} of the samples alone "
-                "and stands still between: is each value held? Log it at its own rate"
-            )
-        return NotEnoughDataError(msg)
+def too_little_motion(track: Track, axis: int, named: str, fewest: int) -> NotEnoughDataError:
+    """Say of what there is too little on a track that is not fitted, or not judged."""
+    travel, share = np.ptp(track.position_rad), np.mean(np.diff(track.position_rad) != 0)
     moving = np.count_nonzero(track.moving)
     msg = (
         f"{named}: of axis {axis} {moving} samples ({moving / track.rate_hz:.3g} s) count, in "
-        "motion and clear of reversals and of the recording's ends, too few to seal a part off: "
-        f"record at least {FEWEST_MOVING}"
+        "motion and clear of reversals and of the recording's ends, too few: record at least "
+        f"{fewest}"
     )
+    if travel < SHORTEST_TRAVEL_RAD:
+        does = f"axis {axis} does not move (travel {travel:.2g} rad)"
+        msg = f"{named}: {does}; give runs in which it does"
+    elif not is_moving(track) and share < HELD:
+        msg = (
+            f"{named}: the position of axis {axis} changes in {share:.0%} of the samples alone "
+            "and stands still between: is each value held? Log it at its own rate"
+        )
     return NotEnoughDataError(msg)

@@ -8,17 +8,27 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.config.joint_model import ClosedConfig, JointModelConfig
-from opamc_cli.errors import ConfigError, InputError, NotEnoughDataError
+from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.explain.declared import BETTER, judged_of
 from opamc_cli.joint.fit.frozen import Applied, apply_frozen, may_extrapolate, why_not_applied
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, Smoothing, build_track, smoothings
-from opamc_cli.joint.motion.recordings import excerpts, grouped_track, is_moving
+from opamc_cli.joint.motion.recordings import (
+    FEWEST_MOVING_SAMPLES,
+    excerpts,
+    grouped_track,
+    is_moving,
+)
 from opamc_cli.joint.motion.track import Bools, Floats, Joint, Reference, Track
 from opamc_cli.signal.transform.least_squares import leverage
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
-from opamc_cli.stages.model.axis_model import declared_effects, library_of, recordings_of
+from opamc_cli.stages.model.axis_model import (
+    declared_effects,
+    library_of,
+    recordings_of,
+    too_little_motion,
+)
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.processes.parallel import Watch, unwatched
 from opamc_cli.storage.files.atomic import ensure_directory, write_json
@@ -82,8 +92,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
     joint = Joint(model.joint.ratio_of(axis), model.joint.poles_of(axis))
     track, _ = grouped_track(recordings, joint)
     if not is_moving(track):
-        msg = f"{runs[0].path}: axis {axis} does not move; give runs in which it does"
-        raise NotEnoughDataError(msg)
+        raise too_little_motion(track, axis, str(runs[0].path), FEWEST_MOVING_SAMPLES)
     if any(recording.position_rad is None for recording in recordings):
         # a speed is summed up from wherever the recording begins
         track = replace(track, channels=track.channels - {"logged"})
@@ -112,7 +121,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
         "opposite_sign": [
             recording.name
             for place, recording in enumerate(recordings)
-            if applied.is_opposed(_within(applied, place))
+            if _is_opposed(applied, _within(applied, place))
         ],
         "not_applied": left_out,
         "notes": [
@@ -180,6 +189,12 @@ def _familiar_entry(applied: Applied, known: Bools) -> dict[str, float | None]:
         "rmse_a": applied.rmse(known) if some else None,
         "r2": applied.r2(known) if some else None,
     }
+
+
+def _is_opposed(applied: Applied, among: Bools) -> bool:
+    """Whether the model explains most of the negative of the current, and less of itself."""
+    negative = replace(applied, residual_a=applied.residual_a - 2 * applied.current_a)
+    return negative.r2(among) > max(0.5, applied.r2(among))
 
 
 def _within(applied: Applied, place: int) -> "np.ndarray[Any, np.dtype[np.bool_]]":

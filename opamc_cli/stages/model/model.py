@@ -64,7 +64,7 @@ DOUBTED = (
 )
 DRIVES = (
     "axis {}: the declared {} drives the joint instead of resisting: it makes up for something "
-    "that the model lacks; check its parameters, or give them"
+    "that the model lacks"
 )
 ONE = (
     "axis {}: on this motion {} are one: their sum is known, each holds a part of it by chance; "
@@ -270,9 +270,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     sure = certainty(loop.after)
     declared = zip(loop.before.terms, loop.after.coefficients, sure.standard_errors, strict=False)
     for term, values, errors in declared:
-        resists = term.effect.resists and not term.effect.at_a_place and term.parameters
+        resists = term.effect.resists and not term.effect.at_a_place
         if resists and values[0] < -DRIVEN_T * errors[0]:
-            doubts.append(DRIVES.format(axis, term.effect.name))
+            given = "; check its parameters, or give them" if term.parameters else ""
+            doubts.append(DRIVES.format(axis, term.effect.name) + given)
     for names in sure.one:
         known = [name for name in names if not name.startswith("unnamed")]
         if len(known) > 1:

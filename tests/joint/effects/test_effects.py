@@ -52,6 +52,21 @@ def test_a_place_is_sought_where_it_is_passed_both_ways():
     assert drag.guesses(one_way, None) == drag.guesses(track, None)
 
 
+def test_what_a_motion_never_shows_is_untestable():
+    """A gear at one speed, one way: 74 165 A of a Stribeck curve were named, and `closed`."""
+    _, track = track_of()
+    stribeck, asymmetric = (built_in_library()[n] for n in ("stribeck", "asymmetric_friction"))
+    assert stribeck.untestable(track) is asymmetric.untestable(track) is None
+    speeds = np.abs(track.velocity)
+    steady = replace(track, velocity=np.clip(speeds, 0.6 * speeds.max(), None))
+    assert stribeck.untestable(steady) == "the joint never goes slowly"
+    slowest = np.abs(track.velocity[track.moving]).min()
+    low, _ = stribeck.limits(track)["stribeck_speed"]
+    assert low >= slowest / 2
+    one_way = replace(track, direction=np.ones(track.size))
+    assert asymmetric.untestable(one_way) == "the joint moves one way alone"
+
+
 @pytest.mark.parametrize("name", [*VOCABULARY, *unnamed_library()])
 def test_regressors_at_some_samples_are_those_of_all(name):
     _, track = track_of()

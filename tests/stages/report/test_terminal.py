@@ -110,6 +110,9 @@ def test_a_loop_that_lacks_a_field_has_a_headline(gone: str) -> None:
         "Axis 2 lacks kinematic error (ripple): error 0.1 → 0.05 A, 80% of what can be explained"
     )
     assert headline(entry) == whole
+    function = {"effect": "unnamed_shift", "interpretation": "a function of time"}
+    beside = headline(entry | {"steps": [*entry["steps"], function]})
+    assert "80% of what can be explained has a name" in beside
     del entry[gone]
     told = "Axis 2: loop.json does not say" if gone == "steps" else "Axis 2 lacks "
     assert headline(entry).startswith(told)

@@ -6,6 +6,7 @@ import numpy.typing as npt
 from opamc_cli.config.models import JointConfig, SegmentConfig
 from opamc_cli.errors import InputError
 from opamc_cli.signal.motion.reported import (
+    FEWEST_SAMPLES,
     JointMotion,
     find_joint_motions,
     motor_frequency,
@@ -97,12 +98,13 @@ def joint_segments(
         )
         notes.append(f"{run.path}: column {name} keeps its sign though the joint reverses: {what}")
     segments = _segments(run, channels, current, motions, config, joint)
+    shortest_s = max(config.min_motion_s, FEWEST_SAMPLES / run.sampling_rate_hz)
     return AxisSegments(
         run.name,
         make_rows(run, channels, segments, "reported"),
         tuple(notes),
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
-        f"{config.min_speed_rad_s:g} is motion",
+        f"{config.min_speed_rad_s:g} is motion where it lasts for {shortest_s:.2g} s",
         lost(channels.axis, 1 - known.size / current.size),
     )
 

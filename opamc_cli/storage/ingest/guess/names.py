@@ -11,7 +11,7 @@ from opamc_cli.storage.schemas.channels import LOGGED
 
 WORDS = {
     **{name: channel.words for name, channel in reversed(LOGGED.items()) if not channel.vague},
-    "torque": ("torque", "torques", "effort", "tau", "moment", "trq"),
+    "torque": ("torque", "torques", "effort", "tau", "moment", "trq", "tor"),
     "current": ("cur", "curr", "current", "currents", "i", "iq", "amp", "amps", "ampere", "strom"),
     **{name: channel.words for name, channel in LOGGED.items() if channel.vague},
     "time": ("time", "timestamp", "timestamps", "stamp", "t", "clock", "zeit", "ts", "epoch"),

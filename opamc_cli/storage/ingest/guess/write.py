@@ -160,7 +160,9 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         pattern = re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name)
         # one of a family that is used is named itself
         unused.append(name if pattern in patterns else pattern)
-    rest = [name for name in dict.fromkeys(unused) if "/" not in name[1:]]
+    unused = list(dict.fromkeys(unused))
+    # of nested groups the deeper ones are many, and seldom signals
+    rest = [name for name in unused if "/" not in name[1:]] or unused
     repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None

@@ -264,9 +264,22 @@ def test_three_columns_without_names_are_phases_if_they_behave_so(tmp_path):
             guess_map([path])
 
 
-def test_positions_without_a_current_are_answered_with_what_is_there(tmp_path):
-    with pytest.raises(InputError, match=r"no channel looks like a motor current .*q_#.*by hand"):
-        guess_map([table(tmp_path / "a.csv", {"t": T, "q_1": SPEED, "q_2": SPEED})])
+@pytest.mark.parametrize("name", ["q_#", "arm/q_#"])
+def test_positions_without_a_current_are_answered_with_what_is_there(name, tmp_path):
+    columns = {"t": T} | {name.replace("#", k): SPEED for k in "12"}
+    with pytest.raises(InputError, match=rf"no channel looks like a motor current .*{name}.*hand"):
+        guess_map([table(tmp_path / "a.csv", columns)])
+
+
+def test_a_motors_own_words_are_known(tmp_path):
+    """As of a humanoid's joint."""
+    columns = {"t": T, "motor/pos": ANGLE, "motor/vel": SPEED, "motor/tor": 3 * SPEED}
+    lines, _ = lines_of(table(tmp_path / "a.csv", columns))
+    assert [line.split(",")[0] for line in lines[4:] if "axis1" in line] == [
+        "axis1_current: {source: motor/tor",
+        "axis1_position: {source: motor/pos",
+        "axis1_velocity: {source: motor/vel",
+    ]
 
 
 @pytest.mark.parametrize(("scale", "said"), [(700, False), (725, True), (5440, True)])
