@@ -140,6 +140,7 @@ def lags(current: Floats, position_rad: Floats, fs_hz: float) -> list[float] | N
     friction, inertia, gravity = parts(position_rad, fs_hz)
     design = np.column_stack([np.ones(x.size), friction, inertia, gravity])
     known = np.isfinite(x) & np.isfinite(design).all(axis=1)
+    moving = known & (np.abs(friction[:, 0]) >= 1)  # What dry friction holds at rest is anything.
     rate = fs_hz / max(int(fs_hz // FIT_HZ), 1)
     reach = int(LONGEST_LAG_S * rate)
     way = np.cumsum(np.where(known, np.abs(friction[:, 0]), 0.0))
@@ -149,7 +150,7 @@ def lags(current: Floats, position_rad: Floats, fs_hz: float) -> list[float] | N
     edges = np.searchsorted(way, np.linspace(0, way[-1], STRETCHES + 1)[1:-1])
     found, tried = [], []
     for stretch in np.split(np.arange(x.size), edges):
-        inside = stretch[known[stretch] & (stretch >= reach) & (stretch < x.size - reach)]
+        inside = stretch[moving[stretch] & (stretch >= reach) & (stretch < x.size - reach)]
         if inside.size < FEWEST_ROWS:
             return None
         inside = inside[:: inside.size // MOST_ROWS + 1]

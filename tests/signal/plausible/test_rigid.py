@@ -67,6 +67,24 @@ def test_a_late_motion_is_told_and_a_drives_own_delay_is_left_to_the_model():
     assert lags(current(OWN), OWN, RATE) is None
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_what_dry_friction_holds_at_rest_hides_no_clock(seed):
+    """It may be any torque: of a measured-looking staircase one clock was called two."""
+    rng, n, rest_s = np.random.default_rng(seed), 24, 6.0
+    time = np.arange(0, n * rest_s, 1 / RATE)
+    moves = (np.arange(n) * rest_s)[:, None] + [-0.4, 0.0]
+    places = rng.uniform(-1.5, 1.5, n)
+    path = np.interp(time, moves.ravel()[1:], np.repeat(places, 2)[:-1])
+    window = np.hanning(41)
+    path = np.convolve(np.pad(path, 20, mode="edge"), window / window.sum(), mode="valid")
+    v = np.gradient(path) * RATE
+    x = np.tanh(v / 0.02) + 0.1 * v + 0.02 * np.gradient(v) * RATE + 0.3 * np.sin(path + 0.4)
+    x += (np.abs(v) < 1e-3) * rng.uniform(-1, 1, n)[(time / rest_s).astype(int)]
+    x += rng.normal(0, 0.02, path.size)
+    np.testing.assert_allclose(lags(x, later(path, 0.6), RATE), 0.6, atol=0.03)
+    assert lags(x, path, RATE) is None
+
+
 def test_noise_alone_has_no_delay_no_scale_and_no_joint():
     noise = np.random.default_rng(0).normal(size=OWN.size)
     assert lags(noise, OWN, RATE) is None
