@@ -73,9 +73,8 @@ class Ways:
     def fit_anew(self, before: Fit, found: Sequence[Term] = ()) -> Fit | None:
         """Fit the model anew, to the motion that predicts best beside terms that were found.
 
-        Before any is, beside functions without a name: what fits best as declared may have smoothed
-        away what something missing answers to. Parameters that are not given are searched beside
-        the terms: alone they make up for what these hold. None where neither is any better.
+        Before any is, beside functions: what fits best as declared may have smoothed away what is
+        missing. Open parameters are searched beside the terms. None where neither is any better.
         """
         present, model = before.dataset.smoothing, self._declared(before.dataset)
         beside = (*model, *((term.effect, term) for term in found))
@@ -92,10 +91,7 @@ class Ways:
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0, late: bool = False) -> Way:
-        """Return the way that leaves least beside so many functions, or the first: see HALF.
-
-        Or beside a delay of the current, if it may come `late`.
-        """
+        """Return the way that leaves least beside functions, or a delay (`late`), or the first."""
         fits = {way: declared_fit(dataset, model) for way, dataset in self._short.items()}
         fits = {way: _or_late(fit) if late else fit for way, fit in fits.items()}
         left = {first: np.inf} | {way: _left(fit) for way, fit in fits.items()}
@@ -108,7 +104,13 @@ class Ways:
         for dataset in self._short.values():
             dataset.cache.clear()  # 100 MB of two minutes; the declared terms are soon laid again
         best = min(left, key=lambda way: left[way])
-        return best if left[best] < (HALF if functions else BETTER) * left[first] else first
+        if functions or not fits:
+            return best if left[best] < HALF * left[first] else first
+        # Of those that leave as little clear of corners, the one that leaves least at them.
+        near = {way: fit for way, fit in fits.items() if BETTER * left[way] < left[best]}
+        at = {way: np.mean(fit.residual_a[fit.dataset.fine.fit] ** 2) for way, fit in near.items()}
+        best = min(at, key=lambda way: at[way])
+        return best if at[best] < BETTER * at.get(first, np.inf) else first
 
 
 def _differentiated(laid: Laid, way: Way, short: bool = False) -> Dataset:

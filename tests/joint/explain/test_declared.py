@@ -10,7 +10,7 @@ from simulator import simulate
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.explain.declared import Ways, declared_fit
 from opamc_cli.joint.fit.model import Term, fit_terms
-from opamc_cli.joint.motion.kinematics import Recording
+from opamc_cli.joint.motion.kinematics import Recording, Smoothing
 from opamc_cli.joint.motion.track import Joint
 from tests.marks import long
 
@@ -127,6 +127,21 @@ def test_the_window_that_predicts_best_is_taken_and_judged_by_the_same_samples(m
     parts = best.sums.parts
     errors = [fit.sums.held_out()[parts.judged].sum() for fit in (best, plain)]
     assert errors[0] < 0.97 * errors[1]
+
+
+@pytest.mark.parametrize("seed", [1, 5, 10])
+def test_of_windows_that_leave_as_little_the_one_that_leaves_least_at_corners_is_taken(seed):
+    """Corners do not count where windows are compared, and the longer one lost 40 % there."""
+    made = simulate(seed, (), rate=500.0, kind="trapezoid", cycles=6, quantum=2e-4)
+    recording = Recording("run", 500.0, current_a=made.current, position_rad=made.position)
+    ways = Ways([recording], Joint(), lambda dataset: declared(*BASE[:4]))
+    fit = ways.best_fit()
+    assert fit.dataset.smoothing == Smoothing(0.05, from_velocity=False)
+    plain = ways.best_fit(without_rules=("windows",))
+    told = [one.rmse(sealed=False) for one in (fit, plain)]
+    assert told[0] == pytest.approx(told[1], rel=0.02)
+    at_corners = [np.std(one.residual_a[one.dataset.fine.fit]) for one in (fit, plain)]
+    assert at_corners[0] < 0.85 * at_corners[1]
 
 
 @pytest.mark.parametrize(

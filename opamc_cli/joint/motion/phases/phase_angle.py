@@ -74,9 +74,8 @@ class PhaseAngle:
 def _slope(angle: Floats, position: Floats, speed: Floats, rough: float) -> float:
     """Electrical radians per joint radian at which the angle, modulo pi, follows the position.
 
-    Where the torque passes zero within a stroke the followed angle slips by half turns; a straight
-    line through it would be wrong by more than a turn at the ends of the travel. Of samples with
-    enough current, (n,); `rough` is known to a few per cent.
+    Where the torque passes zero within a stroke the followed angle slips by half turns, so that no
+    straight line fits it. Of samples with enough current, (n,); `rough` is right to a few per cent.
     """
     travel = float(np.ptp(position))
     largest = float(np.max(np.abs(speed), initial=0.0))
