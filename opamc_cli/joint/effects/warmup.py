@@ -17,7 +17,7 @@ class Warmup(Effect):
     changes_in_time = True
     searches = ("time_constant_s",)
     meaning = "friction that falls while the joint warms up: not a fault"
-    needs = ("position", "revisits")
+    needs = ("position", "returns")
     from_motion = True
 
     def guesses(self, track: Track, residual: Floats) -> list[Parameters]:

@@ -55,7 +55,7 @@ class Smooth(Effect):
         told = name.replace("_", " ")
         such = f": {such_as}" if such_as else ""
         self.meaning = f"a function of {told}{such}; no effect of the library has its form"
-        self.changes_in_time = "revisits" in needs or "temperature" in needs
+        self.changes_in_time = bool({"returns", "revisits", "temperature"} & {*needs})
         self.from_motion = domain != "load" or self.changes_in_time
         self._told = told
         self._covariate = covariate
@@ -181,7 +181,7 @@ def time_since_rest(track: Track) -> Floats:
 LATE = "a brake that opens late, or friction after a rest"
 DRIVE = "a drive's dead zone, or less torque from each ampere of a large current"
 POLARITY = "another gain of one polarity"
-WARM, AGAIN = ("position", "temperature"), ("position", "revisits")
+WARM = "position", "temperature"
 SMOOTH: tuple[Smooth, ...] = (
     Smooth("speed", "velocity", lambda t: np.abs(t.velocity), "direction"),
     Smooth("speed_and_direction", "velocity", lambda t: np.abs(t.velocity), "one"),
@@ -194,8 +194,8 @@ SMOOTH: tuple[Smooth, ...] = (
     Smooth("current", "load", lambda t: np.abs(t.model_a), "sign", such_as=DRIVE),
     Smooth("current_size", "load", lambda t: np.abs(t.model_a), "one", such_as=POLARITY),
     Smooth("acceleration", "acceleration", lambda t: t.acceleration, "one", constant=False),
-    Smooth("time", "time", lambda t: t.time_s, "one", AGAIN),
-    Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", AGAIN),
+    Smooth("time", "time", lambda t: t.time_s, "one", ("position", "revisits")),
+    Smooth("time_and_speed", "time", lambda t: t.time_s, "friction", ("position", "returns")),
     Smooth("time_and_load", "load", lambda t: t.time_s, "load", needs=("scale", "revisits")),
     Smooth("temperature", "temperature", lambda t: np.asarray(t.temperature_c), "friction", WARM),
 )

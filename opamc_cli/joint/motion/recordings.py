@@ -28,20 +28,18 @@ def grouped_track(recordings: list[Recording], joint: Joint) -> tuple[Track, Gro
     period = round(float(np.median(known))) if known else None
     if period is not None:
         track = replace(track, period_s=period / track.rate_hz)
-    if _revisits(track):
-        track = replace(track, channels=track.channels | {"revisits"})
+    track = replace(track, channels=track.channels | _passed_again(track))
     names = tuple(recording.name for recording in recordings)
     return track, group_samples(track.moving, track.bounds, period, track.rate_hz, names)
 
 
-def _revisits(track: Track) -> bool:
-    """Whether places are passed at different times; of an arm that moves, those of all its joints.
-
-    From one recording's end to the next one's start a joint has gone, too.
-    """
-    again = comes_back(track.position_rad)
-    if track.others is None or not again or not track.moving.any():
-        return again
+def _passed_again(track: Track) -> set[str]:
+    """Whether its own places are passed again, "returns", and the whole arm's, "revisits"."""
+    # From one recording's end to the next one's start a joint has gone, too.
+    if not comes_back(track.position_rad):
+        return set()
+    if track.others is None or not track.moving.any():
+        return {"returns", "revisits"}
     beside = track.others[:, : len(track.other_axes)]
     places = np.column_stack([track.position_rad, beside])[track.moving]
     places = places[:: max(len(places) // MOST_PLACES, 1)]
@@ -52,7 +50,7 @@ def _revisits(track: Track) -> bool:
         np.any((np.abs(places - places[k]).max(axis=1) < SAME) & (np.abs(way - way[k]) > 1.0))
         for k in range(0, len(places), max(len(places) // PROBED, 1))
     ]
-    return float(np.mean(passed)) >= MOSTLY
+    return {"returns", "revisits"} if float(np.mean(passed)) >= MOSTLY else {"returns"}
 
 
 def _speeds(track: Track, start: int, stop: int) -> list[Floats]:

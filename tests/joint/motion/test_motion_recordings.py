@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.motion import recordings
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import (
@@ -100,6 +101,11 @@ def test_an_arm_comes_back_where_all_joints_that_move_do(beside, known):
     run = Recording("run", 200.0, current_a=place, position_rad=place, others_rad=others)
     track, _ = grouped_track([run], Joint())
     assert ("revisits" in track.channels) == known
+    # a joint that warms up asks its own places alone: 6.0 times the noise was left of one
+    assert "returns" in track.channels
+    warmup, payload = (built_in_library()[name] for name in ("warmup", "payload_change"))
+    assert warmup.untestable(track) is None
+    assert (payload.untestable(track) is None) == known
 
 
 def test_an_arm_comes_back_in_another_recording_of_its_program():
