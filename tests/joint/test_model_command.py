@@ -576,6 +576,23 @@ def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path,
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("repeats", [True, False])
+def test_which_joint_it_is_is_doubted_where_the_program_repeats_itself(repeats, tmp_path, capsys):
+    """Of a stranger's six such programs three named a joint that asks nothing."""
+    t = np.arange(6000) / 250.0
+    q = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin((2.6 if repeats else 2.9) * t + 1)
+    beside = 0.7 * np.sin((1.3 if repeats else 1.9) * t + 2) + 0.3 * np.sin(3.9 * t)
+    current = 0.5 * np.sin(q) + 0.4 * np.sign(np.gradient(q)) + 0.8 * np.cos(q + beside)
+    current += 0.2 * np.gradient(np.gradient(q)) * 250**2
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 250.0, **columns)
+    assert close(tmp_path, "--axis", "1", "--quiet", model=MODEL) == 0
+    said = "which of the other joints load it" in capsys.readouterr().err
+    assert said == repeats
+
+
+@pytest.mark.long
 @pytest.mark.parametrize("dry", [0.15, 0.0])
 def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp_path, capsys, dry):
     t = np.arange(6000) / 250.0

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
@@ -287,7 +288,8 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         unlikely = any(_of_the_program(step.term, slowest) for step in loop.steps)
         (doubts if unlikely else laid.notes).append(ALONE.format(axis, ", ".join(named)))
     if "coupling" in found and len(runs) == 1:
-        laid.notes.append(ONE_PROGRAM.format(axis))
+        # Of six programs that repeat themselves three named a wrong joint, of eight others none.
+        (doubts if np.isfinite(track.period_s) else laid.notes).append(ONE_PROGRAM.format(axis))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
         doubts += [note for run in runs for note in scaled(run, axis, by_name[run.name])]
