@@ -45,14 +45,15 @@ def check(
     from opamc_cli.config.files import read_values
     from opamc_cli.config.yaml.kinds import USES, kind_of
     from opamc_cli.errors import UsageError
-    from opamc_cli.storage.ingest.map.axes import protect
+    from opamc_cli.storage.ingest.map.axes import as_written, protect
 
     if file is not None and config is not None:
         msg = f"check {file} or {config}, one at a time"
         raise UsageError(msg)
     kind = "configuration"
     if file is not None:
-        kind = kind_of(read_values(file, overrides or (), protect)) or "configuration"
+        with as_written():
+            kind = kind_of(read_values(file, overrides or (), protect)) or "configuration"
     if file is None or kind == "configuration":
         effective = load_config(file or config, overrides or ())
         values = {"valid": True, "kind": kind, "config_hash": effective.digest()}

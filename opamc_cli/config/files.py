@@ -86,8 +86,9 @@ def read_yaml(path: Path, prepare: Callable[[str], str] = str) -> dict[str, Any]
     try:
         values = plain_values(prepare(text))
     except YamlError as error:
-        # what stands for all axes in a map is a mapping to YAML
-        what = f"is {USES['map']}" if "axis{n" in text else f"is not valid YAML: {error}"
+        # what stands for all axes in a map is a mapping to YAML, but for who reads maps
+        of_map = "axis{n" in text and prepare is str
+        what = f"is {USES['map']}" if of_map else f"is not valid YAML: {error}"
         msg = f"{path}: {what}"
         raise ConfigError(msg) from error
     if values is None:

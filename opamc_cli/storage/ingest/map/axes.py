@@ -5,8 +5,11 @@ placeholders are taken out of the text before it is read: quotes are not needed.
 """
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
+
+from opamc_cli.errors import ConfigError
 
 MOST_AXES = 32
 """An arm with external axes has fewer; a file that has more would not end."""
@@ -29,6 +32,21 @@ def protect(text: str) -> str:
 def shown(text: str) -> str:
     """Return protected text as its user wrote it, for a message."""
     return _READ.sub(lambda m: f"{{n{m[1] or ''}}}", text)
+
+
+@contextmanager
+def as_written() -> Iterator[None]:
+    """Name protected text in errors as its user wrote it.
+
+    Raises
+    ------
+    ConfigError
+        Any that is raised within.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        raise ConfigError(shown(str(error))) from error
 
 
 def has_placeholder(value: object) -> bool:

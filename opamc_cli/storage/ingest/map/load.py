@@ -7,7 +7,7 @@ from pathlib import Path
 from opamc_cli.config.files import read_values, validate
 from opamc_cli.config.shipped import shipped_file
 from opamc_cli.errors import ConfigError
-from opamc_cli.storage.ingest.map.axes import has_placeholder, protect, shown
+from opamc_cli.storage.ingest.map.axes import as_written, has_placeholder, protect, shown
 from opamc_cli.storage.ingest.map.map_file import (
     IngestMap,
     RateMap,
@@ -31,7 +31,8 @@ def load_map(path: Path, overrides: Sequence[str] = ()) -> IngestMap:
         If it cannot be read, or a key, column name, unit or combination is not allowed.
     """
     file = shipped_file(path, "maps")
-    channels = validate(IngestMap, read_values(file, overrides, protect), str(path), overrides)
+    with as_written():
+        channels = validate(IngestMap, read_values(file, overrides, protect), str(path), overrides)
     check_map(path, channels)
     return channels
 

@@ -2,6 +2,7 @@
 
 import pytest
 
+from opamc_cli.config import load_config
 from opamc_cli.errors import ConfigError
 from opamc_cli.storage.ingest.map.load import load_map
 
@@ -47,3 +48,20 @@ def test_refused(tmp_path, columns, head, why):
     with pytest.raises(ConfigError) as refused:
         load(tmp_path, columns, head)
     assert why in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("columns", "why"),
+    [
+        ("axis{n}_a: {source: x{n}, unit: A}, axis{n}_a: {source: y{n}}", "'axis{n}_a' is given"),
+        ("axis{n}_a: {source: x{n}, unit: A}, axis1_b: {source: 'x", "while scanning a quoted"),
+        ("axis{n}_a: {source: x{n}, unitt: A}", "columns.axis{n}_a.unitt"),
+    ],
+)
+def test_what_is_wrong_in_lines_for_all_axes_is_said_as_it_was_written(tmp_path, columns, why):
+    """It was said that it is a map, to be read by what read it."""
+    with pytest.raises(ConfigError, match=r"map\.yaml: ") as refused:
+        load(tmp_path, columns)
+    assert why in str(refused.value)
+    with pytest.raises(ConfigError, match=r"is a map, for `opamc ingest --map`|unknown key"):
+        load_config(tmp_path / "map.yaml")
