@@ -186,7 +186,7 @@ DERIVED = (
     "SELECT * FROM alarm",
     "SELECT robot, night, status, why FROM night",
     "SELECT robot, time, axis, kind, text FROM event WHERE kind IN ('alarm', 'cleared', "
-    "'fault', 'not-judged', 'excused', 'failed', 'partial', 'missing')",
+    "'fault', 'not-judged', 'together', 'excused', 'failed', 'partial', 'missing')",
 )
 """What follows from files and what was declared."""
 

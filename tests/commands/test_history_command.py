@@ -23,6 +23,24 @@ def test_programs_of_one_robot_are_told_apart(programs, told):
     assert ("program" in [column.header for column in shown.columns]) is told
 
 
+def test_a_cause_is_shown_in_words():
+    (cause,) = [
+        [*column.cells]
+        for column in _table([{**ROW, "cause": "sensor_gain"}, ROW], events=False).columns
+        if column.header == "cause"
+    ]
+    assert cause == ["sensor gain", ""]
+
+
+def test_what_was_said_again_is_shown_once():
+    """A robot without files from Saturday on was listed twice with the same words."""
+    of = {"robot": "r1", "axis": None, "kind": "missing"}
+    rows = [{**of, "time": f"2026-03-{day}", "text": text} for day, text in enumerate("abab", 10)]
+    (time, *_, text) = _table(rows, events=True).columns
+    assert [*time.cells] == ["2026-03-10", "2026-03-11"]
+    assert [*text.cells] == ["a", "b"]
+
+
 @pytest.mark.parametrize("ending", ["csv", "json", "parquet"])
 def test_an_export_replaces_an_earlier_one_and_no_recording(tmp_path, ending):
     path = tmp_path / f"x.{ending}"

@@ -119,7 +119,10 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
     table = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for name in names:
         table.add_column(name.replace("_", " "))
-    forms = {"health_index": number, "p_value": p_value}
+    if events:  # what is said again has the same words: shown once, of when it was first said
+        first = {tuple(row[of] for of in names[1:]): row for row in reversed(rows)}
+        rows = sorted(first.values(), key=rows.index)
+    forms = {"health_index": number, "p_value": p_value, "cause": _in_words}
     for row in rows:
         table.add_row(
             *(
@@ -130,6 +133,10 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
             )
         )
     return table
+
+
+def _in_words(cause: str | None) -> str:
+    return (cause or "").replace("_", " ")
 
 
 def _refuse_to_replace_others(path: Path) -> None:

@@ -21,7 +21,7 @@ OVER = {
     for rank, kind in enumerate(
         (
             *("lost", "ended", "fault", "silent", "thinned", "lacking", "failed", "partial"),
-            *("not-judged", "missing", "cleared", "excused", "outside", "gathering"),
+            *("not-judged", "missing", "cleared", "together", "excused", "outside", "gathering"),
         )
     )
 }

@@ -9,7 +9,7 @@ import pyarrow as pa
 
 OF_ROBOT = (
     *("alarm", "reminder", "cleared", "fault"),
-    *("not-judged", "excused", "outside", "failed", "partial"),
+    *("not-judged", "together", "excused", "outside", "failed", "partial"),
 )
 """Kinds of event that follow from the nights of one robot."""
 
@@ -81,7 +81,8 @@ class MeasureRow:
     harmless: int
     """Whether the change has a cause outside the joint."""
     reason: str
-    """First reason of the verdict, behind its marks: see `told_by`."""
+    """What the verdict says to do first, of a healthy joint or an unjudged one its first reason,
+    behind its marks: see `told_by`."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ def nights_of(states, distances=None):
             "p_value": 0.5,
             "temperature_c": None,
             "cause": None,
-            "reason": "no motion",
+            "reason": "no motion" if state == "insufficient-data" else "",
         }
         for day, state in enumerate(states, start=1)
     ]
@@ -76,8 +76,8 @@ def test_what_was_said_in_a_night_is_not_changed_by_later_ones():
     assert [one.kind for one in early.events] == ["alarm", "reminder", "fault"]
     assert {*early.events} < {*late.events}
     assert late.alarms[0].text != early.alarms[0].text
-    assert "effect 0.05" in late.events[0].text
-    assert "effect 0.95" in late.alarms[0].text
+    assert "changed by 5%" in late.events[0].text
+    assert "changed by 95%" in late.alarms[0].text
 
 
 def failures(*reasons):
@@ -159,15 +159,15 @@ def test_an_acknowledged_alarm_is_raised_once_more_by_nights_at_fault_where_none
         said = [(one.time[-2:], one.text) for one in found.events if one.kind == "alarm"]
         return found.alarms[0], said
 
-    known, more = "2026-03-14", "acknowledged on 2026-03-14 at effect 0.05, and at fault since"
+    known, more = "2026-03-14", "acknowledged on 2026-03-14, then changed by 5%, and at fault since"
     # a lone night at fault is not enough
     assert [alarm(until, known)[0].acknowledged for until in (14, 17, 18)] == ["gear"] * 3
     for until in (19, 20):
         stands, said = alarm(until, known)
         assert stands.acknowledged is None
-        assert stands.text.startswith(f"{more} 2026-03-19; at fault, effect 0.50")
+        assert stands.text.startswith(f"{more} 2026-03-19; at fault, changed by 50%")
         assert [time for time, _ in said] == [stands.raised[-2:], "19"]
-        assert said[1][1].startswith(f"axis 2: {more} 2026-03-19; at fault, effect 0.50")
+        assert said[1][1].startswith(f"axis 2: {more} 2026-03-19; at fault, changed by 50%")
     # acknowledged again, or with a fault among its nights, it is silent
     for nights in ((known, "2026-03-19"), ("2026-03-18",)):
         assert alarm(20, *nights)[0].acknowledged == "gear"
@@ -230,7 +230,7 @@ def test_an_alarm_by_the_chart_alone_says_so_and_none_after_a_night_that_differe
     events = settled(nights_of(["healthy"] * 22, quiet)).events
     assert any("each night for itself healthy, all together not" in one.text for one in events)
     (alarm,) = settled(nights_of(["healthy"] * 16 + ["fault"] * 4 + ["healthy"], quiet)).alarms
-    assert alarm.text.startswith("healthy in the last night, effect")
+    assert alarm.text.startswith("healthy in the last night, changed by")
 
 
 def test_an_alarm_does_not_end_while_the_chart_is_near_its_limit():
@@ -344,10 +344,10 @@ def test_wear_that_the_weather_hides_from_the_effect_is_no_lack_of_a_trend():
     assert trend["low"] <= 0
     assert trend["distance"][1] <= 0.1 <= trend["distance"][2]
     assert trend["reach"] is None
-    start = "at fault, effect 0.20; distance from the baseline grows by "
+    start = "at fault, changed by 20%; distance from the baseline grows by "
     assert text.startswith(start), text
     assert text.endswith(
-        "a night, the effect too unevenly to say when it reaches fault level (0.4)"
+        "a night, the change too unevenly to say when it reaches fault level (40%)"
     )
     # what does not grow seldom seems to: the interval is one of 90 %
     still = [worn(0.0, 0.15, seed)[0] for seed in range(10)]
@@ -366,13 +366,13 @@ def test_few_nights_that_grow_by_more_than_nights_differ_grow():
     text, trend = said(0.4, 0.9, 1.4, 1.9)
     assert trend["distance"][0] == pytest.approx(0.5, abs=0.05)
     assert "distance from the baseline grows by 6" in text
-    assert text.endswith(" a night, too few nights to say when it reaches fault level (0.4)")
+    assert text.endswith(" a night, too few nights to say when it reaches fault level (40%)")
     # where the effect is there already there is nothing to reach
     text, trend = said(0.4, 0.9, 1.4, 1.9, effect=0.5)
-    start = "at fault, effect 0.50; at fault level (0.4), distance from the baseline grows by 6"
+    start = "at fault, changed by 50%; at fault level (40%), distance from the baseline grows by 6"
     assert (text.startswith(start), trend["reach"]) == (True, [0, 0])
     assert said(0.0, 2.0, 2.1, 2.0) == (
-        "at fault, effect 0.00; too few nights for a trend",
+        "at fault, changed by 0%; too few nights for a trend",
         {},
     )
 
@@ -389,7 +389,7 @@ def test_a_step_is_no_growth_and_what_is_reached_is_not_forecast():
     }
     assert trend_phrase(grows | {"reach": [8, 80]}, 0.4).endswith("in 8 to 80 nights")
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4).endswith("in 8 nights at the earliest")
-    now = "now at fault level (0.4), distance from the baseline grows by 11 % (5.1 to 22) a night"
+    now = "now at fault level (40%), distance from the baseline grows by 11 % (5.1 to 22) a night"
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4, reached=True) == now
 
 
@@ -403,14 +403,16 @@ def test_a_sensors_step_is_forecast_no_more_than_nights_that_stay():
     for row, effect in zip(series, effects, strict=True):
         row["effect"] = effect
     (alarm,) = settled(series).alarms
-    assert alarm.text == "at fault, effect 0.30; a step, no trend since"
+    assert alarm.text == "at fault, changed by 30%; a step, no trend since"
     assert json.loads(alarm.trend)["reach"] is None
     # back again it is at fault level no more, whatever level its nights had
     for row in series[7:]:
         row["effect"] = 0.8
     series[-1]["effect"] = 0.02
     (alarm,) = settled(series).alarms
-    assert alarm.text == "at fault, effect 0.02; was at fault level (0.4) before, not in this night"
+    assert (
+        alarm.text == "at fault, changed by 2%; was at fault level (40%) before, not in this night"
+    )
 
 
 def test_temperature_is_taken_off_the_trend_where_it_is_logged():
@@ -459,15 +461,18 @@ def test_a_joint_that_something_outside_it_changed_is_told_by_cause_and_again_af
     rows = nights_of(["healthy"] * 12)
     for row in rows[2:]:
         row.update(state="changed", harmless=True, cause="sensor_gain", p_value=1e-9)
-    rows[4]["cause"] = "payload_change"
+        row.update(reason="Check before the gear: a gain.")
+    rows[4].update(cause="payload_change", reason="Check before the gear: a payload.")
     rows[5].update(state="fault", harmless=False, cause="ripple")
     found = [one for one in settled(rows).events if one.kind != "fault"]
     assert [(one.time[-2:], one.kind) for one in found] == [
         (day, "outside") for day in ("03", "05", "12")
     ]
-    assert found[0].text.startswith(
-        "axis 2: changed in 9 nights from 2026-03-03 to 2026-03-12 by what lies outside the joint "
-        "(sensor gain and payload change): check it, or rebaseline"
+    assert found[0].text == (
+        "axis 2: changed in 9 nights from 2026-03-03 to 2026-03-12 by what lies outside the joint: "
+        "Check before the gear: a gain. Check before the gear: a payload. A fault that looks alike "
+        "would not be told; if it is meant to stay: opamc nightly rebaseline ROBOT --from "
+        "2026-03-03 --why TEXT --cell CELL"
     )
 
 
@@ -509,30 +514,31 @@ def intermittent(states, effect=0.2, **said):
     return rows
 
 
-NEEDS = (
-    "an alarm needs 2 of 3 nights at fault, 3 of 30 with an effect of 0.4, or a change that lasts"
-)
+NEEDS = "an alarm needs 2 of 3 nights at fault, 3 of 30 that changed by 40%, or a change that lasts"
 
 
 def test_a_single_night_at_fault_is_said_and_each_time_that_it_comes_back():
     """A cable that dropped out every third night was silence, fifteen starts in a row."""
     one, calm = "fault", ["healthy"] * 3
-    rows = intermittent(["healthy", one, *calm, one, *calm, one], cause="ripple")
-    alone = f"axis 2: at fault in 2026-03-02 alone (effect 0.20, looks like ripple): {NEEDS}"
+    rows = intermittent(
+        ["healthy", one, *calm, one, *calm, one], reason="in part: Inspect the joint for ripple."
+    )
+    needs = f"{NEEDS}; do first: Inspect the joint for ripple"
+    alone = f"axis 2: at fault in 2026-03-02 alone, changed by 20%: {needs}"
     assert single(*rows[:3]) == [("03-02", "fault", alone)]
     text = (
-        "axis 2: at fault in 3 nights from 2026-03-02 to 2026-03-10 "
-        f"(the last: effect 0.20, looks like ripple): {NEEDS}"
+        "axis 2: at fault in 3 nights from 2026-03-02 to 2026-03-10, the last changed by 20%: "
+        f"{needs}"
     )
     kinds = [("03-02", "fault"), ("03-06", "fault"), ("03-10", "fault")]
     assert single(*rows) == [(*said, text) for said in kinds]
     # after a month it is another
-    late = {**rows[1], "night": "2026-05-01", "cause": None}
+    late = {**rows[1], "night": "2026-05-01", "reason": ""}
     between = [{**rows[0], "night": f"2026-04-{day}"} for day in (29, 30)]
     assert single(*rows, *between, late)[3] == (
         "05-01",
         "fault",
-        f"axis 2: at fault in 2026-05-01 alone (effect 0.20): {NEEDS}",
+        f"axis 2: at fault in 2026-05-01 alone, changed by 20%: {NEEDS}",
     )
     # a night that was not judged parts none, and one that only changed is the chart's
     between = {**rows[2], "state": "insufficient-data"}
@@ -545,10 +551,14 @@ def test_large_faults_that_come_back_are_an_alarm_that_says_so():
     rows = intermittent((["fault"] + ["healthy"] * 3) * 3, effect=0.5)
     (alarm,) = settled(rows).alarms
     assert (alarm.raised, alarm.since) == ("2026-03-09", "2026-03-01")
+    named = settled([{**row, "reason": "Check the grease."} for row in rows]).events
+    assert next(one.text for one in named if one.kind == "alarm").endswith(
+        "no trend; do first: Check the grease"
+    )
     told = [one for one in settled(rows).events if one.kind == "alarm"]
     assert [one.text for one in told] == [
-        "axis 2: at fault, effect 0.50; comes and goes, in 3 nights until 2026-03-09; "
-        "now at fault level (0.4), no trend"
+        "axis 2: at fault, changed by 50%; comes and goes, in 3 nights until 2026-03-09; "
+        "now at fault level (40%), no trend"
     ]
 
 

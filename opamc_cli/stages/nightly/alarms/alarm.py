@@ -9,7 +9,7 @@ from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, episodes, nights_to_go
 from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
-from opamc_cli.stages.nightly.alarms.not_judged import is_own_fault, said_in
+from opamc_cli.stages.nightly.alarms.not_judged import do_first, is_own_fault, said_in
 from opamc_cli.stages.nightly.alarms.trend import FALLEN, trend_of, trend_phrase
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, begun_anew
 
@@ -65,7 +65,7 @@ def alarm_of(
             parts.insert(1, f"comes and goes, in {len(own)} nights until {first['night']}")
         if rows[night]["state"] == "healthy":
             parts.append(_end_phrase(nights[: night + 1], found, joint.rule))
-        return trend, "; ".join(parts)
+        return trend, "; ".join(parts) + do_first(rows[night])
 
     trend, text = told(last - 1)
     known = _acknowledged(joint.declared, axis, first["night"], until)
@@ -76,7 +76,8 @@ def alarm_of(
         anew = _raised_anew(rows[:last], nights, own[0], after, joint.rule)
         if anew is not None:
             effects = [row["effect"] or 0.0 for row in rows[:after] if row["state"] in JUDGED]
-            how = f"acknowledged on {known.time[:10]} at effect {effects[-1]:.2f}, and at fault"
+            then = f"then changed by {effects[-1]:.0%}"
+            how = f"acknowledged on {known.time[:10]}, {then}, and at fault"
             spans.append((anew, last, f"{how} since {rows[anew]['night']}; "))
             known, text = None, spans[-1][-1] + text
     # later nights do not change what was said in earlier ones
@@ -191,8 +192,7 @@ def _state_phrase(row: Mapping[str, Any], differed: bool) -> str:
         else "each night for itself healthy, all together not",
         "insufficient-data": "not judged in the last night",
     }.get(row["state"], row["state"])
-    if row["effect"] is not None and row["state"] in JUDGED:
-        phrase += f", effect {row['effect']:.2f}"
-    if row["cause"]:
-        phrase += f", looks like {row['cause']}"
-    return str(phrase)
+    if row["effect"] is None or row["state"] not in JUDGED:
+        return str(phrase)
+    size = f"changed by {row['effect']:.0%}"
+    return size if row["state"] == "changed" else f"{phrase}, {size}"

@@ -10,28 +10,28 @@ from opamc_cli.decision.trend.alarm import LATELY, recurring
 from opamc_cli.stages.nightly.alarms.commands import REBASELINE
 from opamc_cli.stages.nightly.alarms.course import JUDGED, day
 from opamc_cli.stages.nightly.alarms.together import kind
-from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow
+from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow, told_by
 
 LASTS = 3
 """Nights after which what keeps a joint from being judged may have been done to it on purpose."""
 
 
-def not_judged(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+def not_judged(rows: Sequence[Mapping[str, Any]], remind_after: int) -> Iterator[Event]:
     """Say of a joint which of its nights were not judged, and why."""
     for unjudged, part in groupby(rows, key=lambda row: row["state"] not in JUDGED):
         streak = list(part)
         if unjudged:
             first, last = streak[0], streak[-1]
-            span = f"since {first['night']}"
+            when = f"since {first['night']}"
             if last is not rows[-1]:  # it was judged again
-                span = f"from {first['night']} to {last['night']}"
-                span = first["night"] if first is last else span
+                when = f"from {first['night']} to {last['night']}"
+                when = first["night"] if first is last else when
             nights, reasons = ([row[of] for row in streak] for of in ("night", "reason"))
             row = f" ({len(streak)} nights in a row)" if len(streak) > 1 else ""
-            text = f"{name}: not judged {span}{row}: {_in_one(nights, reasons)}"
+            text = f"not judged {when}{row}: {_in_one(nights, reasons)}"
             if last is rows[-1] and len(streak) >= LASTS:
                 again = REBASELINE.replace("DATE", first["night"])
-                text += f"; if that is meant to stay: {again}"
+                text = f"{text.removesuffix('.')}; if that is meant to stay: {again}"
             for index in said_in(nights, reasons, remind_after):
                 yield Event(nights[index], first["robot"], first["axis"], "not-judged", text)
 
@@ -46,18 +46,15 @@ def alone(
     """
     needs = (
         f"an alarm needs {rule.nights} of {rule.of} nights at fault, {recurring(rule.nights)} of "
-        f"{LATELY} with an effect of {fault_effect:g}, or a change that lasts"
+        f"{LATELY} that changed by {fault_effect:.0%}, or a change that lasts"
     )
     for times in _coming_back(rows):
         nights = [row for run in times for row in run]
-        first, last = nights[0], nights[-1]
-        seen = [] if last["effect"] is None else [f"effect {last['effect']:.2f}"]
-        seen += [f"looks like {last['cause']}"] if last["cause"] else []
-        of, latest = f"{first['night']} alone", ", ".join(seen)
-        if len(nights) > 1:
-            of = f"{len(nights)} nights from {first['night']} to {last['night']}"
-            latest = f"the last: {latest}"
-        text = f"{name}: at fault in {of} ({latest}): {needs}"
+        last = nights[-1]
+        which = ", the last" if len(nights) > 1 else " alone,"
+        size = "" if last["effect"] is None else f"{which} changed by {last['effect']:.0%}"
+        of = span([row["night"] for row in nights])
+        text = f"{name}: at fault in {of}{size}: {needs}{do_first(last)}"
         for run in times:
             dates = [row["night"] for row in run]
             kinds = [str(row["cause"]) for row in run]
@@ -82,12 +79,18 @@ def _coming_back(
         yield times
 
 
+def do_first(row: Mapping[str, Any]) -> str:
+    """Tell what is to be done first about a joint at fault, or changed; nothing of any other."""
+    what = told_by(row["reason"])[2] if row["state"] in ("fault", "changed") else ""
+    return f"; do first: {what.rstrip('.')}" if what else ""
+
+
 def is_own_fault(row: Mapping[str, Any]) -> bool:
     """Return whether a night is at fault by what is the joint's own."""
     return row["state"] == "fault" and not row["harmless"]
 
 
-def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+def excused(rows: Sequence[Mapping[str, Any]], remind_after: int) -> Iterator[Event]:
     """Say of a joint in which nights it differed, but no more than conditions may move it.
 
     Nights between that are plainly healthy begin nothing anew: the weather comes and goes.
@@ -96,7 +99,7 @@ def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
     nights = [row["night"] for row in found]
     for index in said_in(nights, [""] * len(nights), remind_after):
         last = found[-1]
-        text = f"{name}: not told from unusual conditions in {_span(nights)}"
+        text = f"not told from unusual conditions in {span(nights)}"
         if last["p_value"] is not None and last["distance"] is not None:
             far = f"{math.exp(last['distance']):.2g} times as far as a healthy session"
             text += f" (p {last['p_value']:.2g}, {far})"
@@ -104,23 +107,25 @@ def excused(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> 
         yield Event(nights[index], last["robot"], last["axis"], "excused", text)
 
 
-def _span(nights: Sequence[str]) -> str:
+def span(nights: Sequence[str]) -> str:
+    """Return nights in words: how many, the first and the last."""
     several = f"{len(nights)} nights from {nights[0]} to {nights[-1]}"
     return several if len(nights) > 1 else nights[0]
 
 
-def outside(rows: Sequence[Mapping[str, Any]], name: str, remind_after: int) -> Iterator[Event]:
+def outside(rows: Sequence[Mapping[str, Any]], remind_after: int) -> Iterator[Event]:
     """Say of a joint in which nights it changed by what is no fault of it: payload, sensor, grease.
 
     No alarm comes of them, and a fault beside it might not be told.
     """
     found = [row for row in rows if row["state"] == "changed" and row["harmless"]]
     nights, causes = ([row[of] for row in found] for of in ("night", "cause"))
+    again = REBASELINE.replace("DATE", nights[0]) if nights else ""
     for index in said_in(nights, causes, remind_after):
-        named = " and ".join(dict.fromkeys(causes)).replace("_", " ")
+        said = {row["cause"]: told_by(row["reason"])[2] for row in found}
         text = (
-            f"{name}: changed in {_span(nights)} by what lies outside the joint ({named}): check "
-            "it, or rebaseline if it is meant to stay; a fault that looks alike would not be told"
+            f"changed in {span(nights)} by what lies outside the joint: {' '.join(said.values())} "
+            f"A fault that looks alike would not be told; if it is meant to stay: {again}"
         )
         yield Event(nights[index], found[-1]["robot"], found[-1]["axis"], "outside", text)
 
@@ -138,14 +143,14 @@ def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterato
             if not rows:
                 continue
             dates, reasons = [row.night for row in rows], [row.why for row in rows]
-            span = dates[0]
+            when = dates[0]
             if len(dates) > 1:
                 in_a_row = " in a row" if len(rows) == len(streak) else ""
-                span = f"{dates[0]} to {dates[-1]} ({len(dates)} nights{in_a_row})"
+                when = f"{dates[0]} to {dates[-1]} ({len(dates)} nights{in_a_row})"
             if of == "partial":
                 judged = any(row.status != "baseline" for row in rows)
-                span += f": in part not {'judged' if judged else 'used'}"
-            text = f"{span}: {_in_one(dates, reasons)}"
+                when += f": in part not {'judged' if judged else 'used'}"
+            text = f"{when}: {_in_one(dates, reasons)}"
             for index in said_in(dates, reasons, remind_after):
                 yield Event(dates[index], robot, None, of, text)
 

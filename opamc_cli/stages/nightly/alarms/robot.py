@@ -17,6 +17,7 @@ from opamc_cli.stages.nightly.alarms.not_judged import (
     not_judged,
     outside,
 )
+from opamc_cli.stages.nightly.alarms.several import said_once, together
 from opamc_cli.storage.history.rows import AlarmRow, Declared, Event, NightRow, begun_anew
 
 DIFFERS = 0.01
@@ -66,9 +67,12 @@ def settle_robot(
     standing: list[tuple[str, int, str]] = []
     events: list[Event] = []
     several = len({row["program"] for row in series}) > 1
+    places: dict[str, list[Mapping[str, Any]]] = {}
+    of_joints: list[tuple[str, Event]] = []
     for (program, axis), group in groupby(series, key=lambda row: (row["program"], row["axis"])):
         joint = list(group)
-        name = f"axis {axis}" + (f" in program {program}" if several else "")
+        where = f" in program {program}" if several else ""
+        name = f"axis {axis}{where}"
         watched = Watched(name, declared, rule, fault_effect, baseline_nights)
         for rows, replaced in courses(joint):
             seen = _nights(rows, rule, fault_effect, baseline_nights)
@@ -87,14 +91,27 @@ def settle_robot(
                     for row in joint
                     if raised <= row["night"] < (ended or "9999")
                 ]
-        events += not_judged(joint, name, rule.remind_after)
         under = {night for of, at, night in standing if (of, at) == (program, axis)}
         free = [row for row in joint if row["night"] not in under]
         for rows, _ in courses(joint):
             for stands, part in groupby(rows, key=lambda row: row["night"] in under):
                 events += [] if stands else alone(list(part), name, rule, fault_effect)
-        events += excused(free, name, rule.remind_after)
-        events += outside(free, name, rule.remind_after)
+        said = [
+            *not_judged(joint, rule.remind_after),
+            *excused(free, rule.remind_after),
+            *outside(free, rule.remind_after),
+        ]
+        of_joints += [(where, one) for one in said]
+        places.setdefault(where, []).extend(free)
+    for where, free in places.items():
+        moved, said = together(free, where, rule.remind_after)
+        events += said
+        of_joints = [
+            (at, one)
+            for at, one in of_joints
+            if at != where or one.kind == "outside" or (one.axis, one.time) not in moved
+        ]
+    events += said_once(of_joints)
     events += failed(robot, nights, rule.remind_after)
     return Settled(tuple(alarms), tuple(dict.fromkeys(standing)), tuple(events))
 

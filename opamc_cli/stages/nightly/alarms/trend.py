@@ -88,7 +88,7 @@ def trend_phrase(
     """
     if not trend:
         return "too few nights for a trend"
-    reach, level = trend["reach"], f"fault level ({limit:g})"
+    reach, level = trend["reach"], f"fault level ({limit:.0%})"
     farther = "a step, no trend since" if trend.get("step") else "no trend"
     if trend["distance"][1] > LEAP:
         farther = "distance from the baseline has leapt"
@@ -102,19 +102,20 @@ def trend_phrase(
     if reach == [0, 0]:
         grows = farther
         if trend.get("low", 0) > 0:
-            grows = f"grows by {trend['per_night']:.3f} a night"
+            grows = f"grows by {100 * trend['per_night']:.2g} points a night"
         return f"at {level}, {grows}"
     if reach is None:
-        why = "the effect too unevenly" if "level" in trend else "too few nights"
+        why = "the change too unevenly" if "level" in trend else "too few nights"
         unsure = f", {why} to say when it reaches {level}"
         return farther + (unsure if trend["distance"][1] > 0 else "")
     soon, late = reach
     when = f"{soon} to {late} nights"
     if late > MOST_AHEAD * max(soon, 1):
         when = f"{max(soon, 1)} night{'s' * (soon > 1)} at the earliest"
+    usual, least, most = (100 * trend[of] for of in ("per_night", "low", "high"))
     return (
-        f"effect grows by {trend['per_night']:.3f} ({trend['low']:.3f} to {trend['high']:.3f}) a "
-        f"night, reaches {level} in {when}"
+        f"change grows by {usual:.2g} ({least:.2g} to {most:.2g}) points a night, reaches {level} "
+        f"in {when}"
     )
 
 

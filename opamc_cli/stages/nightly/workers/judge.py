@@ -168,7 +168,7 @@ def _axis(
     if cause and lies_outside(cause) and excuses_little(cause):
         cause = {}  # beside it stands what nobody should look away from
     distance = entry.get("distance") or {}
-    reasons = entry.get("reasons") or [""]
+    first = (entry.get("brief") or {}).get("inspect") or [*entry.get("reasons", ()), ""][0]
     return AxisResult(
         axis=int(entry["axis"]),
         state=str(entry["state"]),
@@ -180,7 +180,7 @@ def _axis(
         log_common=_log(distance.get("allowed")),
         effect=distance.get("effect"),
         temperature_c=temperature_c,
-        reason=EXCUSED * bool(entry.get("excused")) + str(reasons[0]),
+        reason=EXCUSED * bool(entry.get("excused")) + str(first),
         in_part=entry["axis"] in in_part,
     )
 
