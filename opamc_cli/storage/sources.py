@@ -164,6 +164,8 @@ def check_comparable(baseline: Sequence[RunSource], target: Sequence[RunSource])
                 f"{other.path}: {key} is {value!r} where {first.path} has {expected!r}; "
                 "a baseline and a target must be recorded at the same rate with the same program"
             )
+            if key == "program":
+                msg += "; name the files of one by a quoted pattern, such as 'normal/*P.parquet'"
             raise InputError(msg)
     notes = []
     for key in WORTH_NOTING:

@@ -389,7 +389,7 @@ def pair(tmp_path_factory) -> tuple[Path, Path]:
     ("make", "parts"),
     [
         (bad_runs.other_rate, ["sampling_rate_hz is 500", "1000"]),
-        (bad_runs.other_program, ["program is 'place'", "'pick'"]),
+        (bad_runs.other_program, ["program is 'place'", "'pick'", "by a quoted pattern"]),
     ],
 )
 def test_what_cannot_be_compared(opamc, tmp_path, pair, make, parts):

@@ -210,7 +210,9 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         labels = {each.name: each.labels for each in listed if each.labels}
         gaps, left = count_doubts(path, task.channels, channels, listed)
     account = clock.clock.account if clock and channels.time else None
-    doubt = account.doubt() if account else None
+    doubts = [*left, *written.lost]
+    if account and (doubt := account.doubt()):
+        doubts.append(f"{path}: {doubt}")
     return Ingested(
         task.source,
         task.run,
@@ -221,7 +223,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
         doubts=(*gaps, *remarks, *written.doubts),
-        lost="; ".join([*left, *([f"{path}: {doubt}"] if doubt else [])]) or None,
+        lost="; ".join(doubts) or None,
     )
 
 
@@ -361,6 +363,9 @@ def _info(path: Path, source: Source, channels: IngestMap, rate: float) -> RunIn
             continue
         if key == "started_at":
             known: object = utc_text(_since_1970(path, value, given, channels))
+            if known is not None and str(known) < FIRST_DATE:
+                msg = f"{path}: no log is of {known}: write its year in four digits, or correct it"
+                raise InputError(msg)
             wanted = "a date and time in ISO 8601, such as 2022-10-26T08:17:21Z"
         elif key in ("speed_percent", "payload_kg"):
             known, wanted = _number(value), "a number"
@@ -401,6 +406,14 @@ def _number(value: object) -> float | None:
     return number if np.isfinite(number) else None
 
 
+FIRST_DATE = "1970"
+"""A clock that was never set begins there, or later; an earlier date is none of a log."""
+
+MOST_EMPTY = 0.5
+"""Share of a channel's rows without a value from which on it is lost, not only holed by the gaps
+that are told; a temperature may be logged once a minute."""
+
+
 @dataclass(frozen=True)
 class _Written:
     """What was written of a recording; see `Ingested`."""
@@ -408,6 +421,7 @@ class _Written:
     n_samples: int
     missing: dict[str, int]
     doubts: tuple[str, ...]
+    lost: list[str]
 
 
 def _write(
@@ -456,7 +470,13 @@ def _write(
                 msg = f"{doubt} Correct its unit or scale in the map"
                 raise InputError(msg)
             doubts += [doubt] if size.doubt() else []
-    return _Written(n_samples, {name: n for name, n in missing.items() if n}, tuple(doubts))
+    lost = [
+        f"{path}: column {name} (source {channels.columns[name].source!r}) has no value in "
+        f"{count / n_samples:.0%} of the rows; look at the logger, or leave the axis out"
+        for name, count in missing.items()
+        if count > MOST_EMPTY * n_samples and quantity_of(name) != "temperature"
+    ]
+    return _Written(n_samples, {name: n for name, n in missing.items() if n}, tuple(doubts), lost)
 
 
 def _units_apart(path: Path, channels: IngestMap, rate_hz: float, table: pa.Table) -> list[str]:

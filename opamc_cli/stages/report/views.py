@@ -128,7 +128,10 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 def _since(onset: Onset) -> str:
     if onset.first_run is None:
-        return "No target segment lies above the baseline's highest of its motion."
+        return (
+            "Not known: by its patterns no target segment lies above the baseline's highest of its "
+            "motion; what else has changed tells no segment."
+        )
     where = f"run {onset.first_run}"
     if onset.first_started_at:
         where += f" (begun {wording.moment(onset.first_started_at)})"

@@ -70,7 +70,8 @@ def headline(verdict: Mapping[str, Any]) -> str:
     most = far_most(verdict)
     for place, axes in enumerate(states.values()):
         if most in axes:
-            parts[place] += f" (axis {most} by far the most: look there first)"
+            named = f"axis {most} " if len(axes) > 1 else ""
+            parts[place] += f" ({named}by far the most: look there first)"
     if not parts:
         return "No axis was judged"
     if len(healthy) > 1 and len(parts) > 1:

@@ -15,9 +15,10 @@ from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures import partial_residuals
 from opamc_cli.stages.report.figures.figure import canvas, style, to_svg
 from opamc_cli.stages.report.figures.palette import PALETTE, colour
-from opamc_cli.stages.report.onset import find_onset
+from opamc_cli.stages.report.onset import Onset, find_onset
 from opamc_cli.stages.report.results.columns import extremes, to_columns
 from opamc_cli.stages.report.results.inputs import ReportInputs, RoleTables, merged_config
+from opamc_cli.stages.report.views import _since
 
 
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(math.nan), max_size=300), st.integers(4, 60))
@@ -109,9 +110,11 @@ def test_one_joint_shakes_the_others_whatever_they_are_called() -> None:
     axes = [(1, "fault", 3e7), (2, "changed", 700.0), (3, "changed", 3600.0)]
     found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
     said = wording.headline({"axes": found})
-    assert (
-        said == "Axis 1 at fault (axis 1 by far the most: look there first); axes 2 and 3 changed"
-    )
+    assert said == "Axis 1 at fault (by far the most: look there first); axes 2 and 3 changed"
+
+
+def test_since_when_is_answered_where_no_segment_tells_it():
+    assert _since(Onset(0, 24, None, None, None)).startswith("Not known: ")
 
 
 def test_the_headline_tells_the_worst_first() -> None:

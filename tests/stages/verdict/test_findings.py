@@ -11,6 +11,7 @@ from opamc_cli.stages.verdict.agreement.findings import (
     _coarser,
     _other_steps,
     _other_unit,
+    _still,
 )
 from opamc_cli.stages.verdict.agreement.measured import _changing, _noise, _steps
 
@@ -129,3 +130,18 @@ def test_what_all_currents_lose_or_gain_between_samples_is_no_joint_s(smooth, ti
     assert all(one.of_log and "another filter in drive or log" in one.why for one in told)
     assert _all_filtered(axes[:1], usual) == []
     assert _noise([np.full(9, np.nan)]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("current", "position", "said"),
+    [
+        (0.0, 0.5, "the current of axis 2 is 0.0% of the baseline's though its position moves"),
+        (0.0, 0.0, "baseline's; the joint stands without load, or its sensor is dead"),
+        (1.0, 0.0, "no motion is found in x: axis 2 stands still there"),
+    ],
+)
+def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
+    """Of a current of 0 A it was said that no motion was found in the position, which moved."""
+    own = SimpleNamespace(axis=2, signal=("x",), size={"current": current, "position": position})
+    usual = SimpleNamespace(size={(2, "current"): 1.0, (2, "position"): 0.5})
+    assert said in _still(own, usual)

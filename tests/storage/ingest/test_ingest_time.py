@@ -145,3 +145,31 @@ def test_a_part_that_is_lost_is_said_when_quiet(tmp_path, opamc, stamps, said):
     ended = opamc("ingest", file, "--map", path, "--out", out, "--quiet")
     assert (ended.code, out.exists()) == (4, True)
     assert re.search(said, ended.err)
+
+
+@pytest.mark.parametrize(("column", "known", "code"), [("a", 20, 4), ("a", 60, 0), ("t", 2, 0)])
+def test_a_channel_that_is_empty_for_most_of_a_recording_is_said_when_quiet(
+    tmp_path, opamc, column, known, code
+):
+    """An axis of which five seconds of 37 were there was silence; a temperature may be rare."""
+    file, path = tmp_path / "r.csv", tmp_path / "map.yaml"
+    full = {"a": 100, "t": 100} | {column: known}
+    rows = (",".join(str(k % 7) if k < full[of] else "" for of in "at") for k in range(100))
+    file.write_text("i,c\n" + "".join(f"{row}\n" for row in rows))
+    path.write_text(
+        "sampling_rate_hz: 100\ncolumns: {axis1_a: {source: i, unit: A}, "
+        "axis1_temperature: {source: c, unit: degC}}\n"
+    )
+    ended = opamc("ingest", file, "--map", path, "--out", tmp_path / "out", "--quiet")
+    assert ended.code == code
+    assert ("column axis1_a (source 'i') has no value in 80% of the rows" in ended.err) == bool(
+        code
+    )
+
+
+def test_a_date_before_1970_is_none_of_a_log(tmp_path):
+    """The year 0026 passed, and its night was that of its folder."""
+    rows = [(f"0026-03-01T20:00:00.{k:02d}Z", k % 7) for k in range(100)]
+    extra = "metadata: {started_at: {source: t}}\n"
+    with pytest.raises(InputError, match=r"no log is of 0026-03-01T.*year in four digits"):
+        ingested(tmp_path, rows, "{source: t, unit: iso8601}", extra)

@@ -285,13 +285,14 @@ def _unbalanced(own: Measured, reference: Reference) -> str | None:
 
 def _still(own: Measured, reference: Reference) -> str:
     usual = reference.size.get((own.axis, "current"), 0.0)
-    text = f"no motion is found in {', '.join(own.signal)}"
+    moved = reference.size.get((own.axis, "position"), 0.0)
     if own.size["current"] <= DEAD_SHARE * usual:
-        return (
-            f"{text}: the current of axis {own.axis} is {own.size['current'] / usual:.1%} of the "
-            "baseline's; the joint stands without load, or its sensor is dead"
-        )
-    return f"{text}: axis {own.axis} stands still there"
+        share = own.size["current"] / usual
+        text = f"the current of axis {own.axis} is {share:.1%} of the baseline's"
+        if own.size.get("position", 0.0) > DEAD_SHARE * moved:
+            return f"{text} though its position moves: the sensor is dead, or its cable loose"
+        return f"{text}; the joint stands without load, or its sensor is dead"
+    return f"no motion is found in {', '.join(own.signal)}: axis {own.axis} stands still there"
 
 
 def _clipped(own: Measured, reference: Reference) -> str | None:

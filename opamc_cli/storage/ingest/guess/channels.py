@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from opamc_cli.storage.ingest.guess.names import Meant, says_actual
+from opamc_cli.storage.ingest.guess.names import Meant, nearness, says_actual
 from opamc_cli.storage.ingest.map.axes import MOST_AXES
 from opamc_cli.storage.schemas.channels import LOGGED, PHASES
 
@@ -81,9 +81,10 @@ def _within(choice: Choice, axes: set[int]) -> Choice:
     return Choice(choice.kind, kept, choice.passed_over)
 
 
-def _worth(group: Sequence[Meant]) -> tuple[bool, bool, int, int]:
+def _worth(group: Sequence[Meant]) -> tuple[bool, bool, int, int, int]:
     pattern = group[0].pattern
-    return group[0].measured, says_actual(pattern), len(group), -len(pattern)
+    near = nearness(pattern) if group[0].quantity == "temperature" else 0
+    return group[0].measured, says_actual(pattern), near, len(group), -len(pattern)
 
 
 def _parent(channel: Meant) -> str:

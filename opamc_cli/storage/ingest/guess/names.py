@@ -28,6 +28,10 @@ NOT_MEASURED = (
 ACTUAL = ("act", "actual", "ist", "istwert", "meas", "measured", "fbk", "feedback")
 """Words of what was, beside other names for the same."""
 
+OF_JOINT = ("motor", "joint", "axis", "gear", "winding", "wicklung", "coil")
+OF_DRIVE = ("drive", "driver", "board", "pcb", "mosfet", "fet", "mcu", "cpu", "inverter", "ambient")
+"""With `OF_JOINT`: words of where a temperature is taken; grease is as warm as its joint."""
+
 ELSEWHERE = (
     "mm",
     "tcp",
@@ -51,8 +55,8 @@ TOLD_BY_UNIT = ("current", *LOGGED)
 """Quantities that a unit tells where the name does not; a second may be of anything."""
 
 
-UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$")
-"""Such as `Current J1 [mA]`, `time (ms)`."""
+UNIT = re.compile(r"\s*[\[(]\s*([^\[\]()]+?)\s*[\])]\s*$|(?<=[^\W_])_(deg|rad|rpm)$")
+"""Such as `Current J1 [mA]`, `time (ms)`, `J1_act_deg`."""
 
 COUNTED = re.compile(r"([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*[*x·]?\s*(\D\S*)")
 """Such as `0.1 deg`."""
@@ -133,8 +137,9 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
 def _without_unit(name: str) -> tuple[str, str | None]:
     """Return a name without the unit in brackets at its end, and that unit."""
     found = UNIT.search(name)
-    known = found is not None and _is_known(counted_unit(found[1])[1])
-    return (name[: found.start()], found[1]) if found is not None and known else (name, None)
+    unit = found and (found[1] or found[2])
+    known = found is not None and _is_known(counted_unit(unit)[1])
+    return (name[: found.start()], unit) if found is not None and known else (name, None)
 
 
 def _is_known(unit: str | None) -> bool:
@@ -186,6 +191,18 @@ def says_actual(pattern: str) -> bool:
     (True, True, False)
     """
     return any(word in ACTUAL for word in _words(pattern))
+
+
+def nearness(pattern: str) -> int:
+    """Return 1 of a temperature that is by its name the motor's or joint's, -1 of a drive's.
+
+    Examples
+    --------
+    >>> nearness("MOTOR_TEMPERATURE"), nearness("TEMPERATURE"), nearness("drive_temp_#")
+    (1, 0, -1)
+    """
+    words = _words(pattern)
+    return any(word in OF_JOINT for word in words) - any(word in OF_DRIVE for word in words)
 
 
 def _words(pattern: str) -> list[str]:

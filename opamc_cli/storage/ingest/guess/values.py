@@ -181,7 +181,10 @@ def _steps_over_speed(positions: Mapping[int, Float], speeds: Mapping[int, Float
         # the mean of the speed over both steps, by Simpson: the middle's alone is 6 % more where a
         # motion of 1 Hz is logged at 10 Hz
         middle = (speed[:-2] + 4 * speed[1:-1] + speed[2:]) / 6
-        jump = np.abs(step) > 10 * np.nanmedian(np.abs(step)) + 1e-12
+        size = np.abs(step)
+        # of the steps that are some: a joint that rests for most of a log moves all the same
+        moved = size[size > 0]
+        jump = size > 10 * (np.median(moved) if moved.size else 0.0)
         known = np.isfinite(step) & np.isfinite(middle) & ~(jump & (np.abs(step) > 1))
         product += float(np.dot(step[known], middle[known]))
         square += float(np.dot(middle[known], middle[known]))

@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,9 @@ from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED, Conversion
 LOOKED_AT_ROWS = 1 << 16
 """Rows whose values are looked at: minutes of a robot's log."""
 
+PROGRAMS = ("program", "Program", "program_name", "prog", "Prog", "programm", "Programm")
+"""Names of a column of texts that names the program."""
+
 LOOKED_AT_FILES = 20
 """Recordings whose rate is looked at."""
 
@@ -57,6 +61,8 @@ class _Look:
     """Where the file declares one of all that was chosen."""
     unsigned: set[Name | tuple[Name, int]]
     """Keys of `values` that the file has without their sign."""
+    program: str | None = None
+    """Column that names the program."""
 
 
 @dataclass(frozen=True)
@@ -109,7 +115,7 @@ def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     lines += [
         "metadata:",
         "  robot:    # such as cell 7; runs of different robots are told apart",
-        "  program:  # such as pick; runs of different programs are not compared",
+        _program_line(look),
         *_started_at(look),
     ]
     return "\n".join(lines) + "\n"
@@ -136,6 +142,7 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
             choices = choose(meant)
             break
         time = time_channel(meant)
+        program = _program(source)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
     logged = choices.get("temperature", Choice("temperature", {}, ()))
@@ -166,7 +173,22 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
     repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
-    return _Look(path, layout, choices, time, values, rest, repeated, rate, unsigned)
+    return _Look(path, layout, choices, time, values, rest, repeated, rate, unsigned, program)
+
+
+def _program(source: Source) -> str | None:
+    for name in PROGRAMS:
+        with suppress(InputError):
+            if isinstance(source.value(name), str):
+                return name
+    return None
+
+
+def _program_line(look: _Look) -> str:
+    if look.program is None:
+        return "  program:  # such as pick; runs of different programs are not compared"
+    why = "its first row's; runs of different programs are not compared"
+    return f"  program: {{source: {_quoted(look.program)}}}  # {why}"
 
 
 def _is_cold(values: Array, channel: Meant) -> bool:

@@ -68,6 +68,12 @@ def test_a_torque_stands_for_a_current_that_was_not_measured():
     assert "current" not in chosen("tau_1", "i_a", "i_b", "i_c")[0]
 
 
+def test_a_motors_temperature_goes_before_a_drives():
+    for name, other in (("MOTOR_TEMPERATURE", "TEMPERATURE"), ("temperature", "drive_temp")):
+        axes, over = chosen("cur_1", other, name)
+        assert (axes["temperature"], over["temperature"]) == ({1: name}, (other,))
+
+
 def test_columns_of_a_wide_channel_are_axes_from_its_first():
     axes, _ = chosen("temp_1", "temp_2", motor_cur=2, q=3)
     assert axes["current"] == {1: ("motor_cur", 0), 2: ("motor_cur", 1)}

@@ -42,6 +42,13 @@ METADATA = [
 ]
 
 
+def test_a_column_of_texts_that_names_the_program(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_text("t,prog,cur_1\n" + "".join(f"{t:g},P,{t:g}\n" for t in T))
+    why = "its first row's; runs of different programs are not compared"
+    assert f"  program: {{source: prog}}  # {why}" in lines_of(path)[1]
+
+
 def test_a_table_of_everything(tmp_path):
     columns = {
         "t": T,

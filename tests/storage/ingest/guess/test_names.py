@@ -34,6 +34,13 @@ def test_names_of_a_quantity(quantity, name):
     assert found.number == (None if quantity == "time" else 1)
 
 
+def test_an_angle_by_the_unit_at_the_end_of_its_name():
+    found = only("J1_act_deg")
+    assert (found.quantity, found.number, found.unit) == ("position", 1, "deg")
+    assert only("J1_vel_rad").quantity == "velocity"
+    assert meanings([Listed("deg"), Listed("_deg"), Listed("J1_tcp_deg")]) == []
+
+
 def test_what_a_controller_wanted_is_not_measured():
     assert [w for w in WANTED.split() if only(f"{w}_q_1").measured] == []
     assert [w for w in ELSEWHERE.split() if meanings([Listed(f"{w}_q_1")])] == []
@@ -63,7 +70,7 @@ def test_phases_by_their_letter_where_all_three_are_there(name, phase):
 
 def test_the_last_number_counts_axes_unless_names_are_joints():
     assert only("robot2_q_13_rad") == Meant(
-        "position", 13, "robot2_q_#_rad", "robot2_q_13_rad", None, True, None
+        "position", 13, "robot2_q_#_rad", "robot2_q_13_rad", None, True, "rad"
     )
     (joint,) = meanings([Listed("wrist_1/effort", unit="Nm")], counted=False)
     assert joint == Meant("torque", None, "wrist_1/effort", "wrist_1/effort", None, True, "Nm")

@@ -151,6 +151,14 @@ def test_a_speed_that_is_ten_times_too_large_is_of_a_wrong_clock_and_no_rpm():
         )
 
 
+def test_a_joint_that_rests_for_most_of_a_log_moves_all_the_same():
+    """Its strokes were taken for wraps, and its speed for "the motor's"."""
+    moves = np.arange(T.size) < 600
+    angle = 4096 * np.where(moves, ANGLE, ANGLE[600])
+    found = angle_units({1: angle}, {1: 4096 * np.where(moves, SPEED, 0.0)}, 250.0)
+    assert "agree with the speed" in found[0].why
+
+
 @pytest.mark.parametrize(("times", "side"), [(1 / 121, "speed"), (5.05, "position"), (1.2, None)])
 def test_a_speed_that_is_a_whole_gear_ratio_off_may_be_of_the_motor(times, side):
     why = angle_units({1: ANGLE}, {1: SPEED / times}, 250.0)[0].why
