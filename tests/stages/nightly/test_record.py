@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from opamc_cli.stages.nightly.start.record import _places
+from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.nightly.workers.night import ProgramResult
 
 
@@ -17,3 +18,13 @@ def test_no_program_writes_over_another_or_over_a_file_of_the_night():
     assert places("drill", "lift_a", "lift/a") == [".", "lift_a_", "lift_a"]
     assert places("lift_a", "lift/a", "") == [".", "lift_a", "_"]
     assert places("lift", "verdict.json", "../up") == [".", "verdict.json_", "_up"]
+
+
+def test_of_an_unhealthy_joint_the_history_keeps_what_to_do_first():
+    """It kept that the current has changed, and the library's name of the effect."""
+    fault = {"axis": 1, "state": "fault", "reasons": ["It has changed."]}
+    assert _axis({**fault, "brief": {"inspect": "Check the grease."}}, None).reason == (
+        "Check the grease."
+    )
+    assert _axis({**fault, "state": "healthy", "brief": None}, None).reason == "It has changed."
+    assert _axis({"axis": 1, "state": "healthy", "reasons": []}, None).reason == ""
