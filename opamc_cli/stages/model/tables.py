@@ -281,7 +281,7 @@ def _failure(loop: Loop) -> str | None:
     if loop.r2_after <= 0:
         return (
             f"the model predicts sealed data no better than their mean (r2 {loop.r2_after:.2g}): "
-            "check gear ratio, pole pairs, units and phases"
+            "check gear ratio, pole pairs, units and phases, or record more speeds and both ways"
         )
     times = loop.rmse_after_a / max(loop.after.rmse(sealed=False), 1e-300)
     return f"the sealed part's error is {times:.1f} times that of the rest: the fit fails there"
