@@ -104,8 +104,8 @@ class Ways:
         for dataset in self._short.values():
             dataset.cache.clear()  # 100 MB of two minutes; the declared terms are soon laid again
         best = min(left, key=lambda way: left[way])
-        if functions or not fits:
-            return best if left[best] < HALF * left[first] else first
+        if functions or late or not fits:
+            return best if left[best] < (HALF if functions else BETTER) * left[first] else first
         # Of those that leave as little clear of corners, the one that leaves least at them.
         near = {way: fit for way, fit in fits.items() if BETTER * left[way] < left[best]}
         at = {way: np.mean(fit.residual_a[fit.dataset.fine.fit] ** 2) for way, fit in near.items()}
