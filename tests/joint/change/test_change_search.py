@@ -79,6 +79,18 @@ def test_all_of_the_current_in_one_proportion_is_no_payload():
     assert causes_of(lambda *at: payload(*at) + 0.5 * thick(*at))[0].effect != "current_scale"
 
 
+def test_what_no_model_holds_has_no_slow_cause():
+    """Noise in a current's place was magnets that had lost 102 %, or friction that had lost 97."""
+    rng = np.random.default_rng(0)
+
+    def noise(*at):
+        return -scaled(*at) / 0.15 + rng.normal(0, 1.0, at[0].size)
+
+    assert causes_of(noise) == []
+    (cause,) = causes_of(lambda *at: -0.95 * scaled(*at) / 0.15)
+    assert cause.effect == "current_scale"
+
+
 def test_an_offset_is_told():
     (cause,) = causes_of(lambda q, v, a, t: 0.2 + 0 * q)
     assert (cause.effect, cause.interpretation) == ("offset", LIBRARY["offset"].meaning)
