@@ -327,7 +327,10 @@ def _entry(change: Change) -> dict[str, Any] | None:
         "effect": first.effect,
         "domain": first.domain,
         "parameters": dict(first.parameters),
-        "interpretation": _interpretation(first),
+        "interpretation": meaning(
+            *(first.effect, first.interpretation, first.ties),
+            first.evidence.get("relative_change"),
+        ),
         "share": first.share,
         "p_value": first.p_value,
         "ties": list(first.ties),
@@ -456,19 +459,27 @@ def _of_lag(lag: Lag, found: Mapping[str, Any] | None) -> dict[str, Any]:
     }
 
 
-def _interpretation(cause: Cause) -> str:
-    """Say what a cause means, and of friction whether it has grown, and by how much."""
-    change = cause.evidence.get("relative_change")
-    unsure = cause.effect in FRICTION and not FRICTION.isdisjoint(cause.ties)
-    own = cause.interpretation
-    meaning = ANY_FRICTION if unsure and own != LESS_FRICTION else own
+def meaning(effect: str, own: str, ties: Sequence[str], change: float | None) -> str:
+    """Say what a cause means, and of friction whether it has grown, and by how much.
+
+    Parameters
+    ----------
+    effect, own
+        Its name, and what that means by itself.
+    ties
+        Names of what explains as much.
+    change
+        By which share of itself friction, or the current, is larger, if that is known.
+    """
+    unsure = effect in FRICTION and not FRICTION.isdisjoint(ties)
+    said = ANY_FRICTION if unsure and own != LESS_FRICTION else own
     if change is None:
-        return meaning
-    what = "the current" if cause.effect == SCALE.name else "the joint's friction"
+        return said
+    what = "the current" if effect == SCALE.name else "the joint's friction"
     if change >= MUCH:
-        return f"{meaning}; {what} has grown much"
+        return f"{said}; {what} has grown much"
     way = "grown" if change > 0 else "fallen"
-    return f"{meaning}; {what} has {way} by {abs(change):.0%}"
+    return f"{said}; {what} has {way} by {abs(change):.0%}"
 
 
 def _why(cause: Cause, change: Change) -> list[str]:

@@ -157,6 +157,13 @@ def before_the_gear(cause: Mapping[str, Any]) -> bool:
     return own or IN_THE_SUM in cause.get("evidence", ())
 
 
+def logged(warmer_c: float | None) -> str:
+    """Return in brackets what a log says of a joint's temperature, where that is unusual."""
+    if not warmer_c:
+        return ""
+    return f" (logged: {abs(warmer_c):.0f} °C {'warmer' if warmer_c > 0 else 'colder'})"
+
+
 def excuses_little(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause outside the joint holds too little to look there before the gear.
 
@@ -187,14 +194,11 @@ def _change(
         "healthy session does"
     )
     if is_excused(judgement, limits):
-        logged = ""
-        if warmer_c is not None:
-            logged = f" (logged: {abs(warmer_c):.0f} °C {'warmer' if warmer_c > 0 else 'colder'})"
         first = (
             f"It differs from its baseline (p {_p(judgement.p_adjusted)}, "
             f"{judgement.distance_ratio:.3g} times as far as a healthy session), but no more than "
-            f"conditions as unusual as its other joints' may move it{logged}: a fault that looks "
-            "alike would not be told; record under the baseline's conditions."
+            f"conditions as unusual as its other joints' may move it{logged(warmer_c)}: a fault "
+            "that looks alike would not be told; record under the baseline's conditions."
         )
     elif judgement.state == "healthy":
         if judgement.p_adjusted <= SUSPICION < judgement.p_alone:

@@ -17,13 +17,15 @@ from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
 from opamc_cli.decision.odd_session import judge_without_odd
 from opamc_cli.errors import ExitCode, InputError
 from opamc_cli.joint.change.search import SCALE, SMALLEST_WARMTH_C
+from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
+from opamc_cli.stages.verdict.cause import meaning
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, reasons
+from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, logged, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
@@ -36,10 +38,26 @@ AS_SURE = 2.0
 course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
 cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
 
-NO_PAYLOAD = (
-    "Another payload is unlikely: all other joints are healthy, and those further out carry the "
-    "same tool. All of this joint's current in one proportion explains as much."
-)
+STILL = 2.0
+"""Health index, in spreads of a healthy session, below which a joint has not moved. Beside weak
+magnets, a stiff hose and worn grease the others had 1.4 at most; a payload moved one by 3.9."""
+
+LONE_SENSOR = 0.5
+"""Of a joint's own logged difference: where half of the others' lie below, it is its alone."""
+
+LONE_SENSOR_TOO = "; check its temperature sensor, too, which alone has moved{}"
+
+ALIKE = {
+    "payload_change": (SCALE.name, "spring"),
+    "thermal_viscous": ("viscous", "sublinear_friction", "quadratic_friction"),
+}
+"""What moves other joints, too, and what looks like it in one of them alone, likeliest first."""
+
+UNLIKELY = {
+    "payload_change": "Another payload is unlikely: all other joints are healthy, and those "
+    "further out carry the same tool.",
+    "thermal_viscous": "Another temperature is unlikely: all other joints are healthy.",
+}
 
 MOST_FILES = 16
 """Of the target, the last ones: to judge one by itself takes a tenth of a second a joint."""
@@ -324,11 +342,12 @@ def content(
     sides = (decided.sides.baseline, decided.sides.target)
     unit = current_unit([source for side in sides for source in side.sources])
     unlike = other_conditions(*(side.sources for side in sides))
+    warmer = {axis: _warmer_c(axis, *decided.sides.rows) for axis in decided.judgements}
     axes = []
     for axis, judgement in decided.judgements.items():
         in_vain = causes.get(axis) == {}
-        cause = among_siblings(axis, causes.get(axis) or None, decided.judgements, config.score)
-        cause = believed(judgement, cause, config.score)
+        cause = believed(judgement, causes.get(axis) or None, config.score)
+        cause = among_siblings(axis, cause, decided.judgements, warmer)
         final = with_cause(judgement, cause, config.score)
         if final.state == "healthy":
             cause = None
@@ -358,10 +377,9 @@ def content(
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
         others = sum(math.isfinite(one.p_value) for one in decided.judgements.values()) - 1
-        warmer = _warmer_c(axis, *decided.sides.rows)
         said = reasons(
             *(final, bundle, motions, runs, cause, config.score),
-            in_vain=in_vain, siblings=others, warmer_c=warmer,
+            in_vain=in_vain, siblings=others, warmer_c=warmer[axis],
         )  # fmt: skip
         files = decided.files_apart(axis)
         for told in (files, which):  # after what the state does not tell
@@ -374,6 +392,7 @@ def content(
                 "excused": excused,
                 **({"session": decided.named(axis)} if axis in decided.alone else {}),
                 **({"not_compared": lacking} if lacking else {}),
+                **({"warmer_c": warmer[axis]} if warmer[axis] else {}),
                 "health_index": _finite(final.health_index),
                 "p_value": _finite(final.p_value),
                 "p_adjusted": _finite(final.p_adjusted),
@@ -433,28 +452,57 @@ def among_siblings(
     axis: int,
     cause: Mapping[str, Any] | None,
     judgements: Mapping[int, Judgement],
-    config: ScoreConfig,
+    warmer_c: Mapping[int, float | None],
 ) -> Mapping[str, Any] | None:
-    """Put another scale of the current before another payload that no other joint knows of.
+    """Put what looks alike in one joint before what would move others, too, where they are still.
 
-    Axes are counted from the base: those further out carry the same tool.
+    Axes are counted from the base: those further out carry the same tool. Grease of another
+    temperature is that of all joints, unless one joint's sensor alone tells of it; but a joint runs
+    in by itself, and less friction is left to be that.
+
+    Parameters
+    ----------
+    axis, cause
+        The joint, and what was found to have changed in it, if anything.
+    judgements
+        Of all joints, by axis.
+    warmer_c
+        By how much each was warmer than ever in its baseline by the log; None where nothing tells.
     """
-    if cause is None or cause["effect"] != "payload_change" or SCALE.name not in cause["ties"]:
-        return cause
     others = {other: one for other, one in judgements.items() if other != axis}
-    calm = all(one.state == "healthy" and not is_excused(one, config) for one in others.values())
-    if not calm or max(others, default=0) < axis:
+    if cause is None or not all(map(_still, others.values())):
         return cause
+    ties, effect, change = cause["ties"], cause["effect"], cause["evidence"].get("relative_change")
+    name = next((one for one in ALIKE.get(effect, ()) if one in ties), None)
+    sensor = ""
+    if effect == "payload_change":
+        unlikely = max(others, default=0) > axis
+    else:
+        unlikely = len(others) > 1 and (change or 0.0) > 0
+        own = cause["parameters"].get("warmer_c")
+        if own is not None:
+            theirs = [warmer for other in others if (warmer := warmer_c.get(other)) is not None]
+            unlikely &= bool(theirs) and float(np.median(theirs)) / own < LONE_SENSOR
+            sensor = LONE_SENSOR_TOO.format(logged(own))
+    if name is None or not unlikely:
+        return cause
+    known = {SCALE.name: SCALE, **built_in_library()}[name]
+    ties = [effect, *(tie for tie in ties if tie != name)]
     return {
         **cause,
-        "effect": SCALE.name,
-        "domain": SCALE.domain,
-        "origin": SCALE.origin,
+        "effect": name,
+        "domain": known.domain,
+        "parameters": {},
+        "origin": known.origin,
         "harmless": False,
-        "interpretation": SCALE.meaning,
-        "ties": ["payload_change", *(tie for tie in cause["ties"] if tie != SCALE.name)],
-        "why": [*cause["why"], NO_PAYLOAD],
+        "interpretation": meaning(name, known.meaning, ties, change) + sensor,
+        "ties": ties,
+        "why": [*cause["why"], UNLIKELY[effect]],
     }
+
+
+def _still(judgement: Judgement) -> bool:
+    return judgement.state == "healthy" and judgement.health_index < STILL
 
 
 def believed(
@@ -508,7 +556,7 @@ def _runs_of(axis: int, part: Mapping[Key, PatternRows]) -> set[str]:
 def _warmer_c(
     axis: int, before: Mapping[Key, PatternRows], after: Mapping[Key, PatternRows]
 ) -> float | None:
-    """Return how much warmer a joint was than ever in its baseline; None where that is not so."""
+    """Return how much warmer a joint was than ever in its baseline; None where nothing tells."""
     usual, now = (
         np.concatenate(
             [[], *(one.rows["temperature_c"] for key, one in part.items() if key[0] == axis)]
@@ -516,10 +564,11 @@ def _warmer_c(
         for part in (before, after)
     )
     usual, now = usual[np.isfinite(usual)], now[np.isfinite(now)]
-    if not usual.size or not now.size or usual.min() <= np.mean(now) <= usual.max():
+    if not usual.size or not now.size:
         return None
     warmer = float(np.mean(now) - np.mean(usual))
-    return warmer if abs(warmer) >= SMALLEST_WARMTH_C else None
+    usual_too = usual.min() <= np.mean(now) <= usual.max() or abs(warmer) < SMALLEST_WARMTH_C
+    return 0.0 if usual_too else warmer
 
 
 def _not_compared(axis: int, decided: Decided) -> dict[str, list[str]]:

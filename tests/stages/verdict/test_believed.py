@@ -48,29 +48,80 @@ def test_a_harmless_cause_needs_a_course_that_has_changed(witnesses, cause, kept
 @dataclass
 class Judged:
     state: str
+    health_index: float = 0.6
     p_adjusted: float = 0.6
     effect: float = 0.2
+
+
+def among(axis, cause, others, warmer_c=None):
+    """Return what is named among joints of which each has a health index, or a state."""
+    judged = {axis: Judged("changed", 40.0, 0.0)}
+    for other, one in others.items():
+        judged[other] = Judged(one) if isinstance(one, str) else Judged("healthy", one)
+    found = among_siblings(axis, cause, judged, warmer_c or dict.fromkeys(judged))
+    return found, with_cause(judged[axis], found, ScoreConfig()).state
 
 
 @pytest.mark.parametrize(
     ("axis", "others", "ties", "named"),
     [
-        (2, {1: "healthy", 3: "healthy"}, ["spring", "current_scale"], "current_scale"),
-        (2, {1: "healthy", 3: "changed"}, ["current_scale"], "payload_change"),
-        (2, {1: "healthy", 3: "insufficient-data"}, ["current_scale"], "payload_change"),
-        (3, {1: "healthy", 2: "healthy"}, ["current_scale"], "payload_change"),  # the last
-        (2, {1: "healthy", 3: "healthy"}, ["spring"], "payload_change"),
+        (2, {1: 0.1, 3: 0.6}, ["spring", "current_scale"], "current_scale"),
+        (2, {1: 0.1, 3: 3.9}, ["current_scale"], "payload_change"),
+        (2, {1: 0.1, 3: "changed"}, ["current_scale"], "payload_change"),
+        (2, {1: 0.1, 3: "insufficient-data"}, ["current_scale"], "payload_change"),
+        (3, {1: 0.1, 2: 0.6}, ["current_scale"], "payload_change"),  # the last
+        # a stiff hose
+        (4, {3: -0.2, 5: -0.2, 6: 0.8}, ["spring"], "spring"),
+        (4, {3: -0.2, 5: -0.2, 6: 2.8}, ["spring"], "payload_change"),
+        (2, {1: 0.1, 3: 0.6}, ["offset"], "payload_change"),
     ],
 )
-def test_a_payload_that_no_joint_further_out_feels_is_another_scale(axis, others, ties, named):
+def test_a_payload_that_no_joint_further_out_feels_is_what_looks_like_it(axis, others, ties, named):
     """Weakened magnets of a shoulder were a harmless payload, each night."""
-    judged = {axis: Judged("changed", 0.0)} | {other: Judged(s) for other, s in others.items()}
-    cause = PAYLOAD | {"effect": "payload_change", "ties": ties, "why": [], "explained": 0.98}
-    found = among_siblings(axis, cause, judged, ScoreConfig())
+    cause = PAYLOAD | {"ties": ties, "why": [], "explained": 0.98, "evidence": {}}
+    found, state = among(axis, cause, others)
     assert found["effect"] == named
-    state = with_cause(judged[axis], found, ScoreConfig()).state
     assert state == ("changed" if named == "payload_change" else "fault")
-    if named == "current_scale":
-        assert found["ties"] == ["payload_change", "spring"]
-        judged[3] = Judged("healthy", 0.001)  # excused: it differs, too
-        assert among_siblings(axis, cause, judged, ScoreConfig()) == cause
+    if named == "payload_change":
+        assert found == cause
+    else:
+        assert found["ties"] == ["payload_change", *(tie for tie in ties if tie != named)]
+        assert found["why"][0].startswith("Another payload is unlikely")
+
+
+@pytest.mark.parametrize(
+    ("own", "siblings", "others", "change", "named"),
+    [
+        # a dead sensor, or one that is not there
+        (-26.2, [0.0, 0.0], [0.1, 1.4], 0.3, "viscous"),
+        (-26.2, [0.0, None], [0.1, 1.4], 0.3, "viscous"),
+        (None, [None, None], [-0.2, 0.6], 0.4, "viscous"),
+        # the hall is colder, though it moves one joint alone
+        (-9.0, [-8.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
+        (-9.0, [0.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
+        # nobody but the joint itself tells
+        (-9.0, [None, None], [0.1, 1.4], 0.3, "thermal_viscous"),
+        # the others have moved, too; there is but one other; the joint has run in
+        (-26.2, [0.0, 0.0], [0.1, 2.4], 0.3, "thermal_viscous"),
+        (None, [None, None], [-0.2, 2.1], 0.4, "thermal_viscous"),
+        (None, [None], [-0.2], 0.4, "thermal_viscous"),
+        (None, [None, None], [-0.2, 0.6], -0.2, "thermal_viscous"),
+        (None, [None, None], [-0.2, 0.6], None, "thermal_viscous"),
+    ],
+)
+def test_a_temperature_that_moves_one_joint_alone_is_its_friction(
+    own, siblings, others, change, named
+):
+    """Worn grease beside a dead sensor was colder by 26 degrees, not a fault."""
+    cause = GREASE | {"parameters": {} if own is None else {"warmer_c": own}, "explained": 0.9}
+    cause |= {"ties": ["viscous"], "why": []}
+    cause |= {"evidence": {} if change is None else {"relative_change": change}}
+    warmer_c = {4: own} | dict(enumerate(siblings, 1))
+    found, state = among(4, cause, dict(enumerate(others, 1)), warmer_c)
+    assert found["effect"] == named
+    assert state == ("fault" if named == "viscous" else "changed")
+    if named == "viscous":
+        assert found["origin"] == "joint"
+        assert found["ties"] == ["thermal_viscous"]
+        assert f"has grown by {change:.0%}" in found["interpretation"]
+        assert ("sensor" in found["interpretation"]) == (own is not None)

@@ -61,8 +61,8 @@ def test_its_first_reason_says_that_a_fault_may_look_alike(differing):
     ("usual", "now", "said"),
     [
         ((15.0, 19.0), (7.0, 9.0), -9.0),
-        ((15.0, 19.0), (15.0, 17.0), None),  # as it has been
-        ((16.0, 18.0), (18.0, 19.0), None),  # hardly beyond
+        ((15.0, 19.0), (15.0, 17.0), 0.0),  # as it has been
+        ((16.0, 18.0), (18.0, 19.0), 0.0),  # hardly beyond
         ((15.0, math.nan), (25.0, math.nan), 10.0),
         ((math.nan, math.nan), (25.0, 25.0), None),
     ],
