@@ -88,9 +88,10 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
+    from opamc_cli.stages.verdict.brief import foremost
 
-    most = wording.far_most(verdict)  # the joint to look at first comes first
-    unhealthy = sorted(doubtful(verdict), key=lambda entry: entry.get("axis") != most)
+    first = foremost(verdict.get("axes", ()))
+    unhealthy = sorted(doubtful(verdict), key=lambda entry: entry is not first)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
         lines = [Text(wording.headline(verdict), style=_style_of(verdict))]
     else:

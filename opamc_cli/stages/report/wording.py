@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.stages.recordings.sessions import started
+from opamc_cli.stages.verdict.brief import foremost
 from opamc_cli.stages.verdict.reasons import (
     CHECK_FIRST,
     FOUND,
@@ -81,14 +82,17 @@ def headline(verdict: Mapping[str, Any]) -> str:
 
 
 def far_most(verdict: Mapping[str, Any]) -> int | None:
-    """Return the axis that lies BY_FAR as far off as all others: it shakes them."""
-    found = [
-        (float(one.get("health_index") or 0.0), int(one["axis"]))
+    """Return the axis to look at first where it lies BY_FAR as far off as all others."""
+    first = foremost(verdict.get("axes", ()))
+    others = [
+        float(one.get("health_index") or 0.0)
         for one in verdict.get("axes", ())
-        if one.get("state") in ("fault", "changed") and not one.get("excused")
+        if one.get("state") in ("fault", "changed") and one is not first
     ]
-    *_, second, first = [(0.0, 0), (0.0, 0), *sorted(found)]
-    return first[1] if len(found) > 1 and first[0] > BY_FAR * max(second[0], 0.0) else None
+    if first is None or not others:
+        return None
+    far = (first.get("health_index") or 0.0) > BY_FAR * max([*others, 0.0])
+    return int(first["axis"]) if far else None
 
 
 def number(value: object, digits: int = 3) -> str:

@@ -9,7 +9,8 @@ from opamc_cli.decision.judge import Bundle
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report import wording
-from opamc_cli.stages.verdict.brief import brief
+from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
+from opamc_cli.stages.verdict.brief import brief, foremost
 from opamc_cli.storage.sources import other_conditions
 
 
@@ -144,3 +145,52 @@ def test_what_a_cause_cannot_be_told_from_is_said_beside_all_else(common, first)
     assert told.endswith("The recordings cannot tell it from: kinematic error.")
     proven = cause | {"ties": ["ripple"], "evidence": {"times_in_the_sum": 9.0}, "others": []}
     assert "tell it from" not in brief(judged, Bundle([], {}), proven)["against"]
+
+
+CRACK = {"effect": "ripple", "origin": "joint", "explained": 0.65}
+LITTLE = CRACK | {"explained": 0.41}
+LOAD = {"effect": "payload_change", "origin": "load", "harmless": True, "explained": 0.9}
+
+
+@pytest.mark.parametrize(
+    ("joints", "first"),
+    [
+        # that which is explained, though its neighbour lies as far
+        ([("fault", 3e5, LITTLE), ("fault", 2.7e5, CRACK), ("changed", 90.0, None)], 2),
+        ([("fault", 60.0, None), ("fault", 9.0, LITTLE), ("changed", 90.0, LOAD)], 3),
+        ([("fault", 60.0, None), ("healthy", 900.0, None), ("insufficient-data", None, None)], 1),
+        ([("healthy", 0.1, None)], None),
+    ],
+)
+def test_the_joint_to_look_at_first_is_one_that_is_explained(joints, first):
+    axes = [
+        {"axis": axis, "state": state, "health_index": index, "cause": cause}
+        for axis, (state, index, cause) in enumerate(joints, 1)
+    ]
+    assert (foremost(axes) or {}).get("axis") == first
+
+
+@pytest.mark.parametrize(
+    ("causes", "left", "told"),
+    [
+        ((None, CRACK, None), (), {1: 2, 3: 2}),
+        ((LITTLE, CRACK, None), (), {3: 2}),
+        ((None, None, None), (), {2: 1, 3: 1}),
+        # another payload shakes nobody, nor does what is no sure fault
+        ((LOAD, None, None), (), {}),
+        ((None, CRACK, None), (2,), {3: 1}),
+    ],
+)
+def test_a_joint_without_a_cause_beside_one_at_fault_may_be_shaken_by_it(causes, left, told):
+    """Sound neighbours of a cracked joint were to be opened, or the hall was too warm."""
+    axes = [
+        {"axis": axis, "state": "fault", "health_index": 90.0 / axis, "cause": cause}
+        | {"brief": {"inspect": "the gear", "evidence": [], "against": "the hall"}}
+        for axis, cause in enumerate(causes, 1)
+    ]
+    axes[0]["state"] = "changed" if causes[0] is LOAD else "fault"
+    found = with_reasons({"axes": axes}, dict.fromkeys(left, ("another log",)))["axes"]
+    against = {one["axis"]: one["brief"]["against"] for one in found if one["brief"]}
+    for axis, said in against.items():
+        by = f"Axis {told.get(axis)}, which is at fault, may shake it: see to that one first."
+        assert said == (by if axis in told else "the hall")

@@ -39,6 +39,31 @@ def test_joints_that_are_far_together_are_no_small_changes():
     assert all("other joints lie as far" in why for (why,) in found.values())
 
 
+def test_joints_that_are_far_beside_one_at_fault_name_it():
+    """Beside a cracked joint the others were told that this is no fault of one."""
+    shaken = robot(a=("h", 60), b=("f", 9000), c=("f", 3e6), d=("h", 1))
+    shaken["axes"][1]["cause"] = {"effect": "ripple", "origin": "joint", "explained": 0.7}
+    (why,) = not_sure(shaken, ScoreConfig(), ())[1]
+    assert "axis 2, which is at fault, may have shaken it" in why
+    assert "no fault of one" not in why
+    # that is another payload, or no sure fault: a log that changes a joint changes all
+    shaken["axes"][1]["cause"] |= {"origin": "load", "explained": 0.3}
+    assert "axis 3, which" in not_sure(shaken, ScoreConfig(), ())[1][0]
+    alone = robot(a=("h", 60), b=("f", 50), c=("h", 70), d=("h", 40), e=("h", 1))
+    said = not_sure(alone, ScoreConfig(), ())
+    assert sorted(said) == [1, 2, 3, 4]
+    assert "no fault of one" in said[1][0]
+
+
+def test_what_a_log_says_of_the_temperature_is_said_of_what_is_far():
+    cold = robot(a=("h", 60), b=("h", 40), c=("h", 1))
+    cold["axes"][0]["warmer_c"] = -19.6
+    said = not_sure(cold, ScoreConfig(), ())
+    assert "from the baseline (logged: 20 °C colder), and other joints" in said[1][0]
+    assert "logged" not in said[2][0]
+    assert "check temperature, payload" in said[2][0]
+
+
 def robot(**states):
     """Return a verdict of axes in turn, their states as letters, each with its health index."""
     names = {"h": "healthy", "c": "changed", "f": "fault"}

@@ -6,6 +6,8 @@ from typing import Any
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
+from opamc_cli.stages.verdict.brief import shaken_by
+from opamc_cli.stages.verdict.reasons import logged
 
 
 def not_sure(
@@ -22,20 +24,25 @@ def not_sure(
     foreign
         Axes that cannot be compared at all, since their target is of another program or log.
     """
-    far = far_together(verdict, limits)
-    return far | left_alone(verdict, far, foreign)
+    left = left_alone(verdict, far_together(verdict, limits), foreign)
+    return far_together(verdict, limits, left) | left
 
 
-def far_together(verdict: Mapping[str, Any], limits: ScoreConfig) -> dict[int, tuple[str, ...]]:
+def far_together(
+    verdict: Mapping[str, Any], limits: ScoreConfig, left: Collection[int] = ()
+) -> dict[int, tuple[str, ...]]:
     """Return the axes that are called healthy though far from the baseline, with the reason.
 
-    `limits` are those by which they were judged.
+    `limits` are those by which they were judged; `left`, axes that are no sure fault.
     """
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
+    shakes = shaken_by([entry for entry in verdict["axes"] if entry["axis"] not in left])
+    together = _COMMON if shakes is None else _SHAKEN.format(shakes["axis"])
     return {
         entry["axis"]: (
             f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
-            "the baseline, " + (_COMMON if len(far) > 1 else _alone(entry, limits)),
+            f"the baseline{logged(entry.get('warmer_c'))}, "
+            + (together if len(far) > 1 else _alone(entry, limits)),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
@@ -82,7 +89,12 @@ def _alone(entry: Mapping[str, Any], limits: ScoreConfig) -> str:
 
 _COMMON = (
     "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
-    "check unit, sensors, clock, program, payload and speed, and record again, or a new baseline."
+    "check temperature, payload, program, speed, unit, sensors and clock, and record again, or a "
+    "new baseline."
+)
+_SHAKEN = (
+    "and axis {0}, which is at fault, may have shaken it: that would hide a fault of this one; see "
+    "to axis {0} first, and record again."
 )
 _LEFT_ALONE = (
     "It differs from the baseline, but axes {}, half of the robot or more, cannot be compared or "

@@ -18,6 +18,7 @@ from opamc_cli.stages.chain.compared.speeds import of_another_speed
 from opamc_cli.stages.chain.cycles.axis import segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
+from opamc_cli.stages.verdict.brief import with_shaken
 from opamc_cli.stages.verdict.evidence import session_names
 
 MUCH_SHORTER = 0.5
@@ -159,7 +160,7 @@ def with_reasons(
     for axis, why in left_out.items():
         entry = named.get(axis, {"axis": axis, **_EMPTY})
         named[axis] = {**entry, **_UNKNOWN, "reasons": list(why)}
-    return {**verdict, "axes": [named[axis] for axis in sorted(named)]}
+    return {**verdict, "axes": with_shaken([named[axis] for axis in sorted(named)])}
 
 
 _UNKNOWN: Mapping[str, Any] = {
