@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.stages.recordings.sessions import started
-from opamc_cli.stages.verdict.brief import foremost
+from opamc_cli.stages.verdict.brief import by_far
 from opamc_cli.stages.verdict.reasons import (
     CHECK_FIRST,
     FOUND,
@@ -14,9 +14,6 @@ from opamc_cli.stages.verdict.reasons import (
     lies_outside,
 )
 
-BY_FAR = 10.0
-"""Times as far as any other: so far was the joint at fault in 17 of 17 pairs of two simulators that
-had such a one; of seven by 2 to 10 times it was its neighbour in two."""
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
 
 
@@ -68,7 +65,7 @@ def headline(verdict: Mapping[str, Any]) -> str:
         "healthy": "healthy",
     }
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
-    most = far_most(verdict)
+    most = (by_far(verdict.get("axes", ())) or {}).get("axis")
     for place, axes in enumerate(states.values()):
         if most in axes:
             named = f"axis {most} " if len(axes) > 1 else ""
@@ -79,20 +76,6 @@ def headline(verdict: Mapping[str, Any]) -> str:
         parts[-1] = f"the other {len(healthy)} axes healthy"
     text = "; ".join(parts)
     return text[0].upper() + text[1:]
-
-
-def far_most(verdict: Mapping[str, Any]) -> int | None:
-    """Return the axis to look at first where it lies BY_FAR as far off as all others."""
-    first = foremost(verdict.get("axes", ()))
-    others = [
-        float(one.get("health_index") or 0.0)
-        for one in verdict.get("axes", ())
-        if one.get("state") in ("fault", "changed") and one is not first
-    ]
-    if first is None or not others:
-        return None
-    far = (first.get("health_index") or 0.0) > BY_FAR * max([*others, 0.0])
-    return int(first["axis"]) if far else None
 
 
 def number(value: object, digits: int = 3) -> str:

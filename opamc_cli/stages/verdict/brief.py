@@ -31,6 +31,10 @@ SMOOTHER = 0.5
 
 GEAR = "Inspect the gear: backlash by hand, teeth, wave generator bearing, grease; then brake."
 
+BY_FAR = 10.0
+"""Times as far as any other: so far was the joint at fault in 17 of 17 pairs of two simulators that
+had such a one; of seven by 2 to 10 times it was its neighbour in two."""
+
 SHAKEN = "Axis {}, which is at fault, may shake it: see to that one first."
 
 UNLIKE = (
@@ -70,30 +74,49 @@ def brief(
     }
 
 
+def by_far(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Return the unhealthy one of verdict.json's entries that lies BY_FAR as far off as others."""
+    found = sorted(filter(_unhealthy, axes), key=_index)
+    if len(found) < 2 or _index(found[-1]) <= BY_FAR * max(_index(found[-2]), 0.0):
+        return None
+    return found[-1]
+
+
 def foremost(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the entry of verdict.json to look at first; None where no axis is unhealthy.
 
-    One that a cause in the joint explains, and then the farthest out: a joint at fault shakes its
-    neighbours. So it was the right one in 15 of 15 pairs of a simulator in which several joints
-    were unhealthy, by the distance alone in 13.
+    A joint at fault shakes its neighbours: the farthest out by far, else the farthest of those that
+    a cause in the joint explains, else of all.
     """
-    return max(
-        (one for one in axes if one.get("state") in ("changed", "fault")),
-        key=lambda one: (_explained(one.get("cause")), one.get("health_index") or 0.0),
+    return by_far(axes) or max(
+        filter(_unhealthy, axes),
+        key=lambda one: (_explained(one), _index(one)),
         default=None,
     )
 
 
-def _explained(cause: Mapping[str, Any] | None) -> bool:
-    return cause is not None and not (explains_little(cause) or lies_outside(cause))
-
-
 def shaken_by(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Return the entry of the joint at fault that others may be shaken by; None without one."""
+    """Return the entry at fault that others may be shaken by; None where that is not clear.
+
+    Of joints without a cause that lie nearly as far the farthest was the wrong one in one of four.
+    """
     first = foremost(axes)
     if first is None or first["state"] != "fault" or lies_outside(first.get("cause") or {}):
         return None
-    return first
+    return first if _explained(first) or first is by_far(axes) else None
+
+
+def _unhealthy(entry: Mapping[str, Any]) -> bool:
+    return entry.get("state") in ("changed", "fault")
+
+
+def _index(entry: Mapping[str, Any]) -> float:
+    return float(entry.get("health_index") or 0.0)
+
+
+def _explained(entry: Mapping[str, Any]) -> bool:
+    cause = entry.get("cause")
+    return cause is not None and not (explains_little(cause) or lies_outside(cause))
 
 
 def with_shaken(axes: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:

@@ -394,7 +394,8 @@ def test_the_joint_to_look_at_first_comes_first() -> None:
     ]
     titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
     assert [title[:6] for title in titles] == ["Axis 2", "Axis 1"]
-    # not the farthest: what shakes it is explained
+    # not the farthest, if not by far: what shakes it is explained
+    pair[1]["health_index"] = 80.0
     pair[0]["cause"] = {"effect": "ripple", "origin": "joint", "explained": 0.6}
     titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
     assert [title[:6] for title in titles] == ["Axis 1", "Axis 2"]

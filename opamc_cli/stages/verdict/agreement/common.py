@@ -7,7 +7,7 @@ from typing import Any
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
 from opamc_cli.stages.verdict.brief import shaken_by
-from opamc_cli.stages.verdict.reasons import logged
+from opamc_cli.stages.verdict.reasons import lies_outside, logged
 
 
 def not_sure(
@@ -36,8 +36,13 @@ def far_together(
     `limits` are those by which they were judged; `left`, axes that are no sure fault.
     """
     far = {entry["axis"] for entry in verdict["axes"] if (entry["health_index"] or 0.0) > FAR}
-    shakes = shaken_by([entry for entry in verdict["axes"] if entry["axis"] not in left])
-    together = _COMMON if shakes is None else _SHAKEN.format(shakes["axis"])
+    sure = [entry for entry in verdict["axes"] if entry["axis"] in far.difference(left)]
+    faults = [
+        one for one in sure if one["state"] == "fault" and not lies_outside(one["cause"] or {})
+    ]
+    shakes = shaken_by(sure)
+    named = " or ".join(str(one["axis"]) for one in ([shakes] if shakes else faults))
+    together = _SHAKEN.format(named) if named else _COMMON
     return {
         entry["axis"]: (
             f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
@@ -93,7 +98,7 @@ _COMMON = (
     "new baseline."
 )
 _SHAKEN = (
-    "and axis {0}, which is at fault, may have shaken it: that would hide a fault of this one; see "
+    "and a joint at fault, axis {0}, may have shaken it, which would hide a fault of this one; see "
     "to axis {0} first, and record again."
 )
 _LEFT_ALONE = (
