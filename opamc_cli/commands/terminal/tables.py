@@ -34,6 +34,7 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     from rich.text import Text
 
     from opamc_cli.stages.report import wording
+    from opamc_cli.storage.schemas.channels import axes_phrase
 
     axes = list(verdict.get("axes", ()))
     unhealthy = doubtful(verdict)
@@ -67,7 +68,7 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     shared = wording.shared_reasons(unhealthy)
     lines = [line for entry in unhealthy for line in _explanation(entry, set(shared))]
     for reason, numbers in shared.items():
-        lines += [Text(f"{wording.axes_phrase(numbers)}:", style="bold"), _indented(reason)]
+        lines += [Text(f"{axes_phrase(numbers)}:", style="bold"), _indented(reason)]
     return Group(title, Text(), table, Text(), *lines)
 
 

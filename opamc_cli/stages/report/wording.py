@@ -13,20 +13,9 @@ from opamc_cli.stages.verdict.reasons import (
     excuses_little,
     lies_outside,
 )
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 STATE_ORDER = ("fault", "changed", "insufficient-data", "healthy")
-
-
-def axes_phrase(axes: Sequence[int]) -> str:
-    """Return "axis 3", "axes 1 and 4" or "axes 1-6"."""
-    numbers = sorted(axes)
-    if not numbers:
-        return "no axis"
-    if len(numbers) == 1:
-        return f"axis {numbers[0]}"
-    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
-        return f"axes {numbers[0]}-{numbers[-1]}"
-    return "axes " + ", ".join(str(n) for n in numbers[:-1]) + f" and {numbers[-1]}"
 
 
 def by_state(verdict: Mapping[str, Any]) -> dict[str, list[int]]:

@@ -470,10 +470,11 @@ def among_siblings(
         By how much each was warmer than ever in its baseline by the log; None where nothing tells.
     """
     others = {other: one for other, one in judgements.items() if other != axis}
-    if cause is None or not all(map(_still, others.values())):
+    effect = cause["effect"] if cause else ""
+    if cause is None or effect not in ALIKE or not all(map(_still, others.values())):
         return cause
-    ties, effect, change = cause["ties"], cause["effect"], cause["evidence"].get("relative_change")
-    name = next((one for one in ALIKE.get(effect, ()) if one in ties), None)
+    ties, change = cause["ties"], cause["evidence"].get("relative_change")
+    name = next((one for one in ALIKE[effect] if one in ties), None)
     sensor = ""
     if effect == "payload_change":
         unlikely = max(others, default=0) > axis

@@ -6,7 +6,7 @@ hands it to the science; ingest, its maps, `--guess` and the run format know it 
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 
@@ -110,3 +110,15 @@ def quantity_of(column: str) -> str:
     """
     channel = column.partition("_")[2]
     return "current" if channel in CURRENTS else channel
+
+
+def axes_phrase(axes: Sequence[int]) -> str:
+    """Return "axis 3", "axes 1 and 4" or "axes 1-6"."""
+    numbers = sorted(axes)
+    if not numbers:
+        return "no axis"
+    if len(numbers) == 1:
+        return f"axis {numbers[0]}"
+    if len(numbers) > 2 and numbers == list(range(numbers[0], numbers[-1] + 1)):
+        return f"axes {numbers[0]}-{numbers[-1]}"
+    return "axes " + ", ".join(str(n) for n in numbers[:-1]) + f" and {numbers[-1]}"

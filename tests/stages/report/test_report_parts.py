@@ -69,20 +69,6 @@ def test_null_numbers_become_nan() -> None:
 
 
 @pytest.mark.parametrize(
-    ("axes", "phrase"),
-    [
-        ([3], "axis 3"),
-        ([2, 1], "axes 1 and 2"),
-        ([1, 2, 3], "axes 1-3"),
-        ([1, 2, 5], "axes 1, 2 and 5"),
-        ([], "no axis"),
-    ],
-)
-def test_axes_in_words(axes: list[int], phrase: str) -> None:
-    assert wording.axes_phrase(axes) == phrase
-
-
-@pytest.mark.parametrize(
     ("value", "text"),
     [
         (0.0, "0"),

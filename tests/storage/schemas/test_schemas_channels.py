@@ -4,7 +4,13 @@ import math
 
 import pytest
 
-from opamc_cli.storage.schemas.channels import COLUMN, LOGGED, NEARLY_COLUMN, quantity_of
+from opamc_cli.storage.schemas.channels import (
+    COLUMN,
+    LOGGED,
+    NEARLY_COLUMN,
+    axes_phrase,
+    quantity_of,
+)
 
 
 @pytest.mark.parametrize("name", ["axis1_a", "axis12_current", "axis10_temperature"])
@@ -50,3 +56,17 @@ def test_the_run_s_own_unit_stands_first():
     assert [(unit, c.factor, c.offset) for unit, c in first.values()] == [
         *(("rad", 1, 0), ("rad/s", 1, 0), ("degC", 1, 0))
     ]
+
+
+@pytest.mark.parametrize(
+    ("axes", "phrase"),
+    [
+        ([3], "axis 3"),
+        ([2, 1], "axes 1 and 2"),
+        ([1, 2, 3], "axes 1-3"),
+        ([1, 2, 5], "axes 1, 2 and 5"),
+        ([], "no axis"),
+    ],
+)
+def test_axes_in_words(axes: list[int], phrase: str) -> None:
+    assert axes_phrase(axes) == phrase

@@ -9,8 +9,8 @@ from typing import Any
 from opamc_cli.stages.nightly.alarms.commands import REBASELINE
 from opamc_cli.stages.nightly.alarms.course import JUDGED
 from opamc_cli.stages.nightly.alarms.not_judged import said_in, span
-from opamc_cli.stages.report.wording import axes_phrase
 from opamc_cli.storage.history.rows import EXCUSED, Event
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 NUMBER = re.compile(r"(?<![\w.-])(?<!axis )\d+(?:\.\d+)?(?:e[-+]\d+)?(?![\w-])")
 """Of a sentence; of dates, names and joints the numbers are none."""

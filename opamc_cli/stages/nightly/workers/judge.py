@@ -22,13 +22,13 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramResult,
 )
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.report.wording import axes_phrase
 from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
 from opamc_cli.storage.history.rows import EXCUSED
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs.hashes import know_sha256
 from opamc_cli.storage.schemas import files
+from opamc_cli.storage.schemas.channels import axes_phrase
 from opamc_cli.storage.schemas.tables import PATTERNS
 from opamc_cli.storage.tables import read_table
 
