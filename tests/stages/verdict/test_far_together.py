@@ -114,3 +114,25 @@ def test_a_joint_that_most_others_leave_alone_is_no_sure_fault(states, foreign, 
 
 def test_a_joint_near_its_baseline_is_nothing_to_tell():
     assert far_together(verdict((2.0, 0.3, 0.01)), ScoreConfig()) == {}
+
+
+@pytest.mark.parametrize(
+    ("cause", "unsure"),
+    [
+        ({}, [1]),
+        ({"ties": ["current_scale"]}, []),
+        ({"explained": 0.3}, []),
+        ({"effect": "thermal_viscous"}, []),
+    ],
+    ids=["sure", "tied", "beside a fault", "warmth"],
+)
+def test_joints_that_a_payload_may_have_moved_are_no_sure_faults(cause, unsure):
+    """Two kilogrammes were a faulty gear of the axes before and behind the one that told them."""
+    payload = {"effect": "payload_change", "harmless": True, "explained": 0.9, "ties": []}
+    found = robot(a=("f", 1400), b=("c", 3600), c=("f", 5000), d=("h", 1))
+    found["axes"][1]["cause"] = payload | cause
+    found["axes"][2]["cause"] = {"effect": "ripple", "origin": "joint", "explained": 0.9}
+    said = not_sure(found, ScoreConfig(), ())
+    # what lies farther out than the payload's own joint stays a fault
+    assert sorted(said) == unsure
+    assert all("another payload, told by axis 2," in why for (why,) in said.values())

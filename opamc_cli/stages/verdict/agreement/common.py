@@ -7,7 +7,8 @@ from typing import Any
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
 from opamc_cli.stages.verdict.brief import shaken_by
-from opamc_cli.stages.verdict.reasons import lies_outside, logged
+from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside, logged
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 
 def not_sure(
@@ -24,7 +25,7 @@ def not_sure(
     foreign
         Axes that cannot be compared at all, since their target is of another program or log.
     """
-    left = left_alone(verdict, far_together(verdict, limits), foreign)
+    left = left_alone(verdict, far_together(verdict, limits), foreign) | under_payload(verdict)
     return far_together(verdict, limits, left) | left
 
 
@@ -79,6 +80,27 @@ def left_alone(
     }
 
 
+def under_payload(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
+    """Return the unhealthy axes that a payload, which another axis tells for sure, may have moved.
+
+    Those no farther out than that one: the tool is carried by all joints before it.
+    """
+    index = {entry["axis"]: entry["health_index"] or 0.0 for entry in verdict["axes"]}
+    unhealthy = [entry for entry in verdict["axes"] if entry["state"] in ("changed", "fault")]
+    loaded = {
+        entry["axis"]
+        for entry in unhealthy
+        if (cause := entry["cause"] or {}).get("effect") == "payload_change"
+        and not (cause["ties"] or excuses_little(cause))
+    }
+    reach = max((index[axis] for axis in loaded), default=0.0)
+    return {
+        entry["axis"]: (_UNDER_PAYLOAD.format(axes_phrase(sorted(loaded))),)
+        for entry in unhealthy
+        if index[entry["axis"]] <= reach and not lies_outside(entry["cause"] or {})
+    }
+
+
 def _where(entry: Mapping[str, Any]) -> str:
     return f"In {entry['session']} alone it" if "session" in entry else "It"
 
@@ -105,6 +127,10 @@ _LEFT_ALONE = (
     "It differs from the baseline, but axes {}, half of the robot or more, cannot be compared or "
     "lie as far: another program, payload or way of logging changes a joint as a fault does; "
     "record again as for the baseline, or a new baseline."
+)
+_UNDER_PAYLOAD = (
+    "It differs from the baseline, but another payload, told by {}, moves it, too, and would "
+    "hide a fault; check the tool, and record again as for the baseline, or a new baseline."
 )
 _ALONE = (
     "too far to be called healthy, though what was compared does not suffice to call it changed; "
