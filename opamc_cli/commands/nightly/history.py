@@ -120,8 +120,10 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
     for name in names:
         table.add_column(name.replace("_", " "))
     if events:  # what is said again has the same words: shown once, of when it was first said
-        first = {tuple(row[of] for of in names[1:]): row for row in reversed(rows)}
-        rows = sorted(first.values(), key=rows.index)
+        first: dict[tuple[Any, ...], dict[str, Any]] = {}
+        for row in rows:
+            first.setdefault(tuple(row[of] for of in names[1:]), row)
+        rows = [*first.values()]
     forms = {"health_index": number, "p_value": p_value, "cause": _in_words}
     for row in rows:
         table.add_row(
