@@ -133,13 +133,19 @@ def test_names_of_a_place_that_is_a_guess_are_doubted(hidden, tmp_path, capsys, 
     assert any("turned without current (gaps: 2, 0.8 s in all)" in n for n in entry["notes"])
 
 
-@pytest.mark.parametrize("off", [1.0, 1.005, 1.01, 0.8])
-def test_a_declared_ratio_that_phases_beside_a_position_deny_is_doubted(off, tmp_path, capsys):
+@pytest.mark.parametrize(
+    ("off", "known_poles"),  # 0.8 of it with five pole pairs is the same as all of it with four
+    [*((off, True) for off in (1.0, 1.005, 1.01, 0.8)), *((off, False) for off in (1.0, 1.01))],
+)
+def test_a_declared_ratio_that_phases_beside_a_position_deny_is_doubted(
+    off, known_poles, tmp_path, capsys
+):
     """One that was a per cent off moved lines and pole pairs without a word."""
     made = simulate(3, (), rate=1000.0, cycles=3)
     phases = {f"axis1_{name}": made.phases[:, k] for k, name in enumerate("abc")}
     write_run(tmp_path / "run.parquet", 1000.0, axis1_position=made.position, **phases)
-    joint = f"joint: {{gear_ratio: {off * made.gear_ratio}, pole_pairs: {made.pole_pairs}}}"
+    poles = made.pole_pairs if known_poles else "null"
+    joint = f"joint: {{gear_ratio: {off * made.gear_ratio}, pole_pairs: {poles}}}"
     close(tmp_path, "--quiet", model=joint + "\n" + MODEL.split("\n")[1])
     assert ("the phases turn by" in capsys.readouterr().err) == (off != 1)
     (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]

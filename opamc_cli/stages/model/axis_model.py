@@ -39,8 +39,7 @@ GUESSED = (
 )
 OTHER_RATIO = (
     "axis {}: beside the position the phases turn by {:.5g} electrical radians per radian, but "
-    "joint.gear_ratio and joint.pole_pairs make {:.5g}: correct the wrong one, or the position's "
-    "unit"
+    "joint.gear_ratio and {} make {:.5g}: correct the wrong one, or the position's unit"
 )
 RATIO_DOUBT = 0.002
 """By how much a ratio may differ: 38 recordings of three strangers tell it to 0.04 % at worst."""
@@ -153,11 +152,14 @@ def lay(
     if guessed_s:
         read.notes.append(GUESSED.format(axis, len(guessed_s), sum(guessed_s)))
     turns = np.array(fit.dataset.fine.track.turns)
-    if turns.size and joint.gear_ratio and joint.pole_pairs:
-        stated = joint.gear_ratio * joint.pole_pairs
+    if turns.size and joint.gear_ratio:
+        # pole pairs that nobody gave are a whole number
+        poles = joint.pole_pairs or max(round(float(np.median(turns)) / joint.gear_ratio), 1)
+        by = "joint.pole_pairs" if joint.pole_pairs else f"{poles} pole pairs, which is nearest,"
+        stated = joint.gear_ratio * poles
         worst = turns[np.argmax(np.abs(turns - stated))]
         if abs(worst - stated) > RATIO_DOUBT * stated:
-            read.doubts.append(OTHER_RATIO.format(axis, worst, stated))
+            read.doubts.append(OTHER_RATIO.format(axis, worst, by, stated))
             read.notes.append(read.doubts[-1])
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
     return AxisModel(axis, fit, ways.fit_anew, declared, allowed, read)
