@@ -44,6 +44,8 @@ LOST_S = 0.2
 
 SAME_RATE = 1e-9
 """Relative difference of rates that is none: of the arithmetic, not of the clock."""
+ONE_STEP, MOSTLY_ONE = 0.01, 0.9
+"""Relative difference of steps that are one, and the share of them that tells the rate alone."""
 
 _CHUNK = 1 << 20
 
@@ -237,7 +239,7 @@ def _uneven_clock(
     step = np.diff(times_s[kept])
     missing = _missing_samples(step)
     _refuse_two_rates(path, source, step, np.flatnonzero(kept), max_gap_samples)
-    measured = 1.0 / float(step[~missing].mean())
+    measured = 1.0 / float(step[_counted(step, missing)].mean())
     rate = grid_rate_hz or declared_rate_hz or float(f"{measured:.6g}")
     for declared in (declared_rate_hz, grid_rate_hz):
         if declared is not None and abs(measured / declared - 1.0) > RATE_WITHIN:
@@ -284,6 +286,16 @@ def _missing_samples(step: Seconds) -> npt.NDArray[np.bool_]:
     padded = np.concatenate(([typical], step, [typical]))
     together = padded[:-2] + padded[1:-1] + padded[2:]
     return np.asarray((step >= 1.5 * typical) & (together >= 3.5 * typical))
+
+
+def _counted(step: Seconds, missing: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """Mark the steps that tell the rate: those that are one, where nine of ten are.
+
+    A logger that halts writes the rows of that time in a burst, which belongs to the gap.
+    """
+    typical = float(np.median(step))
+    one = np.abs(step - typical) <= ONE_STEP * typical
+    return np.asarray(one if one.mean() >= MOSTLY_ONE else ~missing)
 
 
 def _refuse_two_rates(

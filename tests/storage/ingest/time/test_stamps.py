@@ -67,6 +67,15 @@ def test_gaps_repeats_and_backward_steps_are_counted():
     assert account.measured_rate_hz == pytest.approx(100)
 
 
+def test_rows_that_a_halted_logger_writes_in_a_burst_tell_no_rate():
+    """Of a measured log the gap was left out of the mean, and its burst was not: 127.7 Hz."""
+    times = np.arange(300.0) / 125
+    times[40:48] = times[48] - 0.001 * np.arange(8, 0, -1)
+    clock = clock_of(times)
+    assert clock.account.measured_rate_hz == pytest.approx(125, rel=1e-9)
+    assert clock.account.n_gaps == 1
+
+
 @pytest.mark.parametrize(
     ("times", "rate", "expected"),
     [
