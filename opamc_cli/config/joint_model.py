@@ -32,6 +32,9 @@ class DeclaredEffect(Section):
 class ClosedConfig(Section):
     """What a closed model knows of the recordings that it was closed on."""
 
+    axis: Annotated[int, Field(ge=1)] | None = Field(
+        None, description="That it was closed on, which `opamc model evaluate` takes; null: all."
+    )
     unit: Literal["A", "Nm"] = Field("A", description="Of the current, or of a torque for it.")
     rmse: Annotated[float, Field(ge=0)] = Field(0.0, description="Error on the sealed data.")
     r2: float = Field(0.0, description="Share of the sealed data's variance that it explains.")

@@ -168,7 +168,15 @@ def _unjudged(result: dict[str, Any]) -> list[str]:
         for run in result["opposite_sign"]
     ]
     said += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
+    own, axis = result["closed"]["axis"], result["axis"]
+    if own not in (None, axis):
+        said.append(f"the model was closed on axis {own}, and says little of another joint")
     known = result["familiar"]
+    if known is not None and known["r2"] is not None and known["r2"] <= 0 and not said:
+        said.append(
+            "the model predicts no better than the current's mean even on motion that it knows: "
+            "the joint, its load or the unit is another one"
+        )
     if known is not None and known["share"] < MOSTLY:
         said.append(
             f"{1 - known['share']:.0%} of the motion lies where the model was not closed, and says "

@@ -39,6 +39,7 @@ def on_each_axis(
     axes: Sequence[int],
     jobs: int,
     watch: Watch,
+    own: int | None = None,
 ) -> tuple[list[Result], list[OpamcError], list[tuple[Path, str]]]:
     """Do something with each axis of some runs; return results, what failed, and the runs' hashes.
 
@@ -48,6 +49,8 @@ def on_each_axis(
         Importable by name; model, runs and axis in, what can be pickled out.
     model, paths, axes, jobs, watch
         As of `model.fit`.
+    own
+        The axis that is meant where none is named and the runs have it.
 
     Raises
     ------
@@ -70,7 +73,8 @@ def on_each_axis(
                 usable.append((name, path))
         if not runs:
             raise errors[0]
-        wanted = list(axes) or axes_of(runs)
+        logged = axes_of(runs)
+        wanted = list(axes) or ([own] if own in logged else logged)
         inputs = [(run.path, run.sha256) for run in runs]
         if not wanted:
             msg = f"{runs[0].path}: the runs have no axis in common; name one with --axis"

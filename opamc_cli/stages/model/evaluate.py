@@ -74,7 +74,8 @@ def evaluate(
     if model.closed is None:
         msg = "the model has not been closed, it has no coefficients; run `opamc model close` first"
         raise ConfigError(msg)
-    results, errors, _ = on_each_axis(_on_axis, model, paths, axes, jobs, watch)
+    own = model.closed.axis
+    results, errors, _ = on_each_axis(_on_axis, model, paths, axes, jobs, watch, own)
     ensure_directory(out)
     write_json(out / files.EVALUATION, {"axes": results})
     return Outcome(tuple(results), (out / files.EVALUATION,), tuple(errors))
@@ -109,7 +110,7 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
         "rmse_a": applied.rmse(),
         "r2": applied.r2(),
         "familiar": None if known is None else _familiar_entry(applied, known),
-        "closed": {"rmse_a": closed.rmse, "r2": closed.r2},
+        "closed": {"axis": closed.axis, "rmse_a": closed.rmse, "r2": closed.r2},
         "runs": [
             {
                 "run": recording.name,

@@ -316,6 +316,7 @@ def extended_model(model: JointModelConfig, laid: AxisModel, loop: Loop) -> dict
         "library": [str(path) for path in model.library],
         "without": list(model.without),
         "closed": {
+            "axis": laid.axis,
             "unit": laid.unit,
             "rmse": float(f"{loop.rmse_after_a:.6g}"),
             "r2": float(f"{loop.r2_after:.6g}"),
