@@ -574,6 +574,67 @@ def test_a_joint_that_moves_beside_is_read_named_and_applied_elsewhere(tmp_path,
     assert "asks for the position of axis 7" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("everywhere", [True, False])
+def test_names_that_the_sealed_data_do_not_miss_are_doubted(everywhere, tmp_path, capsys):
+    """A name whose error the others made up for stood beside them without a word."""
+    made = simulate(3, ("quadratic_friction",), 5.0, rate=250.0, cycles=8)
+    recording = Recording("run", 250.0, made.current, position_rad=made.position)
+    _, grouping = grouped_track([recording], Joint())
+    shown = everywhere | ~np.isin(grouping.group, grouping.sealed)
+    current = made.current + 2 * made.noise_rms * shown * np.sin(41 * made.position)
+    write_run(tmp_path / "run.parquet", 250.0, axis1_current=current, axis1_position=made.position)
+    assert close(tmp_path, "--quiet", model=MODEL) == 0
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert {"quadratic_friction", "ripple"} <= {step["effect"] for step in entry["steps"]}
+    said = capsys.readouterr().err
+    assert ("the sealed data do not miss ripple of order 41: a guess" in said) == (not everywhere)
+    assert ("quadratic_friction" in said) is False
+
+
+def test_a_model_is_evaluated_on_the_joint_that_it_was_closed_on(tmp_path, capsys):
+    """It was applied to every axis of a run, and one had r2 -61078 without a word."""
+    made = [simulate(seed, (), rate=250.0, cycles=6) for seed in (3, 4)]
+    columns = {}
+    for n, one in zip((2, 5), made, strict=True):
+        columns |= {f"axis{n}_current": one.current, f"axis{n}_position": one.position}
+    size = min(values.size for values in columns.values())
+    columns = {name: values[:size] for name, values in columns.items()}
+    run = write_run(tmp_path / "run.parquet", 250.0, **columns)
+    assert close(tmp_path, "--axis", "5", model=MODEL) == 0
+    model = tmp_path / "out" / "model.yaml"
+    evaluate = ("model", "evaluate", run, "--model", model, "--out", tmp_path / "e", "--quiet")
+    capsys.readouterr()
+    for more, axis, said in (
+        ((), 5, ""),
+        (("--axis", 2), 2, "axis 2: the model was closed on axis 5, and says little of another"),
+    ):
+        assert opamc(*evaluate, *more) == (5 if said else 0)
+        (entry,) = json.loads((tmp_path / "e" / "evaluation.json").read_text())["axes"]
+        assert (entry["axis"], entry["closed"]["axis"]) == (axis, 5)
+        assert said in capsys.readouterr().err
+    older = yaml.safe_load(model.read_text())
+    del older["closed"]["axis"]
+    model.write_text(yaml.safe_dump(older))
+    opamc(*evaluate)
+    entries = json.loads((tmp_path / "e" / "evaluation.json").read_text())["axes"]
+    assert [entry["axis"] for entry in entries] == [2, 5]
+
+
+def test_a_model_that_predicts_no_better_than_the_mean_is_said_also_if_quiet(tmp_path, capsys):
+    made = simulate(3, (), rate=250.0, cycles=6)
+    run = tmp_path / "run.parquet"
+    write_run(run, 250.0, axis1_current=made.current, axis1_position=made.position)
+    assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+    capsys.readouterr()
+    model, out = tmp_path / "out" / "model.yaml", tmp_path / "e"
+    write_run(run, 250.0, axis1_current=0.3 * made.current, axis1_position=made.position)
+    code = opamc("model", "evaluate", run, "--model", model, "--out", out, "--quiet")
+    (entry,) = json.loads((out / "evaluation.json").read_text())["axes"]
+    assert entry["familiar"]["r2"] < 0
+    assert code == 5
+    assert "predicts no better than the current's mean" in capsys.readouterr().err
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("repeats", [True, False])
 def test_which_joint_it_is_is_doubted_where_the_program_repeats_itself(repeats, tmp_path, capsys):

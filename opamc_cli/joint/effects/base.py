@@ -11,8 +11,8 @@ CHANNEL_REASONS = {
     "scale": "the joint angle's scale is unknown: log the position, or give gear_ratio and "
     "pole_pairs",
     "temperature": "no temperature channel",
-    "returns": "no place is passed at different times, so time cannot be told from place",
-    "revisits": "the arm's places are not passed again, so time cannot be told from place",
+    "returns": "no place is passed twice the same way, so time cannot be told from place",
+    "revisits": "the arm passes no place twice the same way, so time cannot be told from place",
     "logged": "the motion comes from the phase currents themselves: log the position",
     "others": "no other joint is logged to move beside",
     "electrical": "no phase currents, and no pole_pairs to tell the electrical angle",

@@ -15,9 +15,9 @@ from opamc_cli.errors import UsageError
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.intervals import certainty, drag_t
 from opamc_cli.joint.fit.model import Fit, Term
-from opamc_cli.joint.loop import close_loop, untestable
-from opamc_cli.joint.name.chain import chain_of
-from opamc_cli.joint.name.search import Pool, trials
+from opamc_cli.joint.loop import Loop, close_loop, untestable
+from opamc_cli.joint.name.chain import chain_of, without
+from opamc_cli.joint.name.search import LEAST_SHARE, Pool, trials
 from opamc_cli.stages.model.axes import Outcome, Runs, on_each_axis
 from opamc_cli.stages.model.axis_model import OPPOSITE, lay
 from opamc_cli.stages.model.tables import (
@@ -71,7 +71,11 @@ ONE = (
     "axis {}: on this motion {} are one: their sum is known, each holds a part of it by chance; "
     "record it both ways and at other speeds before their values are used"
 )
-ONCE = "axis {}: no place is passed again, so friction at one may be whatever came at that time"
+UNMISSED = "axis {}: the sealed data do not miss {}: a guess until another recording shows it, too"
+ONCE = (
+    "axis {}: no place is passed twice the same way, so friction at one may be whatever came at "
+    "that time"
+)
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
@@ -275,6 +279,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         if resists and values[0] < -DRIVEN_T * errors[0]:
             given = "; check its parameters, or give them" if term.parameters else ""
             doubts.append(DRIVES.format(axis, term.effect.name) + given)
+    unmissed = _unmissed(loop)
+    if unmissed:
+        doubts.append(UNMISSED.format(axis, ", ".join(unmissed)))
     for names in sure.one:
         known = [name for name in names if not name.startswith("unnamed")]
         if len(known) > 1:
@@ -287,9 +294,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)
         unlikely = any(_of_the_program(step.term, slowest) for step in loop.steps)
         (doubts if unlikely else laid.notes).append(ALONE.format(axis, ", ".join(named)))
-    if "coupling" in found and len(runs) == 1:
+    if "coupling" in found.union(*(step.ties for step in loop.steps)) and len(runs) == 1:
         # Of six programs that repeat themselves three named a wrong joint, of eight others none.
-        (doubts if np.isfinite(track.period_s) else laid.notes).append(ONE_PROGRAM.format(axis))
+        doubted = np.isfinite(track.period_s) or not loop.predicts
+        (doubts if doubted else laid.notes).append(ONE_PROGRAM.format(axis))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
         doubts += [note for run in runs for note in scaled(run, axis, by_name[run.name])]
@@ -307,6 +315,23 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         spectrum=spectrum_table(axis, loop),
         extended=extended_model(model, laid, loop),
     )
+
+
+def _unmissed(loop: Loop) -> list[str]:
+    """Name the effects without which, beside all others, the sealed error is hardly larger.
+
+    By less than a share of its square that is asked of an effect in the open data.
+    """
+    squared, found = loop.rmse_after_a**2, []
+    closed = chain_of(loop.after, len(loop.steps))
+    for place, step in enumerate(loop.steps):
+        if step.named:
+            rest = without(closed, place, rounds=1).fit.rmse(sealed=True)
+            if squared > (1 - LEAST_SHARE) * rest**2:
+                order = step.term.parameters.get("order")
+                line = "" if order is None else f" of order {order:.4g}"
+                found.append(step.term.effect.name + line)
+    return found
 
 
 def _of_the_program(term: Term, slowest: float) -> bool:
