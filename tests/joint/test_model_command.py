@@ -650,6 +650,12 @@ def test_which_joint_it_is_is_doubted_where_the_program_repeats_itself(repeats, 
     assert close(tmp_path, "--axis", "1", "--quiet", model=MODEL) == 0
     said = "which of the other joints load it" in capsys.readouterr().err
     assert said == repeats
+    # what is declared takes up as much, and is nobody's name
+    declared = MODEL.replace("viscous]", "viscous, {effect: coupling, parameters: {axis: 3}}]")
+    assert close(tmp_path, "--axis", "1", model=declared) == 0
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert any("which of the other joints load it" in note for note in entry["notes"])
+    assert entry["doubts"] == []
 
 
 @pytest.mark.long

@@ -294,9 +294,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)
         unlikely = any(_of_the_program(step.term, slowest) for step in loop.steps)
         (doubts if unlikely else laid.notes).append(ALONE.format(axis, ", ".join(named)))
-    if "coupling" in found.union(*(step.ties for step in loop.steps)) and len(runs) == 1:
+    linked = "coupling" in found.union(*(step.ties for step in loop.steps))
+    if len(runs) == 1 and (linked or "coupling" in {t.effect.name for t in loop.before.terms}):
         # Of six programs that repeat themselves three named a wrong joint, of eight others none.
-        doubted = np.isfinite(track.period_s) or not loop.predicts
+        doubted = linked and (np.isfinite(track.period_s) or not loop.predicts)
         (doubts if doubted else laid.notes).append(ONE_PROGRAM.format(axis))
     if any(e.unnamed and e.domain == ANGLE for e in (step.term.effect for step in loop.steps)):
         by_name = {one.name: one for one in laid.read.recordings}
