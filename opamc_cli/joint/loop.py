@@ -150,8 +150,7 @@ def _closed(
     arm = replace(pool, library={n: e for n, e in library.items() if "others" in e.needs})
     linked = beam(start, arm)
     chains = [beam(one, pool) for one in ((start,) if linked is start else (start, linked))]
-    asks = chains[-1].score < chains[0].score + LEAST_SHARE  # Where scores hardly differ, too.
-    best, named = settled(chains[-1 if asks else 0], pool, unnamed)
+    best, named = settled(min(chains, key=lambda one: one.score), pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     final = worth_their_price(beam(best, unnamed, width=1))
     if "unnamed" not in without_rules:  # Or beside the functions that explain most.

@@ -329,10 +329,16 @@ def _unmissed(loop: Loop) -> list[str]:
         if step.named:
             rest = without(closed, place, rounds=1).fit.rmse(sealed=True)
             if squared > (1 - LEAST_SHARE) * rest**2:
-                order = step.term.parameters.get("order")
-                line = "" if order is None else f" of order {order:.4g}"
-                found.append(step.term.effect.name + line)
+                found.append(_called(step.term))
     return found
+
+
+def _called(term: Term) -> str:
+    """Name an effect that a joint may have several times."""
+    if "order" in term.parameters:
+        return f"{term.effect.name} of order {term.parameters['order']:.4g}"
+    axes = [f"{term.parameters[key]:g}" for key in ("axis", "beside") if key in term.parameters]
+    return term.effect.name + f" with {' and '.join(axes)}" * bool(axes)
 
 
 def _of_the_program(term: Term, slowest: float) -> bool:
