@@ -42,6 +42,11 @@ STILL = 2.0
 """Health index, in spreads of a healthy session, below which a joint has not moved. Beside weak
 magnets, a stiff hose and worn grease the others had 1.4 at most; a payload moved one by 3.9."""
 
+MOST_STILL = 2 / 3
+"""Of the other joints: grease that has grown stiffer in one alone is no cold hall's though a joint
+at fault shakes a neighbour. Of 19 joints read as grease, nights of -20 °C among them, it moves one,
+whose friction had grown."""
+
 LONE_SENSOR = 0.5
 """Of a joint's own logged difference: where half of the others' lie below, it is its alone."""
 
@@ -56,7 +61,7 @@ ALIKE = {
 UNLIKELY = {
     "payload_change": "Another payload is unlikely: all other joints are healthy, and those "
     "further out carry the same tool.",
-    "thermal_viscous": "Another temperature is unlikely: all other joints are healthy.",
+    "thermal_viscous": "Another temperature is unlikely: most other joints have not moved.",
 }
 
 MOST_FILES = 16
@@ -457,8 +462,9 @@ def among_siblings(
     """Put what looks alike in one joint before what would move others, too, where they are still.
 
     Axes are counted from the base: those further out carry the same tool. Grease of another
-    temperature is that of all joints, unless one joint's sensor alone tells of it; but a joint runs
-    in by itself, and less friction is left to be that.
+    temperature is that of all joints, and seen in more than a third of the others, unless one
+    joint's sensor alone tells of it; but a joint runs in by itself, and less friction is left to be
+    that.
 
     Parameters
     ----------
@@ -471,7 +477,8 @@ def among_siblings(
     """
     others = {other: one for other, one in judgements.items() if other != axis}
     effect = cause["effect"] if cause else ""
-    if cause is None or effect not in ALIKE or not all(map(_still, others.values())):
+    least = max(2, MOST_STILL * len(others)) if effect == "thermal_viscous" else len(others)
+    if cause is None or effect not in ALIKE or sum(map(_still, others.values())) < least:
         return cause
     ties, change = cause["ties"], cause["evidence"].get("relative_change")
     name = next((one for one in ALIKE[effect] if one in ties), None)
@@ -479,7 +486,7 @@ def among_siblings(
     if effect == "payload_change":
         unlikely = max(others, default=0) > axis
     else:
-        unlikely = len(others) > 1 and (change or 0.0) > 0
+        unlikely = (change or 0.0) > 0
         own = cause["parameters"].get("warmer_c")
         if own is not None:
             theirs = [warmer for other in others if (warmer := warmer_c.get(other)) is not None]

@@ -96,6 +96,9 @@ def test_a_payload_that_no_joint_further_out_feels_is_what_looks_like_it(axis, o
         (-26.2, [0.0, 0.0], [0.1, 1.4], 0.3, "viscous"),
         (-26.2, [0.0, None], [0.1, 1.4], 0.3, "viscous"),
         (None, [None, None], [-0.2, 0.6], 0.4, "viscous"),
+        # the joint at fault shakes one of three; the hall moves two
+        (None, [None, None, None], [0.1, 0.9, 3.5], 0.35, "viscous"),
+        (None, [None, None, None], [0.1, 2.2, 3.5], 0.35, "thermal_viscous"),
         # the hall is colder, though it moves one joint alone
         (-9.0, [-8.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
         (-9.0, [0.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
