@@ -146,6 +146,13 @@ def is_excused(judgement: Judgement, limits: ScoreConfig) -> bool:
     return differs and judgement.state == "healthy" and judgement.effect >= limits.minimum_effect
 
 
+def is_small(judgement: Judgement, limits: ScoreConfig) -> bool:
+    """Tell whether a joint is called healthy that differs for sure: it is too little to matter."""
+    if judgement.state != "healthy":
+        return False
+    return max(judgement.p_adjusted, judgement.p_alone) <= limits.false_alarm_rate
+
+
 def lies_outside(cause: Mapping[str, Any]) -> bool:
     """Tell whether a cause of verdict.json is no fault of the joint: load, environment, sensors."""
     return bool(cause.get("harmless")) or cause.get("origin", "joint") != "joint"

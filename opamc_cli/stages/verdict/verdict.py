@@ -25,13 +25,17 @@ from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.cause import meaning
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, logged, reasons
+from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, is_small, logged, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
+
+MUCH_FRICTION = 0.2
+"""By which a joint's friction has grown that matters however little of its current it is, as that
+of a load that is moved fast; 5 °C are half of it. A brake that dragged by 27 % was "too small"."""
 
 AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
@@ -112,7 +116,9 @@ class Decided:
         return [
             axis
             for axis, judgement in self.judgements.items()
-            if judgement.state in ("changed", "fault") or is_excused(judgement, config)
+            if judgement.state in ("changed", "fault")
+            or is_excused(judgement, config)
+            or is_small(judgement, config)
         ]
 
     def target_sources(self, axis: int) -> Sequence[RunSource]:
@@ -541,19 +547,27 @@ def believed(
 def with_cause(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Judgement:
-    """Call a change of known cause a fault only if that cause harms the joint."""
+    """Call a change of known cause a fault only if that cause harms the joint.
+
+    One too small to act on is `changed` by MUCH_FRICTION of the joint itself: such a cause is found
+    at a level below 1 % beside what healthy sessions' friction differs by.
+    """
     if cause is None:
         return judgement
     if is_excused(judgement, config):
         return replace(judgement, state="fault") if cause.get("clear") else judgement
-    if judgement.state not in ("changed", "fault"):
+    small = is_small(judgement, config)
+    if not small and judgement.state not in ("changed", "fault"):
         return judgement
     if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
         return judgement
-    if cause.get("harmless"):
-        return replace(judgement, state="changed")
     # A fault is named first if there is one.
     at_fault = cause.get("origin", "joint") == "joint"
+    if small:
+        much = cause.get("evidence", {}).get("relative_change", 0.0) >= MUCH_FRICTION
+        return replace(judgement, state="changed") if at_fault and much else judgement
+    if cause.get("harmless"):
+        return replace(judgement, state="changed")
     return replace(judgement, state="fault") if at_fault else judgement
 
 
