@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.decision.judge import Bundle
+from opamc_cli.decision.witnesses.amplitudes import AmplitudeCell, AmplitudeEvidence
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report import wording
@@ -217,3 +218,22 @@ def test_an_excused_joint_beside_one_at_fault_may_be_shaken_by_it(cause, shaken)
     first, *others = with_reasons({"axes": axes}, {})["axes"][0]["reasons"]
     said = "It differs. Axis 2, which is at fault, may shake it: see to that one first."
     assert (first, others) == (said if shaken else "It differs.", ["Compared."])
+
+
+@pytest.mark.parametrize(("ratio", "first"), [(1.01, "spectrum"), (1.2, "amplitude")])
+def test_a_size_of_1_01_times_is_said_last(ratio, first):
+    sessions = np.zeros((6, 8))
+    sessions[:5] += 1e-3 * np.random.default_rng(0).normal(size=(5, 8))
+    sessions[5] = np.log(ratio)
+    of_all = (sessions, np.ones(6), np.full(8, 1e-6))
+    cells = {
+        "amplitude": AmplitudeEvidence([AmplitudeCell(0, *(one[..., :3] for one in of_all))], 5),
+        "spectrum": SpectrumEvidence([SpectrumCell(0, *of_all, 2, 4, 3.0)], 5),
+    }
+    judged = SimpleNamespace(
+        **{"state": "fault", "effects": {}, "n_baseline_sessions": 5, "common_log_ratio": 0.0},
+        witnesses={"amplitude": 1e-60, "spectrum": 1e-9},
+    )
+    told = brief(judged, Bundle([], cells), None)["evidence"]
+    sizes = [n for n, text in enumerate(told) if "times the baseline's" in text]
+    assert sizes == ([0] if first == "amplitude" else [1])
