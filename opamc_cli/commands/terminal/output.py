@@ -114,6 +114,8 @@ def folded(texts: Sequence[str]) -> list[str]:
     ['2 runs: no ratio', 'rate differs']
     >>> folded(["a.parquet: 3 samples lost", "b.parquet: 8 samples lost"])
     ['a.parquet: 3 samples lost; 1 more run likewise']
+    >>> folded([f"{run}.parquet: axis{axis}_a lacks 3" for run in "ab" for axis in (1, 2)])
+    ['a.parquet: axis1_a lacks 3; 3 more like this, in 2 runs']
     >>> folded(["axis 3: no temperature", "axis 6: no temperature"])
     ['axes 3, 6: no temperature']
     """
@@ -136,6 +138,9 @@ def folded(texts: Sequence[str]) -> list[str]:
             lines.append(f"{alike[0]} (and {more} more like this)")
         elif more and len(rests) == 1:
             lines.append(f"{len(alike)} runs: {rests.pop()}")
+        elif more and (runs := len({text.partition(": ")[0] for text in alike})) <= more:
+            within = f"in {runs} runs" if runs > 1 else "in this run"
+            lines.append(f"{alike[0]}; {more} more like this, {within}")
         elif more:
             lines.append(f"{alike[0]}; {more} more run{'s' if more > 1 else ''} likewise")
         else:

@@ -1,5 +1,6 @@
 """Signs that a channel cannot be trusted."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,14 @@ class Limit:
     """Of both."""
     looks_like: str
     """What it probably is instead."""
+    lowest: float = -math.inf
+    """Less is of no joint either, however small its size."""
+
+    @property
+    def beyond(self) -> str:
+        """What is of no joint, in words."""
+        low = "beyond" if math.isinf(self.lowest) else f"below {self.lowest:g} or above"
+        return f"{low} {self.impossible:g} {self.unit}"
 
 
 LIMITS = {
@@ -92,11 +101,13 @@ LIMITS = {
     "Nm": Limit(1e5, 3e4, "Nm", "mNm taken for Nm"),
     "velocity": Limit(100.0, 60.0, "rad/s", "degrees or rpm taken for rad/s, or the motor's side"),
     "position": Limit(100.0, 60.0, "rad/s", "degrees taken for rad, or the motor's side"),
+    "temperature": Limit(250.0, 250.0, "°C", "another unit, or no sensor", lowest=-60.0),
 }
 """By unit of the current, or by channel; of a position its speed counts.
 
 The largest drives of robots peak at some 150 A, and their first joints hold 20 kNm; the fastest
-joint, the last one of a small arm, turns at 50 rad/s.
+joint, the last one of a small arm, turns at 50 rad/s. Windings stand 180 °C, greases -50 °C; 300 is
+a hall in K, and a wire that is broken or short reads 850 or -200.
 """
 
 SELDOM = 0.01
@@ -132,11 +143,11 @@ class Size:
         extremes = (np.fmax.reduce(values, initial=0.0), np.fmin.reduce(values, initial=0.0))
         self.known += values.size
         self.largest = max(self.largest, float(extremes[0]), -float(extremes[1]))
-        if self.largest <= self.limit.unusual:
+        if self.largest <= self.limit.unusual and extremes[1] >= self.limit.lowest:
             return
-        sizes = np.abs(values)
-        self.impossible += int(np.count_nonzero(sizes > self.limit.impossible))
-        self.unusual += int(np.count_nonzero(sizes > self.limit.unusual))
+        sizes, low = np.abs(values), values < self.limit.lowest
+        self.impossible += int(np.count_nonzero((sizes > self.limit.impossible) | low))
+        self.unusual += int(np.count_nonzero((sizes > self.limit.unusual) | low))
 
     @property
     def is_impossible(self) -> bool:
@@ -148,9 +159,8 @@ class Size:
         limit = self.limit
         if self.is_impossible:
             return (
-                f"is beyond {limit.impossible:g} {limit.unit} in {self.impossible / self.known:.0%}"
-                f" of its samples (up to {self.largest:.3g}), which no robot's joint is: "
-                f"{limit.looks_like}?"
+                f"is {limit.beyond} in {self.impossible / self.known:.0%} of its samples (up to "
+                f"{self.largest:.3g}), which no robot's joint is: {limit.looks_like}?"
             )
         if self.unusual > SELDOM * self.known:
             return (
@@ -160,8 +170,8 @@ class Size:
             )
         if self.impossible:
             return (
-                f"has {self.impossible} samples beyond {limit.impossible:g} {limit.unit} (up to "
-                f"{self.largest:.3g}), which are no measurement"
+                f"has {self.impossible} samples {limit.beyond} (up to {self.largest:.3g}), which "
+                "are no measurement"
             )
         return None
 

@@ -253,7 +253,7 @@ class Summary:
         if not self.robots:
             return "No robot has been looked at yet"
         counts = Counter(one.shown for one in self.robots)
-        n_alarms = sum(len(one.alarms) for one in self.robots)
+        n_alarms = sum(len({joint.axis for joint in one.alarms}) for one in self.robots)
         parts = []
         if n_alarms:
             joints = "joint" if n_alarms == 1 else "joints"

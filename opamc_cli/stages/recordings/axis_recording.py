@@ -79,8 +79,8 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         _check_channel(run, channel, values)
         if quantity_of(channel) == "current":
             limited(run.path, channel, values, LIMITS[run.info.current_unit])
-        elif quantity_of(channel) == "velocity":
-            limited(run.path, channel, values, LIMITS["velocity"])
+        elif (quantity := quantity_of(channel)) in ("velocity", "temperature"):
+            limited(run.path, channel, values, LIMITS[quantity])
         elif quantity_of(channel) == "position":
             speed = strided_speed(values, run.sampling_rate_hz)
             limited(run.path, f"{channel} (its speed)", speed, LIMITS["position"])

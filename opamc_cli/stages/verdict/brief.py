@@ -35,6 +35,9 @@ BY_FAR = 10.0
 """Times as far as any other: so far was the joint at fault in 17 of 17 pairs of two simulators that
 had such a one; of seven by 2 to 10 times it was its neighbour in two."""
 
+SLIGHT = 0.02
+"""By which a size differs that is said last: nobody looks for 1.01 times, however sure it is."""
+
 SHAKEN = "Axis {}, which is at fault, may shake it: see to that one first."
 
 UNLIKE = (
@@ -120,17 +123,22 @@ def _explained(entry: Mapping[str, Any]) -> bool:
 
 
 def with_shaken(axes: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Say against a fault of each unhealthy joint without a cause that another may shake it.
+    """Say of joints that are excused, or unhealthy without a cause of half, that one shakes them.
 
     Of entries of verdict.json whose states are final.
     """
     first = shaken_by(axes)
-    return [
-        {**one, "brief": {**one["brief"], "against": SHAKEN.format(first["axis"])}}
-        if first not in (None, one) and one.get("brief") and one.get("cause") is None
-        else one
-        for one in axes
-    ]
+    return [one if first in (None, one) else _beside(first, one) for one in axes]
+
+
+def _beside(first: Mapping[str, Any], one: Mapping[str, Any]) -> Mapping[str, Any]:
+    shaken, cause = SHAKEN.format(first["axis"]), one.get("cause")
+    if one.get("brief") and (cause is None or explains_little(cause)):
+        return {**one, "brief": {**one["brief"], "against": shaken}}
+    if one.get("excused"):
+        why, *others = one["reasons"]
+        return {**one, "reasons": [f"{why} {shaken}", *others]}
+    return one
 
 
 def _inspect(
@@ -163,9 +171,20 @@ def _smoother(judgement: Judgement, bundle: Bundle) -> bool:
 
 
 def _evidence(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
-    strongest = sorted((p, name) for name, p in judgement.witnesses.items() if math.isfinite(p))
-    said = [_of_witness(name, judgement, bundle, unit) for _, name in strongest]
+    strongest = sorted(
+        (_is_slight(bundle.witnesses.get(name)), p, name)
+        for name, p in judgement.witnesses.items()
+        if math.isfinite(p)
+    )
+    said = [_of_witness(name, judgement, bundle, unit) for *_, name in strongest]
     return [text for text in said if text][:MOST_EVIDENCE]
+
+
+def _is_slight(witness: object) -> bool:
+    if not isinstance(witness, AmplitudeEvidence):
+        return False
+    size = clearest_amplitude(witness.cells, witness.n_baseline)
+    return size is not None and abs(size.ratio - 1) < SLIGHT
 
 
 def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> str | None:
@@ -229,10 +248,12 @@ def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: boo
             f"Only {n} baseline session{'' if n == 1 else 's'}: how much healthy ones differ is "
             "hardly known."
         )
-    if math.exp(judgement.common_log_ratio) >= COMMON:
+    common = math.exp(judgement.common_log_ratio)
+    # what moved all alike would not have moved one by far the most
+    if common >= COMMON and judgement.distance_ratio < BY_FAR * common:
         return (
-            f"The other joints moved too, {math.exp(judgement.common_log_ratio):.2g} times as far "
-            "as usual: temperature, supply, payload?"
+            f"The other joints moved too, {common:.2g} times as far as usual: temperature, supply, "
+            "payload?"
         )
     if cause is not None and explains_little(cause):
         return "The named cause explains less than half of the change."

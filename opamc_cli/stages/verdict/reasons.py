@@ -32,6 +32,9 @@ REPEAT = (
     "Repeat the recording under the baseline's conditions before taking the joint apart: the "
     "current shows an effect, not the part that is worn."
 )
+NOTABLY = 1.05
+"""Times as far as usual, below which nothing was allowed for: "1 times as far" tells nobody."""
+
 COMMON = 1.5
 """Times as far as usual that the siblings have moved, to be worth a word."""
 
@@ -144,6 +147,13 @@ def is_excused(judgement: Judgement, limits: ScoreConfig) -> bool:
     """Tell whether a joint that would be unhealthy is called healthy: the others differ, too."""
     differs = judgement.p_adjusted <= limits.false_alarm_rate
     return differs and judgement.state == "healthy" and judgement.effect >= limits.minimum_effect
+
+
+def is_small(judgement: Judgement, limits: ScoreConfig) -> bool:
+    """Tell whether a joint is called healthy that differs for sure: it is too little to matter."""
+    if judgement.state != "healthy":
+        return False
+    return max(judgement.p_adjusted, judgement.p_alone) <= limits.false_alarm_rate
 
 
 def lies_outside(cause: Mapping[str, Any]) -> bool:
@@ -351,7 +361,7 @@ def _siblings(judgement: Judgement) -> list[str]:
     factor = math.exp(judgement.common_log_ratio)
     if factor < COMMON:
         allowed = math.exp(judgement.allowed_log_ratio)
-        if not excused or judgement.p_adjusted > SUSPICION:
+        if not excused or judgement.p_adjusted > SUSPICION or allowed < NOTABLY:
             return []
         return [
             "The other joints' conditions are unusual (temperature, say): in such a joint may lie "

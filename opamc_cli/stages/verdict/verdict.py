@@ -25,13 +25,19 @@ from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.cause import meaning
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, logged, reasons
+from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, is_small, logged, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
 
 MAIN_SHARE = 0.5
 """Share of the change from which causes decide between changed and fault."""
+
+MUCH_FRICTION = 0.2
+"""By which a joint's friction has grown that matters however little of its current it is, as that
+of a load that is moved fast. Brakes that dragged by 26 and 21 % were "too small" (25.6 and 20.3 %
+were found); friction or scale of the five other such joints with a cause had grown by 16 % at most,
+and none of a healthy robot was asked."""
 
 AS_SURE = 2.0
 """Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
@@ -41,6 +47,11 @@ cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The ca
 STILL = 2.0
 """Health index, in spreads of a healthy session, below which a joint has not moved. Beside weak
 magnets, a stiff hose and worn grease the others had 1.4 at most; a payload moved one by 3.9."""
+
+MOST_STILL = 2 / 3
+"""Of the other joints: grease that has grown stiffer in one alone is no cold hall's though a joint
+at fault shakes a neighbour. Of 35 joints of strangers' pairs read as grease it moves two, both of
+lost lubricant."""
 
 LONE_SENSOR = 0.5
 """Of a joint's own logged difference: where half of the others' lie below, it is its alone."""
@@ -56,7 +67,7 @@ ALIKE = {
 UNLIKELY = {
     "payload_change": "Another payload is unlikely: all other joints are healthy, and those "
     "further out carry the same tool.",
-    "thermal_viscous": "Another temperature is unlikely: all other joints are healthy.",
+    "thermal_viscous": "Another temperature is unlikely: most other joints have not moved.",
 }
 
 MOST_FILES = 16
@@ -107,7 +118,9 @@ class Decided:
         return [
             axis
             for axis, judgement in self.judgements.items()
-            if judgement.state in ("changed", "fault") or is_excused(judgement, config)
+            if judgement.state in ("changed", "fault")
+            or is_excused(judgement, config)
+            or is_small(judgement, config)
         ]
 
     def target_sources(self, axis: int) -> Sequence[RunSource]:
@@ -457,8 +470,9 @@ def among_siblings(
     """Put what looks alike in one joint before what would move others, too, where they are still.
 
     Axes are counted from the base: those further out carry the same tool. Grease of another
-    temperature is that of all joints, unless one joint's sensor alone tells of it; but a joint runs
-    in by itself, and less friction is left to be that.
+    temperature is that of all joints, and seen in more than a third of the others, unless one
+    joint's sensor alone tells of it; but a joint runs in by itself, and less friction is left to be
+    that.
 
     Parameters
     ----------
@@ -471,7 +485,8 @@ def among_siblings(
     """
     others = {other: one for other, one in judgements.items() if other != axis}
     effect = cause["effect"] if cause else ""
-    if cause is None or effect not in ALIKE or not all(map(_still, others.values())):
+    least = max(2, MOST_STILL * len(others)) if effect == "thermal_viscous" else len(others)
+    if cause is None or effect not in ALIKE or sum(map(_still, others.values())) < least:
         return cause
     ties, change = cause["ties"], cause["evidence"].get("relative_change")
     name = next((one for one in ALIKE[effect] if one in ties), None)
@@ -479,7 +494,7 @@ def among_siblings(
     if effect == "payload_change":
         unlikely = max(others, default=0) > axis
     else:
-        unlikely = len(others) > 1 and (change or 0.0) > 0
+        unlikely = (change or 0.0) > 0
         own = cause["parameters"].get("warmer_c")
         if own is not None:
             theirs = [warmer for other in others if (warmer := warmer_c.get(other)) is not None]
@@ -534,19 +549,27 @@ def believed(
 def with_cause(
     judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
 ) -> Judgement:
-    """Call a change of known cause a fault only if that cause harms the joint."""
+    """Call a change of known cause a fault only if that cause harms the joint.
+
+    One too small to act on is `changed` by MUCH_FRICTION of the joint itself: such a cause is found
+    at a level below 1 % beside what healthy sessions' friction differs by.
+    """
     if cause is None:
         return judgement
     if is_excused(judgement, config):
         return replace(judgement, state="fault") if cause.get("clear") else judgement
-    if judgement.state not in ("changed", "fault"):
+    small = is_small(judgement, config)
+    if not small and judgement.state not in ("changed", "fault"):
         return judgement
     if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
         return judgement
-    if cause.get("harmless"):
-        return replace(judgement, state="changed")
     # A fault is named first if there is one.
     at_fault = cause.get("origin", "joint") == "joint"
+    if small:
+        much = cause.get("evidence", {}).get("relative_change", 0.0) >= MUCH_FRICTION
+        return replace(judgement, state="changed") if at_fault and much else judgement
+    if cause.get("harmless"):
+        return replace(judgement, state="changed")
     return replace(judgement, state="fault") if at_fault else judgement
 
 

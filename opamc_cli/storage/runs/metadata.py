@@ -70,7 +70,8 @@ def _as_moment(text: str) -> str:
 Text = Annotated[str, Field(max_length=1000), BeforeValidator(_as_text)]
 
 
-Condition = Annotated[float, Field(ge=-1e6, le=1e6)]
+Speed = Annotated[float, Field(gt=0, le=1e6)]
+Payload = Annotated[float, Field(ge=0, le=1e6)]
 
 
 class RunMetadata(Document):
@@ -79,8 +80,8 @@ class RunMetadata(Document):
     sampling_rate_hz: Annotated[float, Field(ge=LEAST_HZ, le=MOST_HZ)]
     robot: Text | None = None
     program: Text | None = None
-    speed_percent: Condition | None = None
-    payload_kg: Condition | None = None
+    speed_percent: Speed | None = None
+    payload_kg: Payload | None = None
     started_at: Annotated[Text, AfterValidator(_as_moment)] | None = None
     session: Text | None = None
     source_sha256: Text | None = None

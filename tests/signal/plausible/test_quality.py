@@ -85,6 +85,16 @@ def test_numbers_that_no_joint_has_are_told_from_disturbances():
         assert (size.doubt() is None) if words is None else (words in size.doubt())
 
 
+@pytest.mark.parametrize(
+    ("degrees", "refused"), [(180.0, False), (-40.0, False), (300.0, True), (-200.0, True)]
+)
+def test_a_temperature_of_no_joint_is_another_unit_or_no_sensor(degrees, refused):
+    size = Size(LIMITS["temperature"])
+    size.add(np.full(100, degrees))
+    assert size.is_impossible is refused
+    assert not refused or size.doubt().startswith("is below -60 or above 250 °C in 100% of its")
+
+
 def test_a_handful_of_samples_beyond_any_joint_are_spikes():
     current = 5 * np.sin(np.arange(1000.0))
     spiked = current.copy()

@@ -157,6 +157,11 @@ def test_reported_current_is_cut_by_the_joints_motion(tmp_path, known):
         assert abs(row["stop"] - stop) < 40
         assert row["f_max_hz"] == pytest.approx(move.f_max_hz, rel=0.03)
         assert (row["signal"], row["temperature_c"]) == ("reported", 41.5)
+    values["axis1_temperature"] = np.full(velocity.size, 850.0)
+    broken = save(tmp_path / "broken.parquet", values, 1000.0)
+    told = r"axis1_temperature is below -60 or above 250 °C in 100% .*: another unit, or no sensor"
+    with pytest.raises(InputError, match=told):
+        segment.run([broken], Config.model_validate(joint), tmp_path / "odd")
 
 
 def test_engine_ssqueezepy_finds_the_same_motions(tmp_path, two_axes):

@@ -500,6 +500,15 @@ def test_a_joint_that_is_not_judged_is_counted_beside_one_that_changed():
     )
 
 
+def test_a_joint_with_an_alarm_in_two_programs_is_one_joint():
+    alarm = AlarmRow("r1", "", 2, "2026-03-04", "2026-03-03", None, None, "at fault", "{}")
+    joints = tuple(
+        JointSummary(2, program, "fault", "2026-03-09", "", None, alarm) for program in ("A", "B")
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-09", "", "done"))
+    assert Summary((robot,)).headline() == "1 joint of 1 robot with an alarm"
+
+
 def single(*rows):
     """Return when and how it is said of a joint that it was not as it was in single nights."""
     return [(one.time[-5:], one.kind, one.text) for one in settled(rows).events]

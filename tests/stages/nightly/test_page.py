@@ -118,6 +118,18 @@ def test_a_browser_draws_every_joint(page, tmp_path, width, dark):
 
 @pytest.mark.long
 @needs_browser
+def test_a_joint_of_two_programs_is_not_counted_as_two(page, tmp_path):
+    text = page.read_text(encoding="utf-8")
+    head, data, rest = re.split(r'(?<=id="data">)(.*?)(?=</script>)', text, maxsplit=1)
+    found = json.loads(data)
+    found["robots"][0][1][0][6] = "pick"
+    copy, data = tmp_path / "index.html", json.dumps(found).replace("<", "\\u003c")
+    copy.write_text(f"{head}{data}{rest}", encoding="utf-8")
+    assert "18 of 18 joints, each program's by itself<" in browse(tmp_path, copy, "--dump-dom")
+
+
+@pytest.mark.long
+@needs_browser
 def test_a_phone_shows_since_when_of_alarms_alone(page, tmp_path):
     told = (
         "<script>document.title = [...document.querySelectorAll('td.since')]"

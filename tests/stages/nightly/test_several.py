@@ -79,6 +79,14 @@ def test_joints_that_a_payload_moves_are_one_line_with_what_to_do():
     assert [day for day, *_ in told(*nights, remind_after=1)] == ["02", "03"]
 
 
+@pytest.mark.parametrize(("calm", "since"), [(1, 2), (2, 2), (3, 6)])
+def test_what_is_meant_to_stay_began_before_a_night_or_two_without_it(calm, since):
+    """One program's command named the night after the calm one, the other's the true one."""
+    nights = [CALM, excused(5.0), *[CALM] * calm, excused(5.0)]
+    ((*_, text),) = told(*(joint(axis, *nights) for axis in (1, 2)))
+    assert f"rebaseline ROBOT --from 2026-03-{since:02d} " in text
+
+
 @pytest.mark.parametrize("ratio", [None, 2.0])
 def test_a_joint_that_was_not_judged_and_has_not_moved_as_far_is_a_line_of_its_own(ratio):
     lost = joint(3, CALM, (LOST, ratio, "no motion"))

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.stages.verdict.verdict import among_siblings, believed, with_cause
+from opamc_cli.stages.verdict.verdict import Decided, among_siblings, believed, with_cause
 
 GREASE = {"effect": "thermal_viscous", "harmless": True, "origin": "environment"}
 PAYLOAD = {"effect": "payload_change", "harmless": True, "origin": "load"}
@@ -51,6 +51,7 @@ class Judged:
     health_index: float = 0.6
     p_adjusted: float = 0.6
     effect: float = 0.2
+    p_alone: float = 0.6
 
 
 def among(axis, cause, others, warmer_c=None):
@@ -96,6 +97,9 @@ def test_a_payload_that_no_joint_further_out_feels_is_what_looks_like_it(axis, o
         (-26.2, [0.0, 0.0], [0.1, 1.4], 0.3, "viscous"),
         (-26.2, [0.0, None], [0.1, 1.4], 0.3, "viscous"),
         (None, [None, None], [-0.2, 0.6], 0.4, "viscous"),
+        # the joint at fault shakes one of three; the hall moves two
+        (None, [None, None, None], [0.1, 0.9, 3.5], 0.35, "viscous"),
+        (None, [None, None, None], [0.1, 2.2, 3.5], 0.35, "thermal_viscous"),
         # the hall is colder, though it moves one joint alone
         (-9.0, [-8.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
         (-9.0, [0.0, -9.5], [0.1, 1.4], 0.3, "thermal_viscous"),
@@ -125,3 +129,25 @@ def test_a_temperature_that_moves_one_joint_alone_is_its_friction(
         assert found["ties"] == ["thermal_viscous"]
         assert f"has grown by {change:.0%}" in found["interpretation"]
         assert ("sensor" in found["interpretation"]) == (own is not None)
+
+
+@pytest.mark.parametrize(
+    ("grown", "more", "p_alone", "state"),
+    [
+        (0.26, {}, 1e-9, "changed"),
+        (0.14, {}, 1e-9, "healthy"),
+        (-0.26, {}, 1e-9, "healthy"),
+        (None, {}, 1e-9, "healthy"),
+        (0.26, {"explained": 0.4}, 1e-9, "healthy"),
+        (0.26, {"origin": "environment", "harmless": True}, 1e-9, "healthy"),
+        (0.26, {}, 0.2, "healthy"),
+    ],
+)
+def test_much_friction_matters_though_it_is_little_of_the_current(grown, more, p_alone, state):
+    """A brake that dragged on a joint that accelerates a ton was "too small to act on"."""
+    one, config = Judged("healthy", 6.0, 1e-9, 0.08, p_alone), ScoreConfig()
+    asked = Decided(None, {}, {1: one, 2: Judged("healthy")}).differing(config)
+    assert asked == [1] * (p_alone < 0.1)
+    evidence = {} if grown is None else {"relative_change": grown}
+    cause = {"effect": "coulomb", "origin": "joint", "explained": 0.9, "evidence": evidence}
+    assert with_cause(one, cause | more, config).state == state

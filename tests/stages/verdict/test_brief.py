@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.decision.judge import Bundle
+from opamc_cli.decision.witnesses.amplitudes import AmplitudeCell, AmplitudeEvidence
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report import wording
@@ -133,11 +134,20 @@ def test_that_a_cause_was_sought_in_vain_is_said():
     assert ["No effect of the library" in one for one in told] == [True, False]
 
 
-@pytest.mark.parametrize(("common", "first"), [(0.0, ""), (1.0, "The other joints moved too")])
-def test_what_a_cause_cannot_be_told_from_is_said_beside_all_else(common, first):
+@pytest.mark.parametrize(
+    ("common", "ratio", "first"),
+    [
+        (0.0, 9.0, "The recordings"),
+        (1.0, 9.0, "The other joints moved too, 2.7 times"),
+        # a joint at fault shakes the others: 20 000 times as far as a healthy session is no hall's
+        (1.0, 2e4, "The recordings"),
+    ],
+)
+def test_what_a_cause_cannot_be_told_from_is_said_beside_all_else(common, ratio, first):
     """Order 2.003 was tooth damage to whoever read the terminal alone."""
     judged = SimpleNamespace(
-        state="fault", witnesses={}, effects={}, n_baseline_sessions=5, common_log_ratio=common
+        **{"state": "fault", "witnesses": {}, "effects": {}, "n_baseline_sessions": 5},
+        **{"common_log_ratio": common, "distance_ratio": ratio},
     )
     cause = {"effect": "ripple", "interpretation": "a tooth", "origin": "joint", "share": 0.9}
     told = brief(judged, Bundle([], {}), cause | {"ties": ["kinematic_error", "x"]})["against"]
@@ -176,7 +186,7 @@ def test_the_joint_to_look_at_first_is_one_that_is_explained(joints, first):
     ("causes", "left", "told"),
     [
         ((None, CRACK, None), (), {1: 2, 3: 2}),
-        ((LITTLE, CRACK, None), (), {3: 2}),
+        ((LITTLE, CRACK, None), (), {1: 2, 3: 2}),
         # nobody knows which; another payload shakes nobody, nor does what is no sure fault
         ((None, None, None), (), {}),
         ((LOAD, None, None), (), {}),
@@ -196,3 +206,34 @@ def test_a_joint_without_a_cause_beside_one_at_fault_may_be_shaken_by_it(causes,
     for axis, said in against.items():
         by = f"Axis {told.get(axis)}, which is at fault, may shake it: see to that one first."
         assert said == (by if axis in told else "the hall")
+
+
+@pytest.mark.parametrize(("cause", "shaken"), [(CRACK, True), (LOAD, False)])
+def test_an_excused_joint_beside_one_at_fault_may_be_shaken_by_it(cause, shaken):
+    """It was only to be recorded again in other weather."""
+    axes = [
+        {"axis": 1, "state": "healthy", "excused": True, "reasons": ["It differs.", "Compared."]},
+        {"axis": 2, "state": "fault", "health_index": 90.0, "cause": cause},
+    ]
+    first, *others = with_reasons({"axes": axes}, {})["axes"][0]["reasons"]
+    said = "It differs. Axis 2, which is at fault, may shake it: see to that one first."
+    assert (first, others) == (said if shaken else "It differs.", ["Compared."])
+
+
+@pytest.mark.parametrize(("ratio", "first"), [(1.01, "spectrum"), (1.2, "amplitude")])
+def test_a_size_of_1_01_times_is_said_last(ratio, first):
+    sessions = np.zeros((6, 8))
+    sessions[:5] += 1e-3 * np.random.default_rng(0).normal(size=(5, 8))
+    sessions[5] = np.log(ratio)
+    of_all = (sessions, np.ones(6), np.full(8, 1e-6))
+    cells = {
+        "amplitude": AmplitudeEvidence([AmplitudeCell(0, *(one[..., :3] for one in of_all))], 5),
+        "spectrum": SpectrumEvidence([SpectrumCell(0, *of_all, 2, 4, 3.0)], 5),
+    }
+    judged = SimpleNamespace(
+        **{"state": "fault", "effects": {}, "n_baseline_sessions": 5, "common_log_ratio": 0.0},
+        witnesses={"amplitude": 1e-60, "spectrum": 1e-9},
+    )
+    told = brief(judged, Bundle([], cells), None)["evidence"]
+    sizes = [n for n, text in enumerate(told) if "times the baseline's" in text]
+    assert sizes == ([0] if first == "amplitude" else [1])

@@ -37,15 +37,16 @@ def test_a_joint_that_unusual_conditions_excuse_is_told_so():
 
 
 @pytest.mark.parametrize(
-    ("state", "p_alone", "said"), [("healthy", 0.2, True), ("healthy", 1e-4, False),
-                                   ("fault", 0.2, False)],
+    ("state", "p_alone", "allowed", "said"),
+    [("healthy", 0.2, 1.0, True), ("healthy", 1e-4, 1.0, False), ("fault", 0.2, 1.0, False),
+     ("healthy", 0.2, 0.03, False)],  # 1 times as far
 )  # fmt: skip
-def test_a_joint_that_the_weather_of_its_siblings_excuses_is_told_so(state, p_alone, said):
+def test_a_joint_that_the_weather_of_its_siblings_excuses_is_told_so(state, p_alone, allowed, said):
     bundle = known_fleet.bundle(4, 6, 1, (), 0.0)
     judged = judge({4: bundle})[4]
     one = replace(
         judged, state=state, p_adjusted=1e-3, p_alone=p_alone, common_log_ratio=0.1,
-        allowed_log_ratio=1.0,
+        allowed_log_ratio=allowed,
     )  # fmt: skip
     entries = [
         {
@@ -56,6 +57,7 @@ def test_a_joint_that_the_weather_of_its_siblings_excuses_is_told_so(state, p_al
     ]
     text = " ".join(reasons(one, bundle, entries, {"baseline": [], "target": []}))
     assert ("may lie 2.7 times as far out" in text) is said
+    assert ("as far out, and is not called changed" in text) is said
 
 
 @pytest.mark.parametrize(

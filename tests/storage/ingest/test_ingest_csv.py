@@ -322,16 +322,18 @@ def test_ingesting_again_or_with_more_workers_gives_the_same_bytes(tmp_path):
         assert first.run.read_bytes() == second.run.read_bytes()
 
 
-def logged(tmp_path, unit="A", angle="rad", current=3.0, turn=1.5, scale=1.0):
+def logged(tmp_path, unit="A", angle="rad", current=3.0, turn=1.5, scale=1.0, warmth=40.0):
     """Ingest ten seconds of a joint that swings by `turn` at 100 Hz."""
     t = np.arange(1000) / 100
     swing = np.sin(2 * np.pi * 0.2 * t)
-    np.savetxt(tmp_path / "r.csv", np.column_stack([current * swing, turn * swing]), delimiter=",")
+    columns = np.column_stack([current * swing, turn * swing, 0 * t + warmth])
+    np.savetxt(tmp_path / "r.csv", columns, delimiter=",")
     text = f"""sampling_rate_hz: 100
 header: false
 columns:
   axis1_current: {{source: 0, unit: {unit}}}
   axis1_position: {{source: 1, unit: {angle}, scale: {scale}}}
+  axis1_temperature: {{source: 2, unit: degC}}
 """
     return run_map(tmp_path, text, [tmp_path / "r.csv"])
 
@@ -343,6 +345,7 @@ columns:
         ({"unit": "Nm", "current": 3e5}, ["100000 Nm", "mNm taken for Nm"]),
         ({"turn": 1.5 * 57.3 * 2}, ["speed of column axis1_position", "100 rad/s", "degrees"]),
         ({"scale": 160.0}, ["the motor's side"]),
+        ({"warmth": 300.0}, ["axis1_temperature (source 2)", "above 250 °C", "another unit"]),
     ],
 )
 def test_what_no_joint_does_is_another_unit(tmp_path, wrong, parts):

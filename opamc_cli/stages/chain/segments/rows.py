@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from opamc_cli.signal.plausible.quality import LIMITS
+from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
@@ -135,4 +137,6 @@ def _mean_temperature(run: Run, channels: AxisChannels, segment: Segment) -> flo
         known = block[name]
         known = known[np.isfinite(known)].astype(np.float64)
         total, n = total + float(known.sum()), n + known.size
-    return total / n if n else None
+    mean = np.array([total / n if n else np.nan])
+    limited(run.path, name, mean, LIMITS["temperature"])
+    return float(mean[0]) if n else None

@@ -134,11 +134,17 @@ def _at_once(nights: Sequence[Sequence[Row]], where: str, remind_after: int) -> 
         yield Event(dates[index], last[0]["robot"], None, "together", text)
 
 
+OVER = 3
+"""Nights in a row in which joints did not move together, before which it was another shift. After
+one such night the command of a stranger's cell left eight shifted ones out of the new baseline."""
+
+
 def _begun(nights: Sequence[Sequence[Row]]) -> str:
-    """Return the first night of the last ones in a row in which joints moved together."""
-    begun = ""
+    """Return since which night joints move together, but for less than OVER nights in a row."""
+    begun, calm = "", 0
     for joints in reversed(nights):
-        if not moved_together(joints):
+        if moved_together(joints):
+            begun, calm = joints[0]["night"], 0
+        elif (calm := calm + 1) == OVER:
             break
-        begun = joints[0]["night"]
     return begun

@@ -77,7 +77,8 @@
     at("rows").append(...found.slice(shown, shown + step).map(draw));
     shown = Math.min(shown + step, found.length);
     at("more").hidden = shown >= found.length;
-    at("count").textContent = `${shown} of ${found.length} joints`;
+    const joints = rows.some((row) => row.program) ? "joints, each program's by itself" : "joints";
+    at("count").textContent = `${shown} of ${found.length} ${joints}`;
   };
   const update = () => {
     const wanted = at("robot").value.trim().toLowerCase(), state = at("state").value;

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from opamc_cli.errors import InputError
+from opamc_cli.signal.plausible.quality import LIMITS, Size
 from opamc_cli.storage.ingest.convert import UNSIGNED, quarters_of
 from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
 from opamc_cli.storage.ingest.guess.channels import Choice, choose, time_channel
@@ -40,6 +41,8 @@ LOOKED_AT_ROWS = 1 << 16
 
 PROGRAMS = ("program", "Program", "program_name", "prog", "Prog", "programm", "Programm")
 """Names of a column of texts that names the program."""
+
+WARMTH = LIMITS["temperature"]
 
 LOOKED_AT_FILES = 20
 """Recordings whose rate is looked at."""
@@ -146,8 +149,8 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
     logged = choices.get("temperature", Choice("temperature", {}, ()))
-    cold = {n: one for n, one in logged.by_axis.items() if _is_cold(values[_key(one)], one)}
-    for axis in cold:
+    odd = {n: one for n, one in logged.by_axis.items() if _is_of_no_joint(values[_key(one)], one)}
+    for axis in odd:
         del logged.by_axis[axis]
     signed = [
         _key(channel)
@@ -160,7 +163,8 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         values[key] = np.where(values[key] < 1 << 15, values[key], values[key] - (1 << 16))
     taken = [*chosen, *([time] if time else [])]
     used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
-    unused = [f"{each.source} (below -273.15 °C: no sensor?)" for each in cold.values()]
+    why = f"{WARMTH.beyond}: {WARMTH.looks_like}?"
+    unused = [f"{each.source} ({why})" for each in odd.values()]
     for name in (each.name for each in listed if each.name not in used):
         if isinstance(name, int):
             continue
@@ -191,10 +195,11 @@ def _program_line(look: _Look) -> str:
     return f"  program: {{source: {_quoted(look.program)}}}  # {why}"
 
 
-def _is_cold(values: Array, channel: Meant) -> bool:
-    """Return whether most of a temperature's samples are below absolute zero."""
-    unit = conversion(channel.unit or "degC", "temperature") or Conversion(1.0)
-    return bool(np.mean(unit.factor * channel.scale * values + unit.offset < -273.15) > 0.5)
+def _is_of_no_joint(values: Array, channel: Meant) -> bool:
+    """Return whether ingest would refuse a temperature."""
+    unit, size = conversion(channel.unit or "degC", "temperature") or Conversion(1.0), Size(WARMTH)
+    size.add(unit.factor * channel.scale * values + unit.offset)
+    return size.is_impossible
 
 
 def _differ_by_axis(paths: Sequence[Path]) -> bool:

@@ -172,14 +172,14 @@ def test_per_cent_of_what_the_file_does_not_tell_is_left_open_and_refused(tmp_pa
     assert read == pytest.approx(0.01 * SPEED)
 
 
-def test_a_temperature_below_absolute_zero_is_of_no_sensor(tmp_path):
+def test_a_temperature_of_no_joint_is_of_no_sensor(tmp_path):
     temperatures = {"temp_1": 31.4 + 0 * T, "temp_2": -3276.8 + 0 * T, "temp_3 [K]": 0 * T - 1}
     columns = {"t": T, **{f"cur_{n}": SPEED for n in (1, 2, 3)}, **temperatures}
     lines, _ = lines_of(table(tmp_path / "a.csv", columns))
     assert lines[-2:] == [
         "axis1_temperature: {source: temp_1, unit: degC} # largest 31.4",
-        "# not used: temp_2 (below -273.15 °C: no sensor?), "
-        "temp_3 [K] (below -273.15 °C: no sensor?)",
+        "# not used: temp_2 (below -60 or above 250 °C: another unit, or no sensor?), "
+        "temp_3 [K] (below -60 or above 250 °C: another unit, or no sensor?)",
     ]
 
 
