@@ -89,6 +89,10 @@ class Limit:
     lowest: float = -math.inf
     """Less is of no joint either, however small its size."""
 
+    def holds(self, value: float | None) -> bool:
+        """Whether a joint may have a value; what is not known, it may."""
+        return value is None or not (value < self.lowest or abs(value) > self.impossible)
+
     @property
     def beyond(self) -> str:
         """What is of no joint, in words."""

@@ -11,7 +11,7 @@ from opamc_cli.config import Config
 from opamc_cli.errors import InputError, OpamcError
 from opamc_cli.stages.chain.segments.carrier import carrier_segments
 from opamc_cli.stages.chain.segments.joint import joint_segments
-from opamc_cli.stages.chain.segments.rows import AxisSegments
+from opamc_cli.stages.chain.segments.rows import AxisSegments, without_odd_warmth
 from opamc_cli.stages.processes.kept import KeptResults, remembered
 from opamc_cli.stages.processes.parallel import Watch, map_items, unwatched
 from opamc_cli.storage.runs.finding import find_runs
@@ -155,8 +155,10 @@ def _segment_axis(job: _Job) -> AxisSegments:
         with Run(job.path, job.name) as recording:
             channels = recording.channels(job.axis)
             if channels.phases:
-                return carrier_segments(recording, channels, job.config.segment)
-            return joint_segments(recording, channels, job.config.segment, job.config.joint)
+                found = carrier_segments(recording, channels, job.config.segment)
+            else:
+                found = joint_segments(recording, channels, job.config.segment, job.config.joint)
+            return without_odd_warmth(recording, channels, found)
     except OpamcError as error:
         error.axes = (job.axis,)
         raise

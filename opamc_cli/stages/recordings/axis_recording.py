@@ -12,7 +12,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.motion.reported import unwrapped, velocity_from_position
 from opamc_cli.signal.motion.signs import another_motion, lacks_sign, signed_by_speed, speed_ratio
-from opamc_cli.signal.plausible.quality import LIMITS, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, Size, strided_speed
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs.run import Run
@@ -79,11 +79,15 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         _check_channel(run, channel, values)
         if quantity_of(channel) == "current":
             limited(run.path, channel, values, LIMITS[run.info.current_unit])
-        elif (quantity := quantity_of(channel)) in ("velocity", "temperature"):
-            limited(run.path, channel, values, LIMITS[quantity])
+        elif quantity_of(channel) == "velocity":
+            limited(run.path, channel, values, LIMITS["velocity"])
         elif quantity_of(channel) == "position":
             speed = strided_speed(values, run.sampling_rate_hz)
             limited(run.path, f"{channel} (its speed)", speed, LIMITS["position"])
+    warmth = Size(LIMITS["temperature"])
+    warmth.add(arrays.get("temperature_c", np.empty(0)))
+    if warmth.is_impossible:  # As if not logged, which `mistaken` says.
+        del arrays["temperature_c"]
     if "position_rad" in arrays:
         arrays["position_rad"] = unwrapped(arrays["position_rad"])
     _check_units(run, axis, arrays.get("position_rad"), arrays.get("velocity_rad_s"))

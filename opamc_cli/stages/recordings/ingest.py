@@ -466,7 +466,7 @@ def _write(
             source = channels.columns[name].source
             speed = "the speed of " if quantity_of(name) == "position" else ""
             doubt = f"{path}: {speed}column {name} (source {source!r}) {size.doubt()}"
-            if size.is_impossible:
+            if size.is_impossible and quantity_of(name) != "temperature":
                 msg = f"{doubt} Correct its unit or scale in the map"
                 raise InputError(msg)
             doubts += [doubt] if size.doubt() else []

@@ -5,7 +5,7 @@ import numpy as np
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.plausible.continuity import leaps
-from opamc_cli.signal.plausible.quality import LIMITS, clipped_share, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, Size, clipped_share, strided_speed
 from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
 from opamc_cli.signal.plausible.spikes import spikes
 from opamc_cli.stages.recordings.beyond import limited
@@ -70,6 +70,11 @@ def _sizes(run: Run, axis: int, recording: Recording) -> list[str]:
         speed = strided_speed(recording.position_rad, recording.rate_hz)
         name = f"axis{axis}_position (its speed)"
         found.append(limited(run.path, name, speed, LIMITS["position"]))
+    warm = run.channels(axis).columns.get("temperature")
+    if warm is not None and recording.temperature_c is None:
+        warmth = Size(LIMITS["temperature"])
+        warmth.add(run.read([warm])[warm])
+        found.append(f"{run.path}: column {warm} {warmth.doubt()} It is left out")
     return [note for note in found if note]
 
 

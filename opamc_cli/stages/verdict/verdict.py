@@ -566,7 +566,7 @@ def with_cause(
     # A fault is named first if there is one.
     at_fault = cause.get("origin", "joint") == "joint"
     if small:
-        much = cause.get("evidence", {}).get("relative_change", 0.0) >= MUCH_FRICTION
+        much = (cause["evidence"].get("relative_change") or 0.0) >= MUCH_FRICTION
         return replace(judgement, state="changed") if at_fault and much else judgement
     if cause.get("harmless"):
         return replace(judgement, state="changed")

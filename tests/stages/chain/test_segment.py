@@ -159,9 +159,11 @@ def test_reported_current_is_cut_by_the_joints_motion(tmp_path, known):
         assert (row["signal"], row["temperature_c"]) == ("reported", 41.5)
     values["axis1_temperature"] = np.full(velocity.size, 850.0)
     broken = save(tmp_path / "broken.parquet", values, 1000.0)
-    told = r"axis1_temperature is below -60 or above 250 °C in 100% .*: another unit, or no sensor"
-    with pytest.raises(InputError, match=told):
-        segment.run([broken], Config.model_validate(joint), tmp_path / "odd")
+    odd = segment.run([broken], Config.model_validate(joint), tmp_path / "odd")
+    assert odd.table.column("temperature_c").null_count == odd.table.num_rows
+    n = odd.table.num_rows
+    told = f"axis1_temperature is below -60 or above 250 °C in {n} of {n} segments"
+    assert any(told in note for note in odd.notes)
 
 
 def test_engine_ssqueezepy_finds_the_same_motions(tmp_path, two_axes):

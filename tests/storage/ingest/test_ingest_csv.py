@@ -345,7 +345,6 @@ columns:
         ({"unit": "Nm", "current": 3e5}, ["100000 Nm", "mNm taken for Nm"]),
         ({"turn": 1.5 * 57.3 * 2}, ["speed of column axis1_position", "100 rad/s", "degrees"]),
         ({"scale": 160.0}, ["the motor's side"]),
-        ({"warmth": 300.0}, ["axis1_temperature (source 2)", "above 250 °C", "another unit"]),
     ],
 )
 def test_what_no_joint_does_is_another_unit(tmp_path, wrong, parts):
@@ -359,6 +358,8 @@ def test_what_few_joints_do_is_said(tmp_path):
     assert logged(tmp_path).results[0].doubts == ()
     (doubt,) = logged(tmp_path, current=300.0).results[0].doubts
     assert "beyond 200 A" in doubt
+    (doubt,) = logged(tmp_path, warmth=850.0).results[0].doubts  # a wire broke: no reason to stop
+    assert "axis1_temperature (source 2) is below -60 or above 250 °C in 100% of its" in doubt
 
 
 @pytest.mark.parametrize(

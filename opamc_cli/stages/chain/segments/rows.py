@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 
 from opamc_cli.signal.plausible.quality import LIMITS
-from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.columns import AxisChannels
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
@@ -85,6 +84,23 @@ def make_rows(
     )
 
 
+def without_odd_warmth(run: Run, channels: AxisChannels, found: AxisSegments) -> AxisSegments:
+    """Leave out temperatures that no joint has, as if not logged, and say so."""
+    limit = LIMITS["temperature"]
+    rows = [
+        row if limit.holds(row["temperature_c"]) else row | {"temperature_c": None}
+        for row in found.rows
+    ]
+    n_odd = sum(row is not own for row, own in zip(rows, found.rows, strict=True))
+    if not n_odd:
+        return found
+    note = (
+        f"{run.path}: column {channels.columns['temperature']} is {limit.beyond} in {n_odd} of "
+        f"{len(rows)} segments, which no joint is, and left out there: {limit.looks_like}?"
+    )
+    return found._replace(rows=tuple(rows), notes=(*found.notes, note))
+
+
 def read_variance(run: Run, names: Sequence[str], start: int, stop: int) -> float:
     """Variance of a current over an interval of any length; see `mean_variance`."""
     moments = np.zeros((3, len(names)))
@@ -137,6 +153,4 @@ def _mean_temperature(run: Run, channels: AxisChannels, segment: Segment) -> flo
         known = block[name]
         known = known[np.isfinite(known)].astype(np.float64)
         total, n = total + float(known.sum()), n + known.size
-    mean = np.array([total / n if n else np.nan])
-    limited(run.path, name, mean, LIMITS["temperature"])
-    return float(mean[0]) if n else None
+    return total / n if n else None

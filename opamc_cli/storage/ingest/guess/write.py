@@ -196,7 +196,7 @@ def _program_line(look: _Look) -> str:
 
 
 def _is_of_no_joint(values: Array, channel: Meant) -> bool:
-    """Return whether ingest would refuse a temperature."""
+    """Return whether a temperature would be left out."""
     unit, size = conversion(channel.unit or "degC", "temperature") or Conversion(1.0), Size(WARMTH)
     size.add(unit.factor * channel.scale * values + unit.offset)
     return size.is_impossible
