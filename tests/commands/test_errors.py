@@ -358,6 +358,23 @@ def test_doubtful_channels_are_named(opamc, tmp_path, make, part, code):
     assert len(ended.err.splitlines()) == (1 if code == ExitCode.DONE else 3)
 
 
+def test_a_doubt_of_many_recordings_is_one_line(opamc, tmp_path):
+    """Of a night's 24 files the same sentence came 24 times, also with --quiet."""
+    (tmp_path / "map.yaml").write_text(
+        "sampling_rate_hz: 100\nheader: false\ncolumns: {axis1_current: {source: 0, unit: A}}"
+    )
+    swing = 300 * np.sin(np.arange(1000) / 50)
+    for name in "abc":
+        np.savetxt(tmp_path / f"{name}.csv", swing)
+    ended = opamc(
+        "ingest", tmp_path, "--map", tmp_path / "map.yaml", "--out", tmp_path / "runs", "--quiet"
+    )
+    assert ended.code == ExitCode.DONE
+    (line,) = ended.err.splitlines()
+    assert "beyond 200 A" in line
+    assert line.startswith("opamc: 3 files: ")
+
+
 def test_segment_where_one_run_fails(opamc, tmp_path):
     good, bad = bad_runs.good(tmp_path / "good.parquet"), bad_runs.text(tmp_path / "bad.parquet")
     ended = opamc("segment", good, bad, "--out", tmp_path / "out", "--json")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from opamc_cli.commands.terminal.options import DEFAULT_OUT, Jobs, Json, Out, Overrides, Quiet
-from opamc_cli.commands.terminal.output import Output
+from opamc_cli.commands.terminal.output import Output, folded
 from opamc_cli.errors import ExitCode, UsageError
 
 if TYPE_CHECKING:
@@ -71,9 +71,8 @@ def ingest(
     rates = stage.rates_note(outcome.results)
     if rates is not None:
         output.note(rates)
-    for item in outcome.results:
-        for doubt in item.doubts:
-            output.failure(doubt)
+    for doubt in folded([doubt for item in outcome.results for doubt in item.doubts]):
+        output.failure(doubt)
     failures = [str(error) for error in outcome.errors]
     lost = [item.lost for item in outcome.results if item.lost]
     for sentence in lost:

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
     from opamc_cli.commands.terminal.progress import Steps
 
+FILE_NAME = re.compile(r"\S.*\.[A-Za-z]\w{0,7}")
+"""What a sentence about a recording begins with."""
+
 
 @dataclass(frozen=True)
 class Output:
@@ -112,6 +115,8 @@ def folded(texts: Sequence[str]) -> list[str]:
     --------
     >>> folded(["a.parquet: no ratio", "b.parquet: no ratio", "rate differs"])
     ['2 runs: no ratio', 'rate differs']
+    >>> folded(["a.csv: is large", "b.csv: is large"])
+    ['2 files: is large']
     >>> folded(["a.parquet: 3 samples lost", "b.parquet: 8 samples lost"])
     ['a.parquet: 3 samples lost; 1 more run likewise']
     >>> folded([f"{run}.parquet: axis{axis}_a lacks 3" for run in "ab" for axis in (1, 2)])
@@ -122,7 +127,7 @@ def folded(texts: Sequence[str]) -> list[str]:
     groups: dict[str, list[str]] = {}
     for text in dict.fromkeys(texts):
         subject, colon, rest = text.partition(": ")
-        if colon and subject.endswith(".parquet"):
+        if colon and FILE_NAME.fullmatch(subject):
             text_of_all = re.sub(r"[0-9]+", "#", rest)
         else:
             text_of_all = re.sub(r"[0-9]+", "#", text) if subject.startswith("axis ") else text
@@ -137,7 +142,8 @@ def folded(texts: Sequence[str]) -> list[str]:
         elif more and alike[0].startswith("axis "):
             lines.append(f"{alike[0]} (and {more} more like this)")
         elif more and len(rests) == 1:
-            lines.append(f"{len(alike)} runs: {rests.pop()}")
+            what = "runs" if alike[0].partition(": ")[0].endswith(".parquet") else "files"
+            lines.append(f"{len(alike)} {what}: {rests.pop()}")
         elif more and (runs := len({text.partition(": ")[0] for text in alike})) <= more:
             within = f"in {runs} runs" if runs > 1 else "in this run"
             lines.append(f"{alike[0]}; {more} more like this, {within}")

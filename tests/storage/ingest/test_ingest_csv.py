@@ -169,6 +169,7 @@ def test_a_large_file_is_the_same_as_its_rows(tmp_path):
         (b"a,b\n1,\n3,\n", "column axis1_a (source 'b') has no value in 2 rows"),
         (b"a,b,\xff\n1,2,3\n", "is not text in utf-8"),
         (gzip.compress(b"a,b\n1,2\n", mtime=0), "is compressed by gzip; give it a name that"),
+        (b"PK\x03\x04\x14\x00\xff\xff", "is a zip archive, as spreadsheets (.xlsx) are"),
         (b'a,b\n"1,2\n3,4\n', "r.csv"),
         (b"\x00\x01\x02\x03" * 50, "r.csv"),
     ],

@@ -23,7 +23,7 @@ BLOCK_BYTES = 1 << 22
 FIELD_MARK = "\x1f"
 """Stands for a separator of more than one character once the text is rewritten."""
 
-GZIP = b"\x1f\x8b"
+GZIP, ZIP = b"\x1f\x8b", b"PK\x03\x04"
 
 _CONVERSION = re.compile(r"column #(\d+): Row #(\d+): .*invalid value '(.*)'", re.DOTALL)
 _WIDTH = re.compile(r"Row #(\d+): Expected (\d+) columns, got (\d+)")
@@ -229,10 +229,14 @@ class CsvSource:
 
     def _wrong_encoding(self, error: UnicodeDecodeError) -> InputError:
         with self.path.open("rb") as raw:
-            compressed = self.path.suffix != ".gz" and raw.read(2) == GZIP
-        if compressed:
+            begin = raw.read(4)
+        if self.path.suffix != ".gz" and begin.startswith(GZIP):
             return InputError(
                 f"{self.path}: is compressed by gzip; give it a name that ends in .gz"
+            )
+        if begin == ZIP:
+            return InputError(
+                f"{self.path}: is a zip archive, as spreadsheets (.xlsx) are; save it as text (CSV)"
             )
         return InputError(
             f"{self.path}: is not text in {self._map.encoding} (byte {error.start} cannot be "
