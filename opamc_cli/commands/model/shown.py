@@ -9,6 +9,9 @@ if TYPE_CHECKING:
     from rich.console import RenderableType
 
 MOST_REJECTED = 3
+CORNERS = 1.25
+"""Times the error that is told, from which on the one sample by sample stands beside it, as
+in 24 of 258 closings of three strangers' joints and a third of short measured ones."""
 MOST_MEANINGS = 3
 """Effects that the first line explains; the table below it has them all."""
 
@@ -62,7 +65,8 @@ def _headline(result: Mapping[str, Any]) -> str:
         explained.append(f"{len(more)} more ({', '.join(dict.fromkeys(more))})")
     from opamc_cli.stages.report import wording
 
-    error = f"error {before} → {after} {unit}"
+    logged = _as_logged(result)
+    error = f"error {before} → {after} {unit}{logged}"
     fails = "".join(f"; {why}" for why in wording.unreliable(result))
     functions = wording.without_name(steps)
     share = result.get("explained_share")
@@ -81,21 +85,31 @@ def _headline(result: Mapping[str, Any]) -> str:
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
         if left is None:
             lacks = "nothing for certain" if result.get("unconfirmed") else "nothing worth naming"
-            said = f"Axis {axis} lacks {lacks}: error {before} {unit}{of_it}"
+            said = f"Axis {axis} lacks {lacks}: error {before} {unit}{logged}{of_it}"
             return f"{said}{fails}"
         check = ""
         if wording.beyond_noise(result, wording.FAR_ABOVE_NOISE) is not None:
             check = "; check how its motion was logged, units and gear ratio, or record more motion"
         return (
             f"Axis {axis}: nothing of the library explains the {left:.2g} {unit} that are left "
-            f"beyond noise: error {before} {unit}{of_it}; the rest is slower noise, or something "
-            f"that no effect describes{check}{fails}"
+            f"beyond noise: error {before} {unit}{logged}{of_it}; the rest is slower noise, or "
+            f"something that no effect describes{check}{fails}"
         )
     if "verdict" not in result or "steps" not in result:
         return f"Axis {axis}: loop.json does not say what was found; close the loop again"
     domain = result.get("domain")
     what = functions or "something" + (f" in the {domain} domain" if domain else "")
     return f"Axis {axis} lacks {what}, which no effect of the library describes: {error}{fails}"
+
+
+def _as_logged(result: Mapping[str, Any]) -> str:
+    """Return the errors sample by sample where they are much larger: corners count as smooth."""
+    sides = [result.get(side, {}) for side in ("before", "after")]
+    logged, told = ([one.get(key) for one in sides] for key in ("as_logged_a", "rmse_a"))
+    if None in (*logged, *told) or logged[1] <= CORNERS * told[1]:
+        return ""
+    shown = dict.fromkeys(f"{value:.4g}" for value in logged)
+    return f" (sample by sample {' → '.join(shown)})"
 
 
 def _axes_beside(steps: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -219,12 +219,17 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "unit": laid.unit,
         "declared": [effect.name for effect, _ in laid.declared],
         "sealed": [grouping.names[g] for g in grouping.sealed],
-        "before": {"rmse_a": loop.rmse_before_a, "r2": loop.r2_before},
+        "before": {
+            "rmse_a": loop.rmse_before_a,
+            "r2": loop.r2_before,
+            "as_logged_a": _as_logged(loop.before),
+        },
         "steps": [step_entry(step, loop.steps, laid.dataset.fine.track) for step in loop.steps],
         "after": {
             "rmse_a": loop.rmse_after_a,
             "r2": loop.r2_after,
             "searched_rmse_a": loop.after.rmse(sealed=False),
+            "as_logged_a": _as_logged(loop.after),
         },
         "floor_a": loop.floor_a,
         "noise_a": loop.noise_a,
@@ -263,6 +268,12 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "notes": laid.notes,
         "doubts": laid.read.doubts,
     }
+
+
+def _as_logged(fit: Fit) -> float:
+    """Root mean square of the sealed residual sample by sample, beside corners, too."""
+    grid = fit.opened.dataset.fine
+    return float(np.sqrt(np.mean(fit.opened.residual_a[grid.sealed] ** 2)))
 
 
 def _orders(track: Track) -> str:

@@ -169,6 +169,19 @@ def test_what_the_sealed_data_do_not_bear_out_is_said_where_nothing_was_added() 
     assert "the sealed ones do not" in remains(entry)
 
 
+@pytest.mark.parametrize(("logged", "said"), [(0.036, False), (0.038, True)])
+def test_an_error_that_is_far_larger_sample_by_sample_is_told(logged: float, said: bool) -> None:
+    """Beside sharp corners it was up to 2.7 times the one told, in a document alone."""
+    entry = left_alone(0.1, 0.02) | {"verdict": "closed", "steps": [step("ripple", "wear: look")]}
+    entry["before"] |= {"as_logged_a": 0.11}
+    entry["after"] = {"rmse_a": 0.03, "as_logged_a": logged}
+    told = "error 0.1 → 0.03 A (sample by sample 0.11 → 0.038)"
+    assert (told in headline(entry)) is said
+    alone = left_alone(0.03, 0.02) | {"after": {"rmse_a": 0.03, "as_logged_a": logged}}
+    alone["before"] |= {"as_logged_a": logged}
+    assert ("error 0.03 A (sample by sample 0.038)" in headline(alone)) is said
+
+
 def step(effect: str, interpretation: str) -> dict[str, Any]:
     return {"effect": effect, "interpretation": interpretation}
 
