@@ -633,6 +633,15 @@ def test_a_model_that_predicts_no_better_than_the_mean_is_said_also_if_quiet(tmp
     assert entry["familiar"]["r2"] < 0
     assert code == 5
     assert "predicts no better than the current's mean" in capsys.readouterr().err
+    # what is not applied does not hide it
+    closed = yaml.safe_load(model.read_text())
+    hum = {"effect": "mains_hum", "parameters": {"frequency_hz": 50.0}, "coefficients": [0.1, 0.1]}
+    closed["effects"].append(hum)
+    model.write_text(yaml.safe_dump(closed))
+    opamc("model", "evaluate", run, "--model", model, "--out", out, "--quiet")
+    said = capsys.readouterr().err
+    assert "not applied mains_hum" in said
+    assert "unit is another one, or what is not applied was most of it" in said
 
 
 @pytest.mark.long

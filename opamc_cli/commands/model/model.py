@@ -171,13 +171,14 @@ def _unjudged(result: dict[str, Any]) -> list[str]:
     ]
     said += [f"not applied {entry['effect']}: {entry['why']}" for entry in result["not_applied"]]
     own, axis = result["closed"]["axis"], result["axis"]
+    known = result["familiar"]
     if own not in (None, axis):
         said.append(f"the model was closed on axis {own}, and says little of another joint")
-    known = result["familiar"]
-    if known is not None and known["r2"] is not None and known["r2"] <= 0 and not said:
+    elif known is not None and (known["r2"] or 0.0) < 0 and not result["opposite_sign"]:
         said.append(
             "the model predicts no better than the current's mean even on motion that it knows: "
             "the joint, its load or the unit is another one"
+            + (", or what is not applied was most of it" if result["not_applied"] else "")
         )
     if known is not None and known["share"] < MOSTLY:
         said.append(

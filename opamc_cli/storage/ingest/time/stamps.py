@@ -45,7 +45,9 @@ LOST_S = 0.2
 SAME_RATE = 1e-9
 """Relative difference of rates that is none: of the arithmetic, not of the clock."""
 ONE_STEP, MOSTLY_ONE = 0.01, 0.9
-"""Relative difference of steps that are one, and the share of them that tells the rate alone."""
+"""Relative difference of steps that are one, and the share of them that tells the rate alone: of a
+measured log that halted 286 of 300 steps agreed to a thousandth; a clock that jitters has no such
+share, and keeps the mean of all."""
 
 _CHUNK = 1 << 20
 
