@@ -19,6 +19,7 @@ from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
 from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.signal.motion.signs import friction_drives
+from opamc_cli.signal.plausible.commanded import apart
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
@@ -36,6 +37,10 @@ OPPOSITE = (
 GUESSED = (
     "axis {}: what was turned without current (gaps: {}, {:.1f} s in all) is a guess, and so is "
     "the place: log the position to be certain"
+)
+COMMANDED = (
+    "{}: axis{}_velocity is {:.1%} off the rate of change of the position and has no noise: "
+    "commanded, or filtered for long? It is left out; log the speed as it is measured, or none"
 )
 OTHER_RATIO = (
     "axis {}: beside the position the phases turn by {:.5g} electrical radians per radian, but "
@@ -224,6 +229,8 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     doubts = [
         note for run, one in zip(runs, recordings, strict=True) for note in mistaken(run, axis, one)
     ]
+    recordings, commanded = _without_commands(runs, axis, recordings)
+    doubts += commanded
     notes += doubts
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
@@ -240,6 +247,22 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
     return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes, doubts)
+
+
+def _without_commands(
+    runs: Sequence[Run], axis: int, recordings: list[Recording]
+) -> tuple[list[Recording], list[str]]:
+    """Leave out a speed that is commanded, of all recordings, and say so."""
+    both = [(one.position_rad, one.velocity_rad_s, one.rate_hz) for one in recordings]
+    shares = [None if q is None or v is None else apart(q, v, rate) for q, v, rate in both]
+    doubts = [
+        COMMANDED.format(run.path, axis, share)
+        for run, share in zip(runs, shares, strict=True)
+        if share is not None
+    ]
+    if doubts:
+        recordings = [replace(one, velocity_rad_s=None) for one in recordings]
+    return recordings, doubts
 
 
 def _refuse_copies(runs: Sequence[Run], recordings: Sequence[Recording]) -> None:

@@ -112,6 +112,19 @@ def test_a_speed_of_another_joint_is_refused(model, capsys):
     assert "axis1_velocity is not the rate of change of axis1_position" in capsys.readouterr().err
 
 
+def test_a_speed_that_is_commanded_is_said_and_left_out(model, tmp_path, capsys):
+    """The joint follows its command 30 ms late: samples in motion would be another's."""
+    ahead = round(0.03 * RATE)
+    speed = np.roll(np.gradient(OWN.position) * RATE, -ahead)[:-ahead]
+    columns = {"axis1_current": OWN.current, "axis1_position": OWN.position}
+    assert model("fit", "--quiet", axis1_velocity=speed, **columns) == 0
+    said = capsys.readouterr().err
+    assert re.search(r"axis1_velocity is \d+\.\d% off the rate of change of the position", said)
+    beside = pq.read_table(tmp_path / "out" / "fit.parquet")
+    assert model("fit", **{name: own[:-ahead] for name, own in columns.items()}) == 0
+    assert pq.read_table(tmp_path / "out" / "fit.parquet").equals(beside)
+
+
 def test_missing_samples_are_said_by_model_and_segment(model, tmp_path, capsys):
     kept = np.random.default_rng(0).random(OWN.position.size) > 0.03
     columns = {"axis1_current": OWN.current[kept], "axis1_position": OWN.position[kept]}
