@@ -11,6 +11,10 @@ MOST_BRIDGED = 3
 """Samples of a gap that is filled: a packet or two that a logger lost, less than any pattern
 spans."""
 
+FEWEST_CHANGES, LEAST_HELD, HELD_EVENLY, STEPS = 20, 3, 0.8, 4
+"""Changes that tell at what distance they come; samples that a value is held for, at the least;
+share of the distances that agree; and times its least change by which a channel usually does."""
+
 
 def clipped_share(x: NDArray[np.floating]) -> float:
     """Share of the samples that sit at the channel's largest or smallest value, if it is clipped.
@@ -66,6 +70,30 @@ def bridged(x: NDArray[np.floating]) -> NDArray[np.floating]:
     short = place[(gap > 0) & (gap <= MOST_BRIDGED)]
     filled[short] = np.interp(short, known, x[known])
     return filled
+
+
+def held_for(x: NDArray[np.floating]) -> int | None:
+    """Return for how many samples each value of a channel is held, None where they are its own.
+
+    A channel that a bus brings less often than the logger writes a row keeps its last value until
+    then: its changes come at one distance, and are of many sizes. A coarse encoder at an even speed
+    changes at one distance, too, but by its one step.
+
+    Parameters
+    ----------
+    x : array, shape (n,)
+        Samples of one channel, as logged.
+    """
+    step = np.diff(x)
+    change = np.flatnonzero(step)  # NaN is one
+    if change.size < FEWEST_CHANGES or change.size > x.size / LEAST_HELD:
+        return None
+    apart, sizes = np.diff(change), np.abs(step[change])
+    usual = round(float(np.median(apart)))
+    apart = apart[apart <= 1.5 * usual]  # beyond, one value came twice
+    even = np.mean(np.abs(apart - usual) <= max(1.0, 0.1 * usual)) >= HELD_EVENLY
+    coarse = not np.median(sizes) >= STEPS * sizes.min()
+    return usual if usual >= LEAST_HELD and even and not coarse else None
 
 
 def is_constant(x: NDArray[np.floating]) -> bool:

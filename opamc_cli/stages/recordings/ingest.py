@@ -11,7 +11,7 @@ import pyarrow as pa
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError, OpamcError, UsageError
-from opamc_cli.signal.plausible.quality import LIMITS, Size, strided_speed
+from opamc_cli.signal.plausible.quality import LIMITS, Size, held_for, strided_speed
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
 from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.files.parquet import read_schema
@@ -29,6 +29,7 @@ from opamc_cli.storage.ingest.map.units import (
     ALIASES,
     ISO8601,
     LATEST_S,
+    ONE_UNIT,
     SAMPLES,
     conversion,
     date_s,
@@ -195,7 +196,10 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             for name, column in channels.columns.items()
         }
         clock = _clock(path, source, channels, declared, selections)
-        blocks: Iterable[Block] = convert(path, source.blocks(selections), channels)
+        held: dict[str, int] = {}
+        blocks: Iterable[Block] = _noting_held(
+            convert(path, source.blocks(selections), channels), held
+        )
         if clock is not None and clock.clock.kept is not None:
             blocks = _on_grid(blocks, clock.times_s, clock.clock, channels)
         rate = clock.clock.sampling_rate_hz if clock is not None else cast(float, declared)
@@ -222,7 +226,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
         account,
         {name: _label(column, labels) for name, column in channels.columns.items()},
         replaced=replaced,
-        doubts=(*gaps, *remarks, *written.doubts),
+        doubts=(*gaps, *remarks, *written.doubts, *_held_long(path, channels, held, clock, rate)),
         lost="; ".join(doubts) or None,
     )
 
@@ -328,6 +332,32 @@ def _times(source: Source, channels: IngestMap, rate: float | None) -> Seconds:
     return np.asarray(column if unit.factor == 1.0 else column * unit.factor)
 
 
+def _noting_held(blocks: Iterable[Block], held: dict[str, int]) -> Iterator[Block]:
+    """Pass blocks on, and note which columns of the first hold each value for some samples."""
+    for number, block in enumerate(blocks):
+        if number == 0:  # before any grid: between two values it would draw a line
+            for name, values in block.items():
+                if quantity_of(name) != "temperature" and (count := held_for(values)):
+                    held[name] = count
+        yield block
+
+
+def _held_long(
+    path: Path, channels: IngestMap, held: Mapping[str, int], clock: _Stamped | None, rate: float
+) -> Iterator[str]:
+    """Say which columns were logged less often than the rows."""
+    account = clock.clock.account if clock else None
+    logged_hz = account.measured_rate_hz if account else rate
+    for rows in sorted(set(held.values())):
+        columns = [name for name, count in held.items() if count == rows]
+        source = channels.columns[columns[0]].source
+        yield (
+            f"{path}: each value of {', '.join(columns)} (source {source!r}) is held for {rows} "
+            f"rows: it comes at {logged_hz / rows:.3g} Hz, up to {rows / logged_hz:.2g} s late "
+            "beside other columns; log it as often as they are"
+        )
+
+
 def _on_grid(
     blocks: Iterable[Block], times_s: Seconds, clock: Clock, channels: IngestMap
 ) -> Iterable[Block]:
@@ -408,6 +438,12 @@ def _number(value: object) -> float | None:
 
 FIRST_DATE = "1970"
 """A clock that was never set begins there, or later; an earlier date is none of a log."""
+
+NO_UNITS = (
+    "one of them is of the motor's side, or has another unit, scale or sign, or the time's unit is "
+    "wrong"
+)
+"""Of a speed that is its position's rate of change by a factor that no pair of units makes."""
 
 MOST_EMPTY = 0.5
 """Share of a channel's rows without a value from which on it is lost, not only holed by the gaps
@@ -495,10 +531,12 @@ def _units_apart(path: Path, channels: IngestMap, rate_hz: float, table: pa.Tabl
         declared = [channels.columns[name].unit for name in names]
         units = [ALIASES.get(unit, unit) for unit in declared]
         fit = [" and ".join(each.values()) for each in fitting_units(ratio or 1.0, *units)]
-        if fit:
+        # what is nearer to 1 a filter or a coarse encoder makes as well
+        if fit or (ratio is not None and not 1 / ONE_UNIT < ratio < ONE_UNIT):
+            agree = f"{', or '.join(fit)} would agree"
             said = (
                 f"is {ratio:.2g} times the rate of change of its position, in the map's units "
-                f"({' and '.join(declared)}); {', or '.join(fit)} would agree: correct the map"
+                f"({' and '.join(declared)}); {agree if fit else NO_UNITS}: correct the map"
             )
             found.setdefault(said, []).append(joint.removeprefix("axis"))
     return [f"{path}: the speed of axis {', '.join(axes)} {said}" for said, axes in found.items()]

@@ -10,6 +10,7 @@ from opamc_cli.signal.plausible.quality import (
     Size,
     bridged,
     clipped_share,
+    held_for,
     is_constant,
     spikes,
     strided_speed,
@@ -60,6 +61,35 @@ def test_a_limit_is_reached_more_than_five_times_as_often_as_the_value_inside():
     inside = np.repeat([1.0, 2.0, 3.0, 4.0], 10)
     assert clipped_share(np.append(inside, np.full(50, 5.0))) == 0
     assert clipped_share(np.append(inside, np.full(51, 5.0))) == pytest.approx(51 / 91)
+
+
+@pytest.mark.parametrize("rows", [3, 8, 50])
+def test_a_channel_that_comes_less_often_than_its_rows_is_told(rows):
+    own = np.random.default_rng(rows).normal(size=40).round(2)
+    assert held_for(np.repeat(own, rows)) == rows
+    # a bus is late by a row now and then, and a value comes twice
+    late = np.random.default_rng(1).integers(0, 2, 48)
+    twice = own.repeat(np.where(np.arange(40) % 5, 1, 2))
+    assert held_for(np.repeat(twice, rows + late)) in (rows, rows + 1)
+
+
+@pytest.mark.parametrize(
+    "own",
+    [
+        np.random.default_rng(0).normal(size=900),
+        np.repeat(np.random.default_rng(0).normal(size=450), 2),
+        # one step of a coarse encoder after the other, at an even speed and at another
+        np.floor(np.arange(900) / 8),
+        np.floor(300 * np.sin(np.arange(900) / 150)),
+        # a noise below a converter's step, a value that rests, missing values, next to nothing
+        np.random.default_rng(0).normal(0.0, 0.3, 900).round(),
+        np.r_[np.random.default_rng(0).normal(size=30), np.zeros(900)],
+        np.where(np.arange(900) % 8, np.nan, np.arange(900)),
+        *(np.zeros(0), np.zeros(1), np.zeros(900), np.full(9, np.nan)),
+    ],
+)
+def test_a_channel_of_its_own_rate_is_not_held(own):
+    assert held_for(own) is None
 
 
 def test_constants():

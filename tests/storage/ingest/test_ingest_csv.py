@@ -394,6 +394,45 @@ def test_units_of_position_and_speed_that_contradict_each_other_are_said(
     assert doubts == ((said,) if fit else ())
 
 
+@pytest.mark.parametrize("times", [50.0, 1000.0, 0.019, -1.0, 1.4, 0.7])
+def test_a_speed_that_is_its_positions_in_no_unit_is_said(tmp_path, times):
+    t = np.arange(1000) / 100
+    joint = (np.cos(t), np.sin(2 * t) / max(abs(times), 1), 2 * np.cos(2 * t) * min(times, 1))
+    np.savetxt(tmp_path / "r.csv", np.column_stack(joint), delimiter=",")
+    text = "sampling_rate_hz: 100\nheader: false\ncolumns:\n" + "".join(
+        f"  axis1_{channel}: {{source: {k}, unit: {unit}}}\n"
+        for k, (channel, unit) in enumerate(
+            (("current", "A"), ("position", "rad"), ("velocity", "rad/s"))
+        )
+    )
+    doubts = run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts
+    if times in (1.4, 0.7):  # a coarse encoder or a filter may
+        assert doubts == ()
+    else:
+        assert "in the map's units (rad and rad/s); one of them is of the motor's side" in doubts[0]
+
+
+def test_a_column_that_comes_less_often_than_the_rows_is_said_before_the_grid(tmp_path):
+    t = np.arange(2000) * 0.013 + 0.001 * (np.arange(2000) % 2)
+    current = np.random.default_rng(0).normal(size=(2, 250)).repeat(8, axis=1)
+    warm = 30 + np.random.default_rng(1).normal(size=40).repeat(50)
+    columns = np.column_stack([t, *current, np.sin(t), warm])
+    np.savetxt(tmp_path / "r.csv", columns, delimiter=",", fmt="%.6f")
+    text = "header: false\ntime: {source: 0, unit: s}\nresample_hz: 76.9\ncolumns:\n" + "".join(
+        f"  {column}: {{source: {k}, unit: {unit}}}\n"
+        for column, k, unit in (
+            ("axis1_current", 1, "A"),
+            ("axis2_current", 2, "A"),
+            ("axis1_position", 3, "rad"),
+            ("axis1_temperature", 4, "degC"),  # a temperature may
+        )
+    )
+    (doubt,) = run_map(tmp_path, text, [tmp_path / "r.csv"]).results[0].doubts
+    said = "is held for 8 rows: it comes at 9.62 Hz, up to 0.1 s late beside other columns"
+    column = f"{tmp_path / 'r.csv'}: each value of axis1_current, axis2_current (source 1)"
+    assert doubt == f"{column} {said}; log it as often as they are"
+
+
 def test_a_wrist_that_passes_half_a_turn_is_no_wonder(tmp_path):
     t = np.arange(1000) / 100
     wrapped = (4 * t + np.pi) % (2 * np.pi) - np.pi

@@ -8,7 +8,13 @@ from datetime import UTC, datetime
 import numpy as np
 import numpy.typing as npt
 
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, LATEST_S, conversion, date_s
+from opamc_cli.storage.ingest.map.units import (
+    CONVERSIONS,
+    LATEST_S,
+    ONE_UNIT,
+    conversion,
+    date_s,
+)
 
 Float = npt.NDArray[np.float64]
 
@@ -88,8 +94,10 @@ def angle_units(
             why = f"largest {largest:.3g}{told}; its steps agree with the speed"
             return Guess(units[0], why), Guess(units[1], f"largest {fastest:.3g}; as the position")
     speed = "deg/s" if fastest > LARGEST_RAD else "rad/s"
-    doubt = ""
+    doubt, told = "", "by the range alone"
     if ratio is not None and rate_hz:
+        if 1 / ONE_UNIT < ratio < ONE_UNIT:
+            speed, told = f"{by_range}/s", "as the position"
         power = round(math.log10(ratio))
         tenfold = power and abs(ratio / 10.0**power - 1) < AGREE_WITHIN
         gear, side = max((ratio, "position"), (1 / ratio, "speed"))
@@ -99,7 +107,7 @@ def angle_units(
         doubt = f" (its steps are {ratio:.3g} of the speed{blame})"
     return (
         Guess(by_range, f"largest {largest:.3g}, by the range alone{doubt}"),
-        Guess(speed, f"largest {fastest:.3g}, by the range alone"),
+        Guess(speed, f"largest {fastest:.3g}, {told}"),
     )
 
 

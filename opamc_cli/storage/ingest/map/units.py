@@ -36,8 +36,13 @@ of a time is that of a stamp which is a date."""
 
 EARLIEST_S = 5e8
 """A stamp later than this many seconds (in 1985) counts from 1970; a smaller one from a start."""
+
 LATEST_S = 3.471e9
 """From there on (2080) it counts in another unit, or from another year, as LabVIEW from 1904."""
+
+ONE_UNIT = 1.5
+"""Up to this ratio, either way, a speed that is coarse, noisy or filtered is its position's in the
+same unit: the next pair of units is 6 apart, and hardly any gear is as small."""
 
 TORQUES = frozenset({"Nm", "mNm"})
 """Units in which a joint's torque stands for its motor's current; it stays a torque."""

@@ -116,6 +116,19 @@ def test_units_by_the_range_alone():
     ]
 
 
+@pytest.mark.parametrize(("angle", "unit"), [(1.0, "rad"), (180 / np.pi, "deg")])
+def test_a_coarse_speed_has_the_unit_of_its_position_whatever_its_range(angle, unit):
+    # 8 % of noise in the mean square make more of the speed than the steps are
+    noise = np.random.default_rng(0).normal(0.0, 0.3 * SPEED.std(), SPEED.size)
+    for size in (0.05, 5.0):
+        found = angle_units({1: angle * ANGLE}, {1: angle * (SPEED + noise)}, 250.0)
+        assert (found[0].unit, found[1].unit) == (unit, f"{unit}/s")
+        assert found[1].why.endswith("as the position")
+        slow = {1: size * angle * ANGLE}, {1: size * angle * (SPEED + noise)}
+        position, speed = angle_units(*slow, 250.0)
+        assert speed.unit == f"{position.unit}/s"
+
+
 def test_currents_of_more_than_sixty_are_in_milliampere():
     assert (current_unit(60.0).unit, current_unit(60.1).unit) == ("A", "mA")
 
