@@ -136,6 +136,19 @@ def quiet_velocity(position_rad: NDArray[np.floating], fs_hz: float) -> NDArray[
         window_s *= 2
 
 
+def hides_motions(velocity_rad_s: NDArray[np.floating]) -> bool:
+    """Whether the noise of a logged speed alone is above what a motion of its joint reaches.
+
+    Of 38 logs' speeds four standard deviations are 1.5 % of the largest speed at most, but for
+    those of a direct drive (6 %), a humanoid's joint and three screws and eccentrics (9 to 76 %):
+    of these a logged position tells 39 motions where the speeds tell 27.
+    """
+    velocity = np.nan_to_num(np.asarray(velocity_rad_s, dtype=np.float64))
+    if not velocity.size:
+        return False
+    return 4 * noise_level(_probe(velocity)) > ON_SHARE * _fastest(velocity)
+
+
 def find_joint_motions(
     velocity_rad_s: NDArray[np.floating],
     fs_hz: float,
@@ -170,8 +183,7 @@ def find_joint_motions(
     velocity = np.nan_to_num(np.asarray(velocity_rad_s, dtype=np.float64))
     if not velocity.size:
         return []
-    # A shift's worth of samples is thinned for the quantile, and probed for its noise.
-    fastest = float(np.quantile(np.abs(velocity[:: 1 + velocity.size // PROBE]), 0.999))
+    fastest = _fastest(velocity)
     if fastest < min_speed_rad_s:
         return []
     off = max(OFF_SHARE * fastest, 4 * noise_level(_probe(velocity)))
@@ -204,6 +216,11 @@ def _without_settling(
             way = own
             yield start, stop, sign
         last = stop
+
+
+def _fastest(velocity: NDArray[np.float64]) -> float:
+    # A shift's worth of samples is thinned for the quantile, and probed for its noise.
+    return float(np.quantile(np.abs(velocity[:: 1 + velocity.size // PROBE]), 0.999))
 
 
 def _probe(velocity: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,6 +9,7 @@ from opamc_cli.signal.motion.reported import (
     _probe,
     find_joint_motions,
     fluctuation_frequency,
+    hides_motions,
     motor_frequency,
     quiet_velocity,
     unwrapped,
@@ -52,6 +53,16 @@ def test_finds_the_same_moves_in_a_quantised_wrapped_position():
     derived = velocity_from_position(position, FS_HZ)
     assert np.abs(derived - velocity).max() < 0.06
     assert [m.direction for m in found(derived)] == [s for _, _, s in truth]
+
+
+@pytest.mark.parametrize(("share", "hides"), [(0.0, False), (0.01, False), (0.015, True)])
+def test_noise_hides_motions_where_four_deviations_are_a_twentieth_of_the_speed(share, hides):
+    velocity, _ = profile(signs=(1, -1) * 5, cruise=2000, rest=2000)
+    noise = 0.5 * share * np.random.default_rng(0).standard_normal(velocity.size)
+    assert hides_motions(velocity + noise) is hides
+    assert not hides_motions(np.zeros(9))
+    assert not hides_motions(np.full(9, np.nan))
+    assert not hides_motions(np.zeros(0))
 
 
 def test_a_reversal_without_rest_is_two_motions():

@@ -166,6 +166,30 @@ def test_reported_current_is_cut_by_the_joints_motion(tmp_path, known):
     assert any(told in note for note in odd.notes)
 
 
+@pytest.mark.parametrize("encoder", ["turns", "stands", "missing", "absent"])
+def test_a_position_tells_the_motions_that_a_coarse_speed_hides(tmp_path, encoder):
+    recording = record(MOVES, fs_hz=1000.0, lead_s=0.5)
+    velocity = recording.frequency_hz * 2 * np.pi / 500
+    coarse = velocity + 0.4 * np.random.default_rng(0).standard_normal(velocity.size)
+    positions = {
+        "turns": np.cumsum(velocity) / 1000.0,
+        "stands": np.zeros(velocity.size),
+        "missing": np.full(velocity.size, np.nan),
+    }
+    values = {
+        "axis1_current": np.abs(recording.phases[0]) + np.float32(0.1),
+        "axis1_velocity": coarse,
+        **({} if encoder == "absent" else {"axis1_position": positions[encoder]}),
+    }
+    path = save(tmp_path / "drive.parquet", values, 1000.0)
+    if encoder == "turns":
+        rows = run_stage(tmp_path, path).table.to_pylist()
+        assert [r["direction"] for r in rows] == [m.direction for m in MOVES]
+        return
+    with pytest.raises(InputError, match="no motion was found"):
+        run_stage(tmp_path, path)
+
+
 def test_engine_ssqueezepy_finds_the_same_motions(tmp_path, two_axes):
     path, _ = two_axes
     ours = run_stage(tmp_path, path).table

@@ -9,6 +9,7 @@ from opamc_cli.signal.motion.reported import (
     FEWEST_SAMPLES,
     JointMotion,
     find_joint_motions,
+    hides_motions,
     motor_frequency,
     quiet_velocity,
 )
@@ -39,6 +40,8 @@ def joint_segments(
     run: Run, channels: AxisChannels, config: SegmentConfig, joint: JointConfig
 ) -> AxisSegments:
     """Find the motions of an axis from its velocity, or from its position if there is none.
+
+    So, too, where the velocity's noise hides them: many drives difference a coarse angle.
 
     Raises
     ------
@@ -156,13 +159,24 @@ def _segments(
     ]
 
 
+def _of_position(
+    run: Run, name: str, logged: npt.NDArray[np.float64] | None = None
+) -> npt.NDArray[np.float64]:
+    """Return the speed of a position; the logged one where that is noise, too, or stands still."""
+    velocity = quiet_velocity(run.read([name])[name], run.sampling_rate_hz)
+    if logged is not None and (hides_motions(velocity) or not np.nan_to_num(velocity).any()):
+        return logged
+    return velocity
+
+
 def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
     # One column at the drive's rate: 8 h at 1 kHz are 230 MB.
     if channels.velocity is not None:
         velocity = run.read([channels.velocity])[channels.velocity].astype(np.float64)
+        if channels.position is not None and hides_motions(velocity):
+            velocity = _of_position(run, channels.position, velocity)
     elif channels.position is not None:
-        position = run.read([channels.position])[channels.position]
-        velocity = quiet_velocity(position, run.sampling_rate_hz)
+        velocity = _of_position(run, channels.position)
     else:
         axis = channels.axis
         msg = (
