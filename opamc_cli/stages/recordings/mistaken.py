@@ -5,7 +5,13 @@ import numpy as np
 from opamc_cli.errors import InputError
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.signal.plausible.continuity import leaps
-from opamc_cli.signal.plausible.quality import LIMITS, Size, clipped_share, strided_speed
+from opamc_cli.signal.plausible.quality import (
+    LIMITS,
+    Size,
+    clipped_share,
+    held_for,
+    strided_speed,
+)
 from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_scale
 from opamc_cli.signal.plausible.spikes import spikes
 from opamc_cli.stages.recordings.beyond import limited
@@ -38,6 +44,7 @@ def mistaken(run: Run, axis: int, recording: Recording) -> list[str]:
     notes = [
         *_sizes(run, axis, recording),
         *_clipped(run, axis, recording),
+        *_held(run, axis, recording),
         *_spiked(run, axis, recording),
         *missing(run, f"axis{axis}_position"),
         *_twice(run, axis, recording),
@@ -94,6 +101,21 @@ def _clipped(run: Run, axis: int, recording: Recording) -> list[str]:
         "beyond looks like an effect; check the sensor's range or the drive's limit"
         for name, share in shares.items()
         if share > CLIPPED
+    ]
+
+
+def _held(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say whether a current comes less often than the samples: what is late looks like an effect.
+
+    Of a position that does, hardly any sample counts, which is said where that is asked.
+    """
+    count = None if recording.current_a is None else held_for(recording.current_a)
+    if count is None:
+        return []
+    return [
+        f"{run.path}: axis{axis}_current holds each value for {count} samples, up to "
+        f"{count / recording.rate_hz:.2g} s late beside the rest, which looks like an effect; log "
+        "it as often"
     ]
 
 

@@ -172,6 +172,14 @@ def test_a_current_that_reaches_its_limit_is_said(model, capsys):
     assert "axis1_current is clipped in" in capsys.readouterr().err
 
 
+def test_a_current_that_comes_less_often_than_the_samples_is_said(model, capsys):
+    """An eccentric's was late by up to 0.1 s, and had the names of a payload and of a drag."""
+    held = np.repeat(OWN.current[::10], 10)
+    assert model(axis1_current=held, axis1_position=OWN.position) == 0
+    said = "axis1_current holds each value for 10 samples, up to 0.04 s late beside the rest"
+    assert said in " ".join(capsys.readouterr().err.split())
+
+
 def test_gravity_of_another_scale_is_said_where_no_effect_explains_it(model, tmp_path, capsys):
     code = model("close", "--quiet", axis1_current=OWN.current, axis1_position=OWN.position / 100)
     assert code == 0
