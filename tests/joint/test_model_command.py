@@ -591,6 +591,19 @@ def test_names_that_the_sealed_data_do_not_miss_are_doubted(everywhere, tmp_path
     assert ("quadratic_friction" in said) is False
 
 
+@pytest.mark.parametrize("power", [1, 3])
+def test_a_spring_that_nearly_cancels_gravity_is_doubted(power, tmp_path, capsys):
+    """Over a short travel both made up what a stop at its end asks, and the spring had a name."""
+    made = simulate(3, (), 5.0, rate=250.0, cycles=8)
+    way = made.position / np.abs(made.position).max()
+    current = made.current + 3 * np.std(made.current) * way**power
+    write_run(tmp_path / "run.parquet", 250.0, axis1_current=current, axis1_position=0.3 * way)
+    model = MODEL.replace("viscous]", "viscous, offset]")
+    assert close(tmp_path, "--quiet", model=model) in (0, 5)
+    said = capsys.readouterr().err
+    assert ("gravity and spring nearly cancel, each 3 times" in said) == (power == 3)
+
+
 def test_a_model_is_evaluated_on_the_joint_that_it_was_closed_on(tmp_path, capsys):
     """It was applied to every axis of a run, and one had r2 -61078 without a word."""
     made = [simulate(seed, (), rate=250.0, cycles=6) for seed in (3, 4)]

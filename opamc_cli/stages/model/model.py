@@ -71,6 +71,13 @@ ONE = (
     "axis {}: on this motion {} are one: their sum is known, each holds a part of it by chance; "
     "record it both ways and at other speeds before their values are used"
 )
+CANCEL = (
+    "axis {}: {} nearly cancel, each {:g} times the current's spread or more: over this travel "
+    "they are as one function, whose name is a guess; declare nothing that the joint lacks, or "
+    "move it further"
+)
+CANCELS = 3.0
+"""Spreads of the current from which on what an effect adds is there to cancel another."""
 UNMISSED = "axis {}: the sealed data do not miss {}: a guess until another recording shows it, too"
 ONCE = (
     "axis {}: no place is passed twice the same way, so friction at one may be whatever came at "
@@ -282,6 +289,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     unmissed = _unmissed(loop)
     if unmissed:
         doubts.append(UNMISSED.format(axis, ", ".join(unmissed)))
+    cancelling = _cancelling(loop.after)
+    if found & set(cancelling):
+        doubts.append(CANCEL.format(axis, " and ".join(cancelling), CANCELS))
     for names in sure.one:
         known = [name for name in names if not name.startswith("unnamed")]
         if len(known) > 1:
@@ -316,6 +326,18 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         spectrum=spectrum_table(axis, loop),
         extended=extended_model(model, laid, loop),
     )
+
+
+def _cancelling(closed: Fit) -> list[str]:
+    """Name the effects of the place that add far more than the current has, each against others."""
+    dataset, grid = closed.dataset, closed.dataset.fine
+    spread = float(np.std(grid.track.current_a[grid.parts.rows]))
+    added = {
+        term.effect.name: np.std(grid.parts.taken(dataset.columns(term, fine=True)) @ values)
+        for term, values in zip(closed.terms, closed.coefficients, strict=True)
+        if term.effect.domain == ANGLE
+    }
+    return sorted(name for name, size in added.items() if size > CANCELS * spread)
 
 
 def _unmissed(loop: Loop) -> list[str]:
