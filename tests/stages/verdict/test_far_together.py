@@ -136,3 +136,48 @@ def test_joints_that_a_payload_may_have_moved_are_no_sure_faults(cause, unsure):
     # what lies farther out than the payload's own joint stays a fault
     assert sorted(said) == unsure
     assert all("another payload, told by axis 2," in why for (why,) in said.values())
+
+
+def loaded(**changed):
+    """Of a handler whose part was half as heavy again, carried in two of eight motions."""
+    axes = {1: (6.3, 3.3), 2: (41.0, 15.5), 3: (142.0, 48.2), 4: (163.0, 58.2), 5: (1.2, 1.3)}
+    judged = verdict(*((index, 1e-6 if ratio > 3 else 0.3, 0.2) for index, ratio in axes.values()))
+    for entry in judged["axes"]:
+        entry["distance"]["ratio"] = axes[entry["axis"]][1]
+    judged["axes"][0]["excused"] = True
+    spring = {"effect": "spring", "origin": "joint", "explained": 0.7, "evidence": {}}
+    less = {**spring, "effect": "coulomb", "evidence": {"relative_change": -0.23}}
+    for entry, cause in zip(judged["axes"][2:4], (spring, less), strict=True):
+        entry |= {"state": "fault", "cause": cause}
+    judged["axes"][3] |= changed
+    return judged
+
+
+def test_what_a_part_looks_like_is_no_fault_where_most_others_moved():
+    found = not_sure(loaded(), ScoreConfig(), ())
+    assert sorted(found) == [2, 3, 4]
+    assert "axes 1-3 do, too, nearly as far" in found[4][0]
+    assert "no fault of one" in found[2][0]
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        # worn joints of strangers whose siblings had moved
+        {"distance": {"ratio": 200.0, "effect": 0.5}},
+        {"cause": {"effect": "coulomb", "evidence": {"relative_change": 0.3}}},
+        {"cause": {"effect": "position_drag", "evidence": {}}},
+        {"cause": {"effect": "ripple", "evidence": {}}},
+        {"cause": None},
+    ],
+)
+def test_a_joint_is_at_fault_by_what_no_part_looks_like(changed):
+    assert 4 not in not_sure(loaded(**changed), ScoreConfig(), ())
+
+
+def test_what_befell_one_night_of_a_joint_is_no_part():
+    judged = loaded()
+    judged["axes"][1]["session"] = "night 2026-03-12"
+    judged["axes"][0]["excused"] = False
+    judged["axes"][0]["p_adjusted"] = 0.5
+    assert 4 not in not_sure(judged, ScoreConfig(), ())

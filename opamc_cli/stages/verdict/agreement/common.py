@@ -6,9 +6,14 @@ from typing import Any
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
+from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.stages.verdict.brief import shaken_by
 from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside, logged
 from opamc_cli.storage.schemas.channels import axes_phrase
+
+NEARLY = 3.0
+"""Times as far as the farthest of the others: parts of another weight on a stranger's robots 0.7 to
+1.7, worn joints of three others beside as many that moved 4.1 and more."""
 
 
 def not_sure(
@@ -25,7 +30,9 @@ def not_sure(
     foreign
         Axes that cannot be compared at all, since their target is of another program or log.
     """
-    left = left_alone(verdict, far_together(verdict, limits), foreign) | under_payload(verdict)
+    far = far_together(verdict, limits)
+    left = left_alone(verdict, far, foreign) | under_payload(verdict)
+    left = carried(verdict, limits, far) | left
     return far_together(verdict, limits, left) | left
 
 
@@ -101,6 +108,59 @@ def under_payload(verdict: Mapping[str, Any]) -> dict[int, tuple[str, ...]]:
     }
 
 
+def carried(
+    verdict: Mapping[str, Any], limits: ScoreConfig, far: Collection[int]
+) -> dict[int, tuple[str, ...]]:
+    """Return the axes at fault by what a part of another weight may look like, with the reason.
+
+    One that a program carries in some of its motions is no constant load: a joint that feels it
+    seems to have less friction, a spring or a hysteresis. But most others, two at least, move, too,
+    and one of them nearly as far. Friction that grows, what is at one place, what a gear does fast,
+    or what has no name, is no part.
+
+    `far` are those of `far_together`.
+    """
+    axes = verdict["axes"]
+    moved = [one for one in axes if _moved(one, limits, far)]
+    if any(_unhealthy(one) and not _may_be_load(one["cause"], slow=True) for one in moved):
+        return {}
+    found = {}
+    for entry in moved:
+        others = [one for one in moved if one is not entry]
+        if entry["state"] != "fault" or not _may_be_load(entry["cause"]):
+            continue
+        most = len(others) >= 2 and 2 * len(others) >= len(axes)
+        if most and _ratio(entry) < NEARLY * max(map(_ratio, others)):
+            found[entry["axis"]] = (_CARRIED.format(axes_phrase([one["axis"] for one in others])),)
+    return found
+
+
+def _unhealthy(entry: Mapping[str, Any]) -> bool:
+    return entry["state"] in ("changed", "fault")
+
+
+def _moved(entry: Mapping[str, Any], limits: ScoreConfig, far: Collection[int]) -> bool:
+    """Whether a joint differs for sure, however little, in all of the target."""
+    p_value = entry.get("p_adjusted")
+    sure = p_value is not None and p_value <= limits.false_alarm_rate
+    differs = sure or entry.get("excused") or entry["axis"] in far or _unhealthy(entry)
+    return bool(differs) and "session" not in entry
+
+
+def _may_be_load(cause: Mapping[str, Any] | None, *, slow: bool = False) -> bool:
+    """Whether a load may look like a cause; `slow`: or it is slow at least."""
+    known = built_in_library().get((cause or {}).get("effect", ""))
+    if cause is None or known is None or known.fast:
+        return False
+    fell = (cause["evidence"].get("relative_change") or 0.0) < 0
+    grew = known.resists and known.domain != "joint-angle" and not fell
+    return slow or not (known.at_a_place or grew or lies_outside(cause))
+
+
+def _ratio(entry: Mapping[str, Any]) -> float:
+    return float(entry["distance"]["ratio"] or 0.0)
+
+
 def _where(entry: Mapping[str, Any]) -> str:
     return f"In {entry['session']} alone it" if "session" in entry else "It"
 
@@ -122,6 +182,11 @@ _COMMON = (
 _SHAKEN = (
     "and a joint at fault, axis {0}, may have shaken it, which would hide a fault of this one; see "
     "to axis {0} first, and record again."
+)
+_CARRIED = (
+    "It differs from the baseline, and {} do, too, nearly as far: a part or tool of another weight "
+    "in some of the motions does that, and would hide a fault; check what is carried, and record "
+    "again as for the baseline, or a new baseline."
 )
 _LEFT_ALONE = (
     "It differs from the baseline, but axes {}, half of the robot or more, cannot be compared or "
