@@ -144,14 +144,19 @@ def tell(
     standing_lines: list[str] = []
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
-        for joint in robot.alarms:
-            if joint.alarm and as_told(joint.alarm) in news:
-                lines += _alarm_lines("ALARM", robot, joint, out, cell)
-            elif (joint.axis, "reminder") in told:
-                lines += _alarm_lines("STILL UNDER ALARM", robot, joint, out, cell)
-            else:
-                place, text = _place(robot, joint), robot.text_of(joint)
-                standing_lines.append(f"{place}: alarm since {joint.since}, {text}")
+        for joints in _by_axis(robot.alarms):
+            new = [one for one in joints if one.alarm and as_told(one.alarm) in news]
+            first, *others = joints
+            if (first.axis, "reminder") in told or len(new) == len(joints):
+                how = "ALARM" if new else "STILL UNDER ALARM"
+                lines += _alarm_lines(how, robot, first, others, out, cell)
+                continue
+            before = [one for one in joints if one not in new]
+            lines += [f"{robot.name} axis {first.axis}: alarm{_also(robot, one)}" for one in new]
+            standing_lines += [
+                f"{_place(robot, one)}: alarm since {one.since}, {robot.text_of(one)}"
+                for one in before
+            ]
         said_now = any(e.robot == robot.name and e.kind in ("failed", "missing") for e in news)
         if robot.broken and not said_now:
             of = robot.failure
@@ -199,16 +204,35 @@ def tell(
 
 
 def _alarm_lines(
-    how: str, robot: RobotSummary, joint: JointSummary, out: Path, cell: Path
+    how: str,
+    robot: RobotSummary,
+    joint: JointSummary,
+    others: Sequence[JointSummary],
+    out: Path,
+    cell: Path,
 ) -> Iterator[str]:
+    """Tell a joint's alarm: of that program in which it lies farthest, the others a line each."""
     alarm = joint.alarm
     assert alarm is not None
     yield f"{_place(robot, joint)}: {how}, not as it was since {alarm.since}"
     yield f"  {robot.text_of(joint)}"
+    yield from (f" {_also(robot, one)}" for one in others)
     where = out / joint.report if joint.report else out / files.PAGE
     silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
     yield to_copy(f"  see {where}; silence it with: {silence}", [robot.name], cell)
     yield to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell)
+
+
+def _by_axis(alarms: Sequence[JointSummary]) -> list[list[JointSummary]]:
+    """Return each joint's alarms, of one program each, in order: one repair is for them all."""
+    found: dict[int, list[JointSummary]] = {}
+    for one in alarms:
+        found.setdefault(one.axis, []).append(one)
+    return list(found.values())
+
+
+def _also(robot: RobotSummary, joint: JointSummary) -> str:
+    return f" also in program {joint.program}, since {joint.since}: {robot.text_of(joint)}"
 
 
 def _place(robot: RobotSummary, joint: JointSummary) -> str:

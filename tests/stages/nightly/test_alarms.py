@@ -9,7 +9,7 @@ import pytest
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
-from opamc_cli.stages.nightly.morning import tell
+from opamc_cli.stages.nightly.morning import as_told, tell
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
 from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, Event, NightRow
@@ -347,7 +347,7 @@ def test_wear_that_the_weather_hides_from_the_effect_is_no_lack_of_a_trend():
     start = "at fault, changed by 20%; distance from the baseline grows by "
     assert text.startswith(start), text
     assert text.endswith(
-        "a night, the change too unevenly to say when it reaches fault level (40%)"
+        "a night, the change too unevenly to say when it reaches the 40% of a fault"
     )
     # what does not grow seldom seems to: the interval is one of 90 %
     still = [worn(0.0, 0.15, seed)[0] for seed in range(10)]
@@ -366,10 +366,12 @@ def test_few_nights_that_grow_by_more_than_nights_differ_grow():
     text, trend = said(0.4, 0.9, 1.4, 1.9)
     assert trend["distance"][0] == pytest.approx(0.5, abs=0.05)
     assert "distance from the baseline grows by 6" in text
-    assert text.endswith(" a night, too few nights to say when it reaches fault level (40%)")
+    assert text.endswith(" a night, too few nights to say when it reaches the 40% of a fault")
     # where the effect is there already there is nothing to reach
     text, trend = said(0.4, 0.9, 1.4, 1.9, effect=0.5)
-    start = "at fault, changed by 50%; at fault level (40%), distance from the baseline grows by 6"
+    start = (
+        "at fault, changed by 50%; beyond the 40% of a fault, distance from the baseline grows by 6"
+    )
     assert (text.startswith(start), trend["reach"]) == (True, [0, 0])
     assert said(0.0, 2.0, 2.1, 2.0) == (
         "at fault, changed by 0%; too few nights for a trend",
@@ -389,7 +391,8 @@ def test_a_step_is_no_growth_and_what_is_reached_is_not_forecast():
     }
     assert trend_phrase(grows | {"reach": [8, 80]}, 0.4).endswith("in 8 to 80 nights")
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4).endswith("in 8 nights at the earliest")
-    now = "now at fault level (40%), distance from the baseline grows by 11 % (5.1 to 22) a night"
+    grew = "distance from the baseline grows by 11 % (5.1 to 22) a night"
+    now = f"now beyond the 40% of a fault, {grew}"
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4, reached=True) == now
 
 
@@ -405,13 +408,14 @@ def test_a_sensors_step_is_forecast_no_more_than_nights_that_stay():
     (alarm,) = settled(series).alarms
     assert alarm.text == "at fault, changed by 30%; a step, no trend since"
     assert json.loads(alarm.trend)["reach"] is None
-    # back again it is at fault level no more, whatever level its nights had
+    # back again it is beyond it no more, whatever level its nights had
     for row in series[7:]:
         row["effect"] = 0.8
     series[-1]["effect"] = 0.02
     (alarm,) = settled(series).alarms
     assert (
-        alarm.text == "at fault, changed by 2%; was at fault level (40%) before, not in this night"
+        alarm.text
+        == "at fault, changed by 2%; was beyond the 40% of a fault before, not in this night"
     )
 
 
@@ -509,6 +513,39 @@ def test_a_joint_with_an_alarm_in_two_programs_is_one_joint():
     assert Summary((robot,)).headline() == "1 joint of 1 robot with an alarm"
 
 
+def test_a_joint_under_alarm_in_two_programs_is_told_once():
+    """It was two alarms of four lines, with the same two commands in both."""
+    alarms = {
+        program: AlarmRow("r1", program, 2, "2026-03-09", since, None, None, text, "{}")
+        for program, since, text in (("A", "2026-03-03", "at fault"), ("B", "2026-03-05", "worn"))
+    }
+    joints = tuple(
+        JointSummary(2, program, "fault", "2026-03-09", "", index, alarms[program])
+        for program, index in (("A", 50.0), ("B", 40.0))
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-09", "", "done"))
+
+    def morning(*events):
+        found = tell(Summary((robot,)), events, CellOutcome(), Path("out"), Path("cell.yaml"))
+        return found.lines, found.standing
+
+    stand = {program: as_told(alarm) for program, alarm in alarms.items()}
+    lines, standing = morning(*stand.values())
+    assert lines[:3] == (
+        "r1 axis 2, program A: ALARM, not as it was since 2026-03-03",
+        "  at fault",
+        "  also in program B, since 2026-03-05: worn",
+    )
+    assert (len(lines), standing) == (5, ())
+    # where the other one was told some mornings before
+    lines, standing = morning(stand["B"])
+    assert lines == ("r1 axis 2: alarm also in program B, since 2026-03-05: worn",)
+    assert standing == ("r1 axis 2, program A: alarm since 2026-03-03, at fault",)
+    reminder = Event("2026-03-09", "r1", 2, "reminder", "")
+    assert morning(reminder)[0][0].startswith("r1 axis 2, program A: STILL UNDER ALARM")
+    assert len(morning(reminder)[0]) == 5
+
+
 def single(*rows):
     """Return when and how it is said of a joint that it was not as it was in single nights."""
     return [(one.time[-5:], one.kind, one.text) for one in settled(rows).events]
@@ -567,7 +604,7 @@ def test_large_faults_that_come_back_are_an_alarm_that_says_so():
     told = [one for one in settled(rows).events if one.kind == "alarm"]
     assert [one.text for one in told] == [
         "axis 2: at fault, changed by 50%; comes and goes, in 3 nights until 2026-03-09; "
-        "now at fault level (40%), no trend"
+        "now beyond the 40% of a fault, no trend"
     ]
 
 

@@ -88,7 +88,7 @@ def trend_phrase(
     """
     if not trend:
         return "too few nights for a trend"
-    reach, level = trend["reach"], f"fault level ({limit:.0%})"
+    reach, level = trend["reach"], f"the {limit:.0%} of a fault"
     farther = "a step, no trend since" if trend.get("step") else "no trend"
     if trend["distance"][1] > LEAP:
         farther = "distance from the baseline has leapt"
@@ -96,14 +96,14 @@ def trend_phrase(
         usual, least, most = (_percent(one) for one in trend["distance"])
         farther = f"distance from the baseline grows by {usual} % ({least} to {most}) a night"
     if reach != [0, 0] and reached:
-        return f"now at {level}, {farther}"
+        return f"now beyond {level}, {farther}"
     if reach == [0, 0] and fallen:
-        return f"was at {level} before, not in this night"
+        return f"was beyond {level} before, not in this night"
     if reach == [0, 0]:
         grows = farther
         if trend.get("low", 0) > 0:
             grows = f"grows by {100 * trend['per_night']:.2g} points a night"
-        return f"at {level}, {grows}"
+        return f"beyond {level}, {grows}"
     if reach is None:
         why = "the change too unevenly" if "level" in trend else "too few nights"
         unsure = f", {why} to say when it reaches {level}"
