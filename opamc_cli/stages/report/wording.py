@@ -4,6 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from opamc_cli.joint.effects.library import in_words
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.stages.verdict.brief import by_far
 from opamc_cli.stages.verdict.reasons import (
@@ -174,11 +175,12 @@ def likely_cause(entry: Mapping[str, Any]) -> list[str]:
     cause = entry.get("cause")
     if not cause:
         return []
-    named = f"{_meaning(cause)[0]}, by {effect_phrase(cause)}"
+    by = f", by {effect_phrase(cause)}" if cause.get("parameters") else ""
+    named = f"{_meaning(cause)[0]}{by}"
     told = [share_phrase(cause) or ""]
     ties = [str(tie) for tie in cause.get("ties", ())]
     if ties:
-        told.append(f"the recordings cannot tell it from {', '.join(ties)}")
+        told.append(f"the recordings cannot tell it from {', '.join(map(in_words, ties))}")
     return [named[:1].upper() + named[1:], *(each for each in told if each)]
 
 

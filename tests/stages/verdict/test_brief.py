@@ -11,7 +11,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report import wording
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.brief import brief, foremost
+from opamc_cli.stages.verdict.brief import _tie, brief, foremost
 from opamc_cli.storage.sources import other_conditions
 
 
@@ -237,3 +237,10 @@ def test_a_size_of_1_01_times_is_said_last(ratio, first):
     told = brief(judged, Bundle([], cells), None)["evidence"]
     sizes = [n for n, text in enumerate(told) if "times the baseline's" in text]
     assert sizes == ([0] if first == "amplitude" else [1])
+
+
+def test_what_a_cause_is_not_told_from_is_said_in_words():
+    """It was `sublinear_friction`, in the engineer's mail."""
+    assert _tie({"ties": ["sublinear_friction", "coulomb"]}).endswith(
+        "from: shear-thinning or starved lubricant."
+    )
