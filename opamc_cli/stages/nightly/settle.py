@@ -15,6 +15,7 @@ from opamc_cli.decision.trend.chart import LIMIT
 from opamc_cli.stages.nightly.alarms.commands import ACKNOWLEDGE
 from opamc_cli.stages.nightly.alarms.not_judged import said_in
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
+from opamc_cli.stages.nightly.inputs.recordings import some
 from opamc_cli.stages.nightly.plan.baselines import NIGHTS_AGAIN
 from opamc_cli.stages.nightly.publish.metrics import write_metrics
 from opamc_cli.stages.nightly.publish.page import write_page
@@ -184,6 +185,9 @@ def _missing(
                 weeks = min(_weeks_before(one, lacking, own) for one in gap)
                 if weeks == REST_WEEKS - 1:
                     text += f", as in the {weeks} weeks before; this weekday is not said again"
+                days = {one[5:] for one in gap}
+                if years := sorted(one for one in own if one[5:] in days and one < gap[0]):
+                    text += f"; it has files of {some(years)}: is its clock a year off?"
                 if not night:
                     text += f"; {HOW_TO_END}"
                 # a free Saturday is no news that the robot is dead on Monday, too

@@ -589,3 +589,10 @@ def test_a_file_that_the_system_refuses_to_read_is_not_remembered(tmp_path):
     sha256, facts = read_facts(LogFile(str(tmp_path), "r1", None, 0, 0), tmp_path)
     assert sha256 == ""
     assert "cannot be read" in facts.error
+
+
+def test_a_robot_without_files_whose_clock_is_a_year_off_is_told_so():
+    """Its night was judged, and kept as one of last year's, without a word."""
+    told = "; it has files of 2025-03-11: is its clock a year off?"
+    said = missing([-355, *range(10), *range(11, 70)])
+    assert said == [("2026-03-11", f"no file of 2026-03-11; others have some{told}")]
