@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 FILE_NAME = re.compile(r"\S.*\.[A-Za-z]\w{0,7}")
 """What a sentence about a recording begins with."""
 
+MOST_NAMES = 3
+"""Of recordings that fail as the first one does."""
+
 
 @dataclass(frozen=True)
 class Output:
@@ -78,7 +81,7 @@ class Output:
 
     def failures(self, failures: Sequence[str], n_done: int) -> ExitCode:
         """Print the runs that failed and return the exit code that they make."""
-        for failure in failures:
+        for failure in gathered(failures):
             self.failure(failure)
         if failures and n_done:
             self.note(
@@ -106,6 +109,32 @@ def _rendered(shown: "Sequence[RenderableType]") -> str:
     for item in shown:
         console.print(item, soft_wrap=isinstance(item, str))
     return text.getvalue()
+
+
+def gathered(failures: Sequence[str]) -> list[str]:
+    """Return failures with one line for all files that fail alike, which it names.
+
+    A logger whose columns have new names says so of each of a night's files.
+
+    Examples
+    --------
+    >>> gathered([f"{name}.csv: 3 columns of {n}" for n, name in enumerate("abcde")])
+    ['a.csv: 3 columns of 0; likewise b.csv, c.csv, d.csv and 1 more']
+    >>> gathered(["a.csv: cut off", "b.csv: no rate"])
+    ['a.csv: cut off', 'b.csv: no rate']
+    """
+    groups: dict[str, list[str]] = {}
+    for text in dict.fromkeys(failures):
+        subject, _, rest = text.partition(": ")
+        own = re.sub(r"[0-9]+", "#", rest) if FILE_NAME.fullmatch(subject) else text
+        groups.setdefault(own, []).append(text)
+    lines = []
+    for first, *others in groups.values():
+        names = [text.partition(": ")[0] for text in others]
+        more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
+        likewise = f"; likewise {', '.join(names[:MOST_NAMES])}{more}" if names else ""
+        lines.append(first + likewise)
+    return lines
 
 
 def folded(texts: Sequence[str]) -> list[str]:
