@@ -69,6 +69,8 @@ def read_values(
                 msg = f"--set {override}: a bracket is open; write {key}={text}{missing}"
             else:
                 msg = f"--set {shown(override)}: the value is not YAML ({error})"
+                if text in (",", "|"):  # signs that separate columns, and mean something in YAML
+                    msg += f"; write --set '{key}=\"{text}\"'"
             raise ConfigError(msg) from error
         _set(values, key.split("."), value, override)
     return values

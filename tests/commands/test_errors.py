@@ -80,6 +80,7 @@ def test_config_files(opamc, tmp_path, text, parts):
         ("patterns.gama=1", "did you mean 'gamma'"),
         ("patterns.gamma={:", "write patterns.gamma={:}"),
         ("patterns.gamma=]", "the value is not YAML"),
+        ("decimal=,", """write --set 'decimal=","'"""),
         ("patterns.orders=[4,5", "a bracket is open; write patterns.orders=[4,5]"),
         ("patterns.orders=9", "it takes a list, such as patterns.orders=[4,5]"),
         ("patterns.orders=4-5", "it takes a list, such as patterns.orders=[4,5]"),

@@ -169,6 +169,7 @@ def test_a_large_file_is_the_same_as_its_rows(tmp_path):
         (b"a,b\n1,\n3,\n", "column axis1_a (source 'b') has no value in 2 rows"),
         (b"a,b,\xff\n1,2,3\n", "is not text in utf-8"),
         (gzip.compress(b"a,b\n1,2\n", mtime=0), "is compressed by gzip; give it a name that"),
+        ("a,b\n1,2\n".encode("utf-16"), "set encoding, such as utf-16,"),
         (b"PK\x03\x04\x14\x00\xff\xff", "is a zip archive, as spreadsheets (.xlsx) are"),
         (b'a,b\n"1,2\n3,4\n', "r.csv"),
         (b"\x00\x01\x02\x03" * 50, "r.csv"),
@@ -183,6 +184,14 @@ def test_unusable_tables_are_refused(tmp_path, content, expected):
     assert message.startswith(str(file))
     assert "\n" not in message
     assert not list((tmp_path / "out").glob("*.par*"))
+
+
+def test_what_is_compressed_twice_is_called_that(tmp_path):
+    """It was no text in utf-8, and latin-1 was offered."""
+    file = tmp_path / "r.csv.gz"
+    file.write_bytes(gzip.compress(gzip.compress(b"a,b\n1,2\n")))
+    text = "sampling_rate_hz: 10\ncolumns: {axis1_a: {source: b, unit: A}}"
+    assert "is compressed twice by gzip" in refusal(run_map(tmp_path, text, [file]))
 
 
 def test_decimal_commas_read_with_points_are_refused(tmp_path):

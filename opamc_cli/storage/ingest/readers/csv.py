@@ -3,6 +3,7 @@
 Rows are parsed block by block, so that a recording of gigabytes does not need gigabytes.
 """
 
+import codecs
 import csv
 import io
 import re
@@ -238,9 +239,15 @@ class CsvSource:
             return InputError(
                 f"{self.path}: is a zip archive, as spreadsheets (.xlsx) are; save it as text (CSV)"
             )
+        held = error.object[:4] if isinstance(error.object, bytes) else b""
+        if self.path.suffix == ".gz" and held.startswith(GZIP):
+            return InputError(f"{self.path}: is compressed twice by gzip; unpack it once")
+        near = (
+            "utf-16" if held.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "latin-1"
+        )
         return InputError(
             f"{self.path}: is not text in {self._map.encoding} (byte {error.start} cannot be "
-            "decoded); set encoding, such as latin-1, in the map"
+            f"decoded); set encoding, such as {near}, in the map"
         )
 
 
