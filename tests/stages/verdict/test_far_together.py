@@ -39,6 +39,16 @@ def test_joints_that_are_far_together_are_no_small_changes():
     assert all("other joints lie as far" in why for (why,) in found.values())
 
 
+def test_a_joint_that_is_far_beside_others_that_moved_has_no_sensor_to_check():
+    """A palletizer's heavier parts: one of its four joints was to have its sensor looked at."""
+    judged = verdict((40.0, 1e-9, 0.05), (9.0, 1e-4, 0.2), (8.0, 1e-4, 0.2), (1.0, 0.5, 0.0))
+    for entry in judged["axes"][1:3]:
+        entry["excused"] = True
+    assert "other joints have moved, too" in far_together(judged, ScoreConfig())[1][0]
+    judged["axes"][1]["excused"] = judged["axes"][2]["excused"] = False
+    assert "is 5.0%, less than" in far_together(judged, ScoreConfig())[1][0]
+
+
 def test_joints_that_are_far_beside_one_at_fault_name_it():
     """Beside a cracked joint the others were told that this is no fault of one."""
     shaken = robot(a=("h", 60), b=("f", 9000), c=("f", 9900), d=("h", 1))

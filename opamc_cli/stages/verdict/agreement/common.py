@@ -1,7 +1,7 @@
 """Joints that are far from the baseline together: common, but neither healthy nor at fault."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from opamc_cli.config.models import ScoreConfig
@@ -55,7 +55,7 @@ def far_together(
         entry["axis"]: (
             f"{_where(entry)} lies {entry['health_index']:.3g} of the baseline's own spreads from "
             f"the baseline{logged(entry.get('warmer_c'))}, "
-            + (together if len(far) > 1 else _alone(entry, limits)),
+            + (together if len(far) > 1 else _alone(entry, verdict["axes"], limits)),
         )
         for entry in verdict["axes"]
         if entry["state"] == "healthy" and entry["axis"] in far
@@ -165,8 +165,11 @@ def _where(entry: Mapping[str, Any]) -> str:
     return f"In {entry['session']} alone it" if "session" in entry else "It"
 
 
-def _alone(entry: Mapping[str, Any], limits: ScoreConfig) -> str:
+def _alone(entry: Mapping[str, Any], axes: Sequence[Mapping[str, Any]], limits: ScoreConfig) -> str:
     """Say why a joint that is far out by itself was not called changed."""
+    moved = sum(bool(one.get("excused")) for one in axes)
+    if moved and 2 * moved >= len(axes) - 1:  # as a part of another weight does
+        return _MOST_MOVED
     effect = (entry.get("distance") or {}).get("effect")
     certain = (entry.get("p_adjusted") or 0.0) <= limits.false_alarm_rate
     if certain and effect is not None and effect < limits.minimum_effect:
@@ -178,6 +181,10 @@ _COMMON = (
     "and other joints lie as far: what moves several so far is no fault of one, but would hide it; "
     "check temperature, payload, program, speed, unit, sensors and clock, and record again, or a "
     "new baseline."
+)
+_MOST_MOVED = (
+    "and other joints have moved, too, if not as far: what moves several is no fault of one, but "
+    "would hide it; check payload, temperature and program, and record again, or a new baseline."
 )
 _SHAKEN = (
     "and a joint at fault, axis {0}, may have shaken it, which would hide a fault of this one; see "
