@@ -144,7 +144,7 @@ def tell(
     standing_lines: list[str] = []
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
-        for joints in _by_axis(robot.alarms):
+        for joints in robot.alarms_by_joint:
             new = [one for one in joints if one.alarm and as_told(one.alarm) in news]
             first, *others = joints
             if (first.axis, "reminder") in told or len(new) == len(joints):
@@ -221,14 +221,6 @@ def _alarm_lines(
     silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
     yield to_copy(f"  see {where}; silence it with: {silence}", [robot.name], cell)
     yield to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell)
-
-
-def _by_axis(alarms: Sequence[JointSummary]) -> list[list[JointSummary]]:
-    """Return each joint's alarms, of one program each, in order: one repair is for them all."""
-    found: dict[int, list[JointSummary]] = {}
-    for one in alarms:
-        found.setdefault(one.axis, []).append(one)
-    return list(found.values())
 
 
 def _also(robot: RobotSummary, joint: JointSummary) -> str:

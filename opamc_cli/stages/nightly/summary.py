@@ -154,6 +154,14 @@ class RobotSummary:
         found = [joint for joint in self.joints if joint.shown == "alarm"]
         return sorted(found, key=_worst_first)
 
+    @property
+    def alarms_by_joint(self) -> list[list[JointSummary]]:
+        """Alarms of each joint, of one program each, in their order: one repair is for them all."""
+        found: dict[int, list[JointSummary]] = {}
+        for one in self.alarms:
+            found.setdefault(one.axis, []).append(one)
+        return list(found.values())
+
     def text_of(self, joint: JointSummary) -> str:
         """Return what is said of a joint's alarm: a joint at fault shakes the others."""
         assert joint.alarm is not None
@@ -253,7 +261,7 @@ class Summary:
         if not self.robots:
             return "No robot has been looked at yet"
         counts = Counter(one.shown for one in self.robots)
-        n_alarms = sum(len({joint.axis for joint in one.alarms}) for one in self.robots)
+        n_alarms = sum(len(one.alarms_by_joint) for one in self.robots)
         parts = []
         if n_alarms:
             joints = "joint" if n_alarms == 1 else "joints"

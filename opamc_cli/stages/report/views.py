@@ -63,7 +63,9 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
         "p_adjusted": entry.get("p_adjusted"),
         "features": features,
         "cause": wording.cause_phrase(entry.get("cause")),
-        "effect": wording.effect_phrase(entry["cause"]) if entry.get("cause") else "–",
+        "effect": wording.effect_phrase(entry["cause"]).replace("_", " ")
+        if entry.get("cause")
+        else "–",
         "reasons": reasons,
         "advice": wording.advice(entry),
         "since": _since(find_onset(inputs, axis, focus.order[axis])),

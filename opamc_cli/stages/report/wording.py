@@ -135,8 +135,9 @@ def share_phrase(cause: Mapping[str, Any]) -> str | None:
     share = cause.get("explained", cause.get("share"))
     if not isinstance(share, int | float) or isinstance(share, bool):
         return None
-    left = max(1 - share, 0.0)
-    return f"explains {share:.0%} of the change; {left:.0%} remains unexplained"
+    left = f"{max(1 - share, 0.0):.0%}"
+    unexplained = "" if left == "0%" else f"; {left} remains unexplained"
+    return f"explains {share:.0%} of the change{unexplained}"
 
 
 def inspection(entry: Mapping[str, Any]) -> str | None:

@@ -9,7 +9,7 @@ import pytest
 from browser import browse, needs_browser
 
 from opamc_cli.stages.nightly.publish.page import render
-from opamc_cli.stages.nightly.summary import summarise
+from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary, summarise
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import AlarmRow, Event, MeasureRow, NightRow, VerdictRow
 
@@ -139,3 +139,20 @@ def test_a_phone_shows_since_when_of_alarms_alone(page, tmp_path):
     copy.write_text(page.read_text(encoding="utf-8").replace("</body>", told), encoding="utf-8")
     dom = browse(tmp_path, copy, "--window-size=500,900", "--dump-dom")
     assert f"<title>1{'0' * 17}</title>" in dom
+
+
+def test_a_joint_under_alarm_in_two_programs_is_one_card(page):
+    name = "two programs"
+    alarms = {
+        program: AlarmRow(name, program, 2, NIGHTS[-1], NIGHTS[9], None, None, text, "{}")
+        for program, text in (("A", "at fault"), ("B", "worn"))
+    }
+    joints = tuple(
+        JointSummary(2, program, "fault", NIGHTS[-1], "", index, alarms[program])
+        for program, index in (("A", 50.0), ("B", 40.0))
+    )
+    robot = RobotSummary(name, joints, NightRow(name, NIGHTS[-1], "", "done"))
+    with History(page.parent / "history.sqlite") as history:
+        text = render(history, Summary((robot,)))
+    assert text.count('class="card fault-edge"') == 1
+    assert f"also in B, since {NIGHTS[9]}: worn" in text

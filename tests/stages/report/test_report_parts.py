@@ -254,3 +254,14 @@ def test_each_added_effect_has_a_panel_and_nothing_else_has(monkeypatch, count):
     drawn = partial_residuals.figure(SimpleNamespace(unit="A"), 1)
     assert drawn.svg.count(">speed (rad/s)<") == count
     assert drawn.svg.count("<clipPath") == count
+
+
+def test_a_likely_cause_is_told_in_words_without_what_nobody_needs():
+    """It was "..., by sublinear_friction; 0% remains unexplained; ... from thermal_viscous"."""
+    cause = {"effect": "sublinear_friction", "interpretation": "friction: check grease"}
+    told = wording.likely_cause({"cause": cause | {"explained": 1.0, "ties": ["coulomb"]}})
+    assert told == [
+        "Friction",
+        "explains 100% of the change",
+        "the recordings cannot tell it from dry friction of bearings and seals",
+    ]
