@@ -146,10 +146,10 @@ def tell(
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
         for joints in robot.alarms_by_joint:
             new = [one for one in joints if one.alarm and as_told(one.alarm) in news]
-            first, *others = joints
+            first, *again = joints
             if (first.axis, "reminder") in told or len(new) == len(joints):
                 how = "ALARM" if new else "STILL UNDER ALARM"
-                lines += _alarm_lines(how, robot, first, others, out, cell)
+                lines += _alarm_lines(how, robot, first, again, out, cell)
                 continue
             before = [one for one in joints if one not in new]
             lines += [f"{robot.name} axis {first.axis}: alarm{_also(robot, one)}" for one in new]

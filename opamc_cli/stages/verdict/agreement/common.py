@@ -124,7 +124,7 @@ def carried(
     moved = [one for one in axes if _moved(one, limits, far)]
     if any(_unhealthy(one) and not _may_be_load(one["cause"], slow=True) for one in moved):
         return {}
-    found = {}
+    found: dict[int, tuple[str, ...]] = {}
     for entry in moved:
         others = [one for one in moved if one is not entry]
         if entry["state"] != "fault" or not _may_be_load(entry["cause"]):
