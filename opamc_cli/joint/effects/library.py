@@ -76,18 +76,6 @@ def built_in_library(without: tuple[str, ...] = ()) -> Library:
     return {effect.name: effect() for effect in BUILT_IN if effect.name not in without}
 
 
-def in_words(name: str) -> str:
-    """Say to a maintainer what an effect is; what is none of the library is said as it stands.
-
-    Examples
-    --------
-    >>> in_words("coulomb"), in_words("kinematic error, twice a turn")
-    ('dry friction of bearings and seals', 'kinematic error, twice a turn')
-    """
-    known = built_in_library().get(name)
-    return name.replace("_", " ") if known is None else known.meaning.partition(": ")[0]
-
-
 def effect_named(library: Library, name: str) -> Effect:
     """Look an effect up; a ConfigError names the nearest one where the library has no such."""
     if name in library:

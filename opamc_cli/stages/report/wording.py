@@ -4,13 +4,13 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from opamc_cli.joint.effects.library import in_words
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.stages.verdict.brief import by_far
 from opamc_cli.stages.verdict.reasons import (
     CHECK_FIRST,
     FOUND,
     INSPECT,
+    effect_in_words,
     excuses_little,
     lies_outside,
 )
@@ -181,7 +181,7 @@ def likely_cause(entry: Mapping[str, Any]) -> list[str]:
     told = [share_phrase(cause) or ""]
     ties = [str(tie) for tie in cause.get("ties", ())]
     if ties:
-        told.append(f"the recordings cannot tell it from {', '.join(map(in_words, ties))}")
+        told.append(f"the recordings cannot tell it from {', '.join(map(effect_in_words, ties))}")
     return [named[:1].upper() + named[1:], *(each for each in told if each)]
 
 

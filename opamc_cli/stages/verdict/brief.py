@@ -9,7 +9,6 @@ from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
-from opamc_cli.joint.effects.library import in_words
 from opamc_cli.stages.verdict.reasons import (
     COMMON,
     CURRENT_LAG,
@@ -18,6 +17,7 @@ from opamc_cli.stages.verdict.reasons import (
     OF_SENSORS,
     SENSOR_NOISE,
     SMALLER_PART,
+    effect_in_words,
     excuses_little,
     explains_little,
     lies_outside,
@@ -273,7 +273,7 @@ def _tie(cause: Mapping[str, Any] | None) -> str:
     known = cause or {}
     if not known.get("ties") or not OF_SENSORS.isdisjoint(known.get("evidence", ())):
         return ""
-    return f"The recordings cannot tell it from: {in_words(known['ties'][0])}."
+    return f"The recordings cannot tell it from: {effect_in_words(known['ties'][0])}."
 
 
 def _besides(others: Sequence[Mapping[str, Any]]) -> str:

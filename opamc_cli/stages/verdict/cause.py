@@ -20,7 +20,7 @@ from opamc_cli.errors import NotEnoughDataError, OpamcError
 from opamc_cli.joint.change.explain import SMALLEST_SHARE, Change, explain_change
 from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION, SCALE
-from opamc_cli.joint.effects.library import Library, built_in_library, in_words
+from opamc_cli.joint.effects.library import Library, built_in_library
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
 from opamc_cli.signal.motion.reported import unwrapped
@@ -35,6 +35,7 @@ from opamc_cli.stages.verdict.reasons import (
     IN_SPIKES,
     IN_THE_SUM,
     SENSOR_NOISE,
+    effect_in_words,
     excuses_little,
     lies_outside,
 )
@@ -509,7 +510,7 @@ def _why(cause: Cause, change: Change) -> list[str]:
     )
     if cause.ties:
         sentences.append(
-            f"The recordings cannot tell it from: {'; '.join(map(in_words, cause.ties))}."
+            f"The recordings cannot tell it from: {'; '.join(map(effect_in_words, cause.ties))}."
         )
     for other in change.causes[1:]:
         name = _effect_name(other).lower()
@@ -527,5 +528,5 @@ def _why(cause: Cause, change: Change) -> list[str]:
 
 
 def _effect_name(cause: Cause) -> str:
-    name = in_words(cause.effect)
+    name = effect_in_words(cause.effect)
     return name[0].upper() + name[1:]

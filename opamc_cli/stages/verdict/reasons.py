@@ -13,6 +13,7 @@ from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_
 from opamc_cli.decision.witnesses.patterns import Cell, effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change
+from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.sources import RunSource, current_unit
 
@@ -154,6 +155,18 @@ def is_small(judgement: Judgement, limits: ScoreConfig) -> bool:
     if judgement.state != "healthy":
         return False
     return max(judgement.p_adjusted, judgement.p_alone) <= limits.false_alarm_rate
+
+
+def effect_in_words(name: str) -> str:
+    """Say to a maintainer what an effect is; what is none of the library is said as it stands.
+
+    Examples
+    --------
+    >>> effect_in_words("coulomb"), effect_in_words("kinematic error, twice a turn")
+    ('dry friction of bearings and seals', 'kinematic error, twice a turn')
+    """
+    known = built_in_library().get(name)
+    return name.replace("_", " ") if known is None else known.meaning.partition(": ")[0]
 
 
 def lies_outside(cause: Mapping[str, Any]) -> bool:
