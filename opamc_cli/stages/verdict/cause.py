@@ -257,7 +257,7 @@ def _recordings(
                 found.append(interpolated(recording, LEAST_HZ))
             noise = _fluctuation(recording, start, strokes.get(source.name, ()))
             noises += [] if noise is None else [noise]
-            current = recording.current_a if recording.phases_a is None else recording.phases_a
+            current = _current(recording)
             added = None if current is None else sensor_errors(current, recording.rate_hz)
             wrong += [] if added is None else [added]
             along.append(_courses(recording))
@@ -267,10 +267,14 @@ def _recordings(
     return found, noises, wrong, along, errors
 
 
+def _current(recording: Recording) -> Floats | None:
+    """Return a recording's phases, (n, 3), or without them its reported current."""
+    return recording.current_a if recording.phases_a is None else recording.phases_a
+
+
 def _courses(recording: Recording) -> list[Course]:
     """Return a recording's courses; none where no position is logged."""
-    phases, position = recording.phases_a, recording.position_rad
-    current = recording.current_a if phases is None else phases
+    current, position = _current(recording), recording.position_rad
     if current is None or position is None:
         return []
     return courses(current, position, recording.rate_hz)
@@ -301,8 +305,7 @@ def _fluctuation(recording: Recording, start: int, strokes: Spans) -> Fluctuatio
         for first, last in strokes:
             moves[max(first - start, 0) : max(last - start, 0)] = 1.0
         position = np.cumsum(moves)
-    phases = recording.phases_a
-    current = recording.current_a if phases is None else phases
+    current = _current(recording)
     return None if current is None else fluctuation(current, position, recording.rate_hz)
 
 
@@ -404,7 +407,7 @@ def _of_spikes(grown: ErrorGrowth) -> dict[str, Any]:
 
 
 def _sensor(
-    effect: str, meaning: str, share: float, evidence: Mapping[str, float], why: str
+    effect: str, meaning: str, share: float, evidence: Mapping[str, float], *why: str
 ) -> dict[str, Any]:
     """Return a cause that makes a joint neither healthy nor faulty."""
     return {
@@ -420,7 +423,7 @@ def _sensor(
         "explained": share,
         "clear": False,
         "evidence": dict(evidence),
-        "why": [why],
+        "why": [*why],
         "others": [],
     }
 
@@ -442,22 +445,10 @@ def _of_lag(lag: Lag, found: Mapping[str, Any] | None) -> dict[str, Any]:
     ]
     if rest:
         why += ["With the current moved back:", *(found or {})["why"]]
-    return {
-        "effect": CURRENT_LAG,
-        "domain": "time",
-        "parameters": {"delay_s": lag.lag_s},
-        "interpretation": f"{late} than in the baseline: look at the logger, its bus and the drive",
-        "share": lag.share,
-        "p_value": None,
-        "ties": [],
-        "harmless": False,
-        "origin": "measurement",
-        "explained": lag.share,
-        "clear": False,
-        "evidence": {"delay_s": lag.lag_s, "baseline_delay_s": lag.of_baseline_s},
-        "why": why,
-        "others": rest,
-    }
+    told = f"{late} than in the baseline: look at the logger, its bus and the drive"
+    evidence = {"delay_s": lag.lag_s, "baseline_delay_s": lag.of_baseline_s}
+    cause = _sensor(CURRENT_LAG, told, lag.share, evidence, *why)
+    return {**cause, "parameters": {"delay_s": lag.lag_s}, "others": rest}
 
 
 def meaning(effect: str, own: str, ties: Sequence[str], change: float | None) -> str:
