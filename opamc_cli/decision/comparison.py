@@ -30,6 +30,7 @@ from opamc_cli.decision.witnesses.evidence import (
 )
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 Voice = tuple[str, Kind]
 """A witness and one of its two distances."""
 
@@ -71,16 +72,6 @@ class Shift:
     """Standard deviation of a healthy session's log distance."""
     spread: Spread
     """Standard deviation of `log_ratio` if nothing has changed."""
-
-
-@dataclass(frozen=True)
-class Exchange:
-    """How sessions are exchanged between baseline and target."""
-
-    permutations: int
-    """Most relabellings evaluated."""
-    seed: int
-    """Of the draw if there are more."""
 
 
 @dataclass(frozen=True)
@@ -143,11 +134,11 @@ def compare_sessions(
         own = {axis: joint for axis, joint in joints.items() if voice in joint.voices}
         shifts[voice] = _shifts(own, voice)
     scales = scales_of(joints.values())
-    exchange = Exchange(permutations, seed)
     unusual = {axis: joint.unusual() for axis, joint in joints.items()}
     found = {}
     for axis, joint in joints.items():
         own_shifts = {voice: shifts[voice][axis] for voice in joint.voices}
+        labels = relabellings(*sessions[axis], permutations, seed)
         foreign = FOREIGN_CONDITIONS * of_siblings(unusual, axis)
         shared = {
             voice: common_log_ratio(shifts[voice], axis, largest=voice[1] == "score")
@@ -159,10 +150,10 @@ def compare_sessions(
             for voice in joint.voices
         }
         tails = joint.tails(own_shifts, {})
-        p_value = joint.p_value(own_shifts, {}, scales, exchange)
+        p_value = joint.p_value(own_shifts, {}, scales, labels)
         p_alone = p_value
         if any(taken_off.values()):
-            p_alone = max(p_value, joint.p_value(own_shifts, taken_off, scales, exchange))
+            p_alone = max(p_value, joint.p_value(own_shifts, taken_off, scales, labels))
         together = joint.together(own_shifts, {})
         common, allowed = (
             max(together.log_ratio - joint.together(own_shifts, off).log_ratio, 0.0)
@@ -323,14 +314,14 @@ class Joint:
         shifts: Mapping[Voice, Shift],
         taken_off: Mapping[Voice, float],
         scales: Mapping[Voice, float],
-        exchange: Exchange,
+        labels: BoolArray,
     ) -> float:
         """Probability of such distances, after some of them is taken off; NaN if unknown."""
         if not self.voices:
             return math.nan
         tail = self.combined(self.tails(shifts, taken_off))
         if self.n_target > 1:
-            return self._p_by_exchange(tail, taken_off, exchange)
+            return self._p_by_exchange(tail, taken_off, labels)
         places = self.places(scales, taken_off)
         above = int((places[:-1] >= places[-1]).sum())
         gaps, place = places[:-1] - np.median(places), float(places[-1] - np.median(places))
@@ -355,9 +346,8 @@ class Joint:
         return soft_maximum(np.array(rows), self.weights(self.voices))
 
     def _p_by_exchange(
-        self, tail: float, taken_off: Mapping[Voice, float], exchange: Exchange
+        self, tail: float, taken_off: Mapping[Voice, float], labels: BoolArray
     ) -> float:
-        labels = relabellings(self.n_baseline, self.n_target, exchange.permutations, exchange.seed)
         if self._labelled is None:
             by_witness = {
                 name: labelled_distances(self._evidence[name], labels)
