@@ -16,11 +16,9 @@ from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
 from opamc_cli.stages.verdict import findings, verdict
-from opamc_cli.stages.verdict.agreement.common import not_sure
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
-from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
-from opamc_cli.stages.verdict.agreement.unjudged import refuse_all, with_reasons
+from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
@@ -193,7 +191,7 @@ def _diagnose(
             watch(done, len(differing))
             times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
             try:
-                found = cause.explain(
+                named = cause.explain(
                     axis,
                     decided.baseline_sources(axis),
                     decided.target_sources(axis),
@@ -213,7 +211,7 @@ def _diagnose(
                 notes.append(f"axis {axis}: no cause could be sought ({error})")
                 continue
             # empty: sought in vain
-            causes[axis] = found if found.get("explained", 0.0) >= LEAST_SHARE else {}
+            causes[axis] = named if named.get("explained", 0.0) >= LEAST_SHARE else {}
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,
@@ -229,13 +227,6 @@ def _diagnose(
     sources = (*sides.baseline.sources, *sides.target.sources)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
     tables = [name for name in FILES if name.endswith(".parquet")]
-
-    def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        unsure = not_sure(judged, config.score, unjudged.foreign)
-        odd = decided.with_files(unsure) | exchanged_joints(sides, decided.target_runs(), judged)
-        named = with_reasons(judged, {**odd, **unjudged.axes})
-        return named | header(sources, every_note, out, tables)
-
     of_baseline = (*normal.errors, *unjudged.of_baseline, *decided.odd_ones())
     of_target = (
         *(*repeats.errors, *other.errors, *unjudged.errors),
@@ -243,8 +234,10 @@ def _diagnose(
         *([InputError(stranger)] if stranger else []),
     )
     in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
-    findings.write_findings(out, findings.Findings(causes, unjudged.axes, unjudged.foreign))
-    written = verdict.write(decided, scored, config, out, causes=causes, complete=complete)
+    found = findings.Findings(causes, unjudged.axes, unjudged.foreign)
+    findings.write_findings(out, found)
+    head = header(sources, every_note, out, tables)
+    written = verdict.write(decided, scored, config, out, found, head)
     progress("report")
     title = config.report.title
     page = report.run(out, title=title, figures_of_healthy=figures_of_healthy, kept=kept)

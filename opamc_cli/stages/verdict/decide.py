@@ -14,9 +14,6 @@ from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict import verdict
-from opamc_cli.stages.verdict.agreement.common import not_sure
-from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
-from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.findings import read_findings
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs.hashes import file_sha256
@@ -72,15 +69,9 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     if any(axis not in found.causes for axis in decided.differing(config.score)):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)
-
-    def complete(judged: dict[str, Any]) -> dict[str, Any]:
-        unsure = not_sure(judged, config.score, found.foreign)
-        odd = decided.with_files(unsure) | exchanged_joints(sides, decided.target_runs(), judged)
-        named = with_reasons(judged, {**odd, **found.unjudged})
-        head = header(sources, notes, out, score.FILES)
-        return named | head | {"tables": head["tables"] | _beside(folder, (baseline, target))}
-
-    written = verdict.write(decided, scored, config, out, causes=found.causes, complete=complete)
+    head = header(sources, notes, out, score.FILES)
+    head["tables"] |= _beside(folder, (baseline, target))
+    written = verdict.write(decided, scored, config, out, found, head)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)
     unsure = [InputError(why) for why in (stranger, *scored.doubts) if why]
     errors = (*decided.odd_ones(), *unsure)

@@ -32,6 +32,9 @@ class Findings:
     """Of these, the ones of another program or log."""
 
 
+NOTHING_FOUND = Findings()
+
+
 def write_findings(folder: Path, findings: Findings) -> None:
     """Write the findings beside the pattern tables of a diagnosis."""
     content = {
@@ -57,5 +60,5 @@ def read_findings(folder: Path, tables: tuple[Path, Path]) -> Findings:
             frozenset(map(int, content.get("foreign", ()))),
         )
     except (InputError, ValueError, LookupError, TypeError, AttributeError):
-        return Findings()
-    return found if vouched == [file_sha256(table) for table in tables] else Findings()
+        return NOTHING_FOUND
+    return found if vouched == [file_sha256(table) for table in tables] else NOTHING_FOUND

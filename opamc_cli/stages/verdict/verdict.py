@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -22,9 +22,13 @@ from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.chain.score import ALL_MOTIONS, ScoreOutcome
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
+from opamc_cli.stages.verdict.agreement.common import not_sure
+from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
+from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.cause import meaning
 from opamc_cli.stages.verdict.evidence import bundles
+from opamc_cli.stages.verdict.findings import NOTHING_FOUND, Findings
 from opamc_cli.stages.verdict.reasons import OF_SENSORS, is_excused, is_small, logged, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
@@ -305,9 +309,8 @@ def write(
     scored: ScoreOutcome,
     config: Config,
     out: Path,
-    *,
-    causes: Mapping[int, Mapping[str, Any]] | None = None,
-    complete: Callable[[dict[str, Any]], dict[str, Any]] = lambda verdict: verdict,
+    found: Findings = NOTHING_FOUND,
+    head: Mapping[str, Any] | None = None,
 ) -> VerdictOutcome:
     """Write the verdict.
 
@@ -321,13 +324,16 @@ def write(
         The verdict carries the hash of the whole.
     out
         Folder of verdict.json.
-    causes
-        Cause of the change by axis, from closing the loop of the joint's model; empty where it was
-        sought in vain.
-    complete
-        Adds what is known of the diagnosis besides: joints that cannot be judged, notes, tables.
+    found
+        From the recordings: causes, empty where one was sought in vain, and joints that cannot be
+        judged.
+    head
+        What the verdict says besides its axes; see `header`.
     """
-    verdict = complete(content(decided, scored, config, causes or {}))
+    judged = content(decided, scored, config, found.causes)
+    unsure = decided.with_files(not_sure(judged, config.score, found.foreign))
+    crossed = exchanged_joints(decided.sides, decided.target_runs(), judged)
+    verdict = with_reasons(judged, {**unsure, **crossed, **found.unjudged}) | dict(head or {})
     path = out / files.VERDICT
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
     return VerdictOutcome(path, verdict, exit_code(verdict))

@@ -15,6 +15,7 @@ from opamc_cli.stages.chain.compared import discriminants
 from opamc_cli.stages.chain.compared.pattern_rows import group_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.verdict import verdict
+from opamc_cli.stages.verdict.findings import Findings
 from opamc_cli.storage.sources import read_sources, sources_record
 from opamc_cli.storage.tables import read_table, write_table
 from tests.decision.fleet import Fleet
@@ -27,7 +28,8 @@ def diagnose(folder, plan, seed=0, config=CONFIG, causes=None, **info):
     baseline, target = write_patterns(folder, plan, seed, **info)
     sides = Sides(read_side(baseline), read_side(target))
     scored = score.compare_sides(sides, config, folder)
-    return verdict.write(verdict.decide(sides, config), scored, config, folder, causes=causes)
+    found = Findings(causes or {})
+    return verdict.write(verdict.decide(sides, config), scored, config, folder, found)
 
 
 def strings(value):
@@ -187,7 +189,7 @@ def test_a_harmless_cause_makes_a_fault_a_change(tmp_path, cause, state, said):
 @pytest.mark.parametrize(("clear", "state"), [(True, "fault"), (False, "healthy")])
 def test_damage_is_found_behind_what_all_joints_have_in_common(tmp_path, clear, state):
     causes = {3: {"effect": "ripple", "interpretation": "tooth damage", "clear": clear}}
-    verdict = diagnose(tmp_path, Fleet(common=1.0, n_target=3), causes=causes).verdict
+    verdict = diagnose(tmp_path, Fleet(common=0.3, n_target=3), causes=causes).verdict
     axes = {axis["axis"]: axis for axis in verdict["axes"]}
     assert axes[3]["p_adjusted"] < 0.01
     assert axes[3]["state"] == state
