@@ -69,8 +69,8 @@ ALIKE = {
 """What moves other joints, too, and what looks like it in one of them alone, likeliest first."""
 
 UNLIKELY = {
-    "payload_change": "Another payload is unlikely: all other joints are healthy, and those "
-    "further out carry the same tool.",
+    "payload_change": "Another payload is unlikely: all other joints, which carry the same tool, "
+    "are healthy.",
     "thermal_viscous": "Another temperature is unlikely: most other joints have not moved.",
 }
 
@@ -475,10 +475,10 @@ def among_siblings(
 ) -> Mapping[str, Any] | None:
     """Put what looks alike in one joint before what would move others, too, where they are still.
 
-    Axes are counted from the base: those further out carry the same tool. Grease of another
-    temperature is that of all joints, and seen in more than a third of the others, unless one
-    joint's sensor alone tells of it; but a joint runs in by itself, and less friction is left to be
-    that.
+    All joints carry the same tool, though the last one, counted from the base, may be all that
+    lifts it: what looks like a spring there is a hose. Grease of another temperature is that of all
+    joints, and seen in more than a third of the others, unless one joint's sensor alone tells of
+    it; but a joint runs in by itself, and less friction is left to be that.
 
     Parameters
     ----------
@@ -491,14 +491,14 @@ def among_siblings(
     """
     others = {other: one for other, one in judgements.items() if other != axis}
     effect = cause["effect"] if cause else ""
-    least = max(2, MOST_STILL * len(others)) if effect == "thermal_viscous" else len(others)
+    least = max(2, (MOST_STILL if effect == "thermal_viscous" else 1) * len(others))
     if cause is None or effect not in ALIKE or sum(map(_still, others.values())) < least:
         return cause
     ties, change = cause["ties"], cause["evidence"].get("relative_change")
     name = next((one for one in ALIKE[effect] if one in ties), None)
     sensor = ""
     if effect == "payload_change":
-        unlikely = max(others, default=0) > axis
+        unlikely = name == "spring" or max(others) > axis
     else:
         unlikely = (change or 0.0) > 0
         own = cause["parameters"].get("warmer_c")

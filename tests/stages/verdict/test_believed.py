@@ -70,14 +70,16 @@ def among(axis, cause, others, warmer_c=None):
         (2, {1: 0.1, 3: 3.9}, ["current_scale"], "payload_change"),
         (2, {1: 0.1, 3: "changed"}, ["current_scale"], "payload_change"),
         (2, {1: 0.1, 3: "insufficient-data"}, ["current_scale"], "payload_change"),
-        (3, {1: 0.1, 2: 0.6}, ["current_scale"], "payload_change"),  # the last
+        (3, {1: 0.1, 2: 0.6}, ["current_scale"], "payload_change"),  # the last may lift it alone
+        (3, {1: 0.1}, ["spring"], "payload_change"),
         # a stiff hose
         (4, {3: -0.2, 5: -0.2, 6: 0.8}, ["spring"], "spring"),
         (4, {3: -0.2, 5: -0.2, 6: 2.8}, ["spring"], "payload_change"),
+        (6, {4: -0.2, 5: -0.2}, ["spring"], "spring"),
         (2, {1: 0.1, 3: 0.6}, ["offset"], "payload_change"),
     ],
 )
-def test_a_payload_that_no_joint_further_out_feels_is_what_looks_like_it(axis, others, ties, named):
+def test_a_payload_that_no_other_joint_feels_is_what_looks_like_it(axis, others, ties, named):
     """Weakened magnets of a shoulder were a harmless payload, each night."""
     cause = PAYLOAD | {"ties": ties, "why": [], "explained": 0.98, "evidence": {}}
     found, state = among(axis, cause, others)
