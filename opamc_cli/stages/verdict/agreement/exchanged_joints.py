@@ -21,12 +21,6 @@ are exchanged (0.66 in the samples, since motions are synchronised by the wrong 
 takes a joint away from its own course, not both to each other's: 0.97 at least of 5000 pairs of two
 simulators' joints, healthy and at fault."""
 
-FOLLOWED = 0.75
-"""Of the root mean square of the other's course: how far from it a joint that follows it may be."""
-
-FEWEST_PARTS = 0.5
-"""Of a motion's parts that hold numbers on both sides: less of a motion is not compared."""
-
 
 def exchanged_joints(
     sides: Sides, targets: Mapping[int, Collection[str]], verdict: Mapping[str, Any]
@@ -73,8 +67,7 @@ def _exchanged(new: Courses, known: Courses, pair: tuple[int, int]) -> bool:
         # what is not known is not far: it makes no other course the nearer one
         if math.isnan(across) or math.isnan(own):
             return False
-        nearest = np.nanmin(list(away.values()))
-        if across > min(NEARER * nearest, FOLLOWED * _size(known[other])):
+        if across > NEARER * np.nanmin(list(away.values())):
             return False
     return True
 
@@ -94,24 +87,14 @@ def _courses(table: pa.Table, run: str | None = None) -> Courses:
     return found
 
 
-def _size(courses: Mapping[int, npt.NDArray[np.float64]]) -> float:
-    """Return the root mean square of a joint's courses, motions alike."""
-    return _root_mean([course[np.isfinite(course)] for course in courses.values()])
-
-
 def _away(new: Courses, axis: int, known: Courses, other: int) -> float:
     """Return the root mean square by which an axis is away from one's baseline; NaN if unknown."""
-    differences = []
+    squares = []
     for motion, course in new.get(axis, {}).items():
         their = known.get(other, {}).get(motion)
         if their is not None and their.size == course.size:
             difference = course - their
             heard = np.isfinite(difference)
-            if np.mean(heard) >= FEWEST_PARTS:
-                differences.append(difference[heard])
-    return _root_mean(differences)
-
-
-def _root_mean(motions: Collection[npt.NDArray[np.float64]]) -> float:
-    squares = [float(np.mean(one**2)) for one in motions if one.size]
+            if heard.any():
+                squares.append(float(np.mean(difference[heard] ** 2)))
     return math.sqrt(np.mean(squares)) if squares else math.nan
