@@ -122,9 +122,7 @@ class Decided:
         return [
             axis
             for axis, judgement in self.judgements.items()
-            if judgement.state in ("changed", "fault")
-            or is_excused(judgement, config)
-            or is_small(judgement, config)
+            if judgement.state in ("changed", "fault") or is_small(judgement, config)
         ]
 
     def target_sources(self, axis: int) -> Sequence[RunSource]:
@@ -562,8 +560,6 @@ def with_cause(
     """
     if cause is None:
         return judgement
-    if is_excused(judgement, config):
-        return replace(judgement, state="fault") if cause.get("clear") else judgement
     small = is_small(judgement, config)
     if not small and judgement.state not in ("changed", "fault"):
         return judgement

@@ -186,17 +186,6 @@ def test_a_harmless_cause_makes_a_fault_a_change(tmp_path, cause, state, said):
     )
 
 
-@pytest.mark.parametrize(("clear", "state"), [(True, "fault"), (False, "healthy")])
-def test_damage_is_found_behind_what_all_joints_have_in_common(tmp_path, clear, state):
-    causes = {3: {"effect": "ripple", "interpretation": "tooth damage", "clear": clear}}
-    verdict = diagnose(tmp_path, Fleet(common=0.3, n_target=3), causes=causes).verdict
-    axes = {axis["axis"]: axis for axis in verdict["axes"]}
-    assert axes[3]["p_adjusted"] < 0.01
-    assert axes[3]["state"] == state
-    assert (axes[3]["cause"] is not None) == clear
-    assert all(axes[k]["state"] == "healthy" for k in axes if k != 3)
-
-
 def test_a_cause_does_not_make_a_healthy_joint_ill(tmp_path):
     outcome = diagnose(tmp_path, Fleet(), causes={3: {"effect": "ripple"}})
     assert {a["state"] for a in outcome.verdict["axes"]} == {"healthy"}
