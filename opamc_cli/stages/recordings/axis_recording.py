@@ -1,7 +1,7 @@
 """One axis of a run, as a model of the joint needs it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.stages.recordings.sessions import started
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.runs.writing import Array
-from opamc_cli.storage.schemas.channels import LOGGED, quantity_of
+from opamc_cli.storage.schemas.channels import LOGGED, PHASES, quantity_of
 
 SAME_RATIO = 0.03
 """By which a speed over the position's rate of change may miss the ratio of two units."""
@@ -43,19 +43,20 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
     Raises
     ------
     InputError
-        If the run has no such axis, neither a signed current nor three phases, or no number in most
+        If the run has no such axis, neither a signed current nor two phases, or no number in most
         samples of what is needed.
     """
     channels = run.channels(axis)
     run.check_time()
-    three = len(channels.phases) == 3
-    if channels.current is None and not three:
+    # Two phases tell the third, but a drive's own current is better than a sum.
+    phased = len(channels.phases) >= (2 if channels.current is None else 3)
+    if channels.current is None and not phased:
         msg = (
             f"{run.path}: axis {axis} has {len(channels.phases)} phase current(s) and no "
-            f"axis{axis}_current; a model needs the signed current or all three phases"
+            f"axis{axis}_current; a model needs the signed current, or two phases or three"
         )
         raise InputError(msg)
-    if not three and channels.position is None and channels.velocity is None:
+    if not phased and channels.position is None and channels.velocity is None:
         msg = (
             f"{run.path}: axis {axis} has no axis{axis}_position, no axis{axis}_velocity and not "
             "three phases; log one of them, a model needs the motion"
@@ -64,17 +65,15 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
     named = {
         field: channels.columns[name]
         for name, field in FIELDS.items()
-        if name in channels.columns and not (three and name == "current")
+        if name in channels.columns and not (phased and name == "current")
     }
-    samples = run.read([*named.values(), *(channels.phases if three else ())], start, stop)
+    samples = run.read([*named.values(), *(channels.phases if phased else ())], start, stop)
     arrays: dict[str, Any] = {
         key: np.asarray(samples[name], dtype=np.float64) for key, name in named.items()
     }
     phases = None
-    if three:
-        phases = np.stack(
-            [np.asarray(samples[name], dtype=np.float64) for name in channels.phases], axis=1
-        )
+    if phased:
+        phases = _all_three({name: samples[name] for name in channels.phases})
     for channel, values in samples.items():
         _check_channel(run, channel, values)
         if quantity_of(channel) == "current":
@@ -99,6 +98,16 @@ def read_recording(run: Run, axis: int, start: int = 0, stop: int | None = None)
         **arrays,
     )
     return replace(recording, current_a=_with_sign(recording))
+
+
+def _all_three(phases: Mapping[str, Array]) -> Array:
+    """Stack phase currents by their columns' last letters, (n, 3); they sum to zero at the motor.
+
+    A motor has no neutral conductor, and many drives sense two phases alone.
+    """
+    known = {name[-1]: np.asarray(values, dtype=np.float64) for name, values in phases.items()}
+    third = -np.sum(list(known.values()), axis=0)
+    return np.stack([known.get(name, third) for name in PHASES], axis=1)
 
 
 def positions_beside(run: Run, axis: int) -> dict[int, Array]:

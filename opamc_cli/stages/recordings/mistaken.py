@@ -16,6 +16,8 @@ from opamc_cli.signal.plausible.rigid import DRIFTED_S, follows, lags, other_sca
 from opamc_cli.signal.plausible.spikes import spikes
 from opamc_cli.stages.recordings.beyond import limited
 from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.runs.writing import Array
+from opamc_cli.storage.schemas.channels import PHASES
 
 UNITS = {180 / np.pi: "rad taken for degrees", np.pi / 180: "degrees taken for rad"} | {
     2 * np.pi: "turns taken for rad",
@@ -88,7 +90,7 @@ def _sizes(run: Run, axis: int, recording: Recording) -> list[str]:
 def _clipped(run: Run, axis: int, recording: Recording) -> list[str]:
     """Say which currents reach a limit: what lies beyond it would pass for an effect."""
     if recording.phases_a is not None:
-        currents = dict(zip("abc", recording.phases_a.T, strict=True))
+        currents = _logged_phases(run, axis, recording)
     elif recording.current_a is not None and recording.position_rad is not None:
         speed = np.abs(strided_speed(recording.position_rad, recording.rate_hz))
         moving = np.flatnonzero(speed > MOVING * np.nanmax(speed, initial=0.0))
@@ -119,12 +121,21 @@ def _held(run: Run, axis: int, recording: Recording) -> list[str]:
     ]
 
 
+def _logged_phases(run: Run, axis: int, recording: Recording) -> dict[str, Array]:
+    """Return the phases that are in the file by their letters; a third may be the sum of two."""
+    names, phases = run.channels(axis).phases, recording.phases_a
+    columns = () if phases is None else zip(PHASES, phases.T, strict=True)
+    return {name: values for name, values in columns if f"axis{axis}_{name}" in names}
+
+
 def _spiked(run: Run, axis: int, recording: Recording) -> list[str]:
     """Say which channels hold single samples far from their neighbours."""
-    phases = () if recording.phases_a is None else zip("abc", recording.phases_a.T, strict=True)
-    channels = dict(phases) or {"current": recording.current_a}
-    channels["position"] = recording.position_rad
-    found = {name: spikes(values) for name, values in channels.items() if values is not None}
+    channels = _logged_phases(run, axis, recording)
+    if recording.phases_a is None and recording.current_a is not None:
+        channels["current"] = recording.current_a
+    if recording.position_rad is not None:
+        channels["position"] = recording.position_rad
+    found = {name: spikes(values) for name, values in channels.items()}
     return [
         f"{run.path}: axis{axis}_{name} leaps in {places.size} single samples, the first at "
         f"{places[0] / recording.rate_hz:.4g} s: a loose contact, or garbled by the logger? They "

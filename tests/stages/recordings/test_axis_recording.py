@@ -1,0 +1,54 @@
+"""One axis of a run, as a model needs it."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from opamc_cli.errors import InputError
+from opamc_cli.stages.recordings.axis_recording import read_recording
+from opamc_cli.stages.recordings.mistaken import mistaken
+from opamc_cli.storage.runs.run import Run
+
+ANGLE = 2 * np.pi * 7 * np.arange(4000) / 1000
+PHASES = {name: np.cos(ANGLE - k * 2 * np.pi / 3) for k, name in enumerate("abc")}
+
+
+def logged(path, **columns):
+    table = pa.table({f"axis1_{name}": pa.array(own) for name, own in columns.items()})
+    record = json.dumps({"sampling_rate_hz": 1000.0}).encode()
+    pq.write_table(table.replace_schema_metadata({b"opamc": record}), path)
+    return path
+
+
+@pytest.mark.parametrize("left_out", list(PHASES))
+def test_two_phases_are_three(tmp_path, left_out):
+    """A motor has no neutral conductor; what is wrong with one of two is said of that one."""
+    two = {name: own.copy() for name, own in PHASES.items() if name != left_out}
+    with Run(logged(tmp_path / "run.parquet", **two)) as run:
+        read = read_recording(run, 1)
+    np.testing.assert_allclose(read.phases_a, np.stack(list(PHASES.values()), axis=1), atol=1e-12)
+    spiked = min(two)
+    two[spiked][[700, 1900, 3100]] += 20.0
+    with Run(logged(tmp_path / "spiked.parquet", **two)) as run:
+        notes = mistaken(run, 1, read_recording(run, 1))
+    assert [note.split()[1] for note in notes if "leaps" in note] == [f"axis1_{spiked}"]
+
+
+def test_a_logged_current_is_taken_before_two_phases(tmp_path):
+    two = {name: PHASES[name] for name in "ab"}
+    file = logged(tmp_path / "run.parquet", current=PHASES["c"], position=ANGLE, **two)
+    with Run(file) as run:
+        read = read_recording(run, 1)
+    assert read.phases_a is None
+    np.testing.assert_array_equal(read.current_a, PHASES["c"])
+
+
+def test_one_phase_is_refused(tmp_path):
+    with (
+        Run(logged(tmp_path / "run.parquet", a=PHASES["a"], position=ANGLE)) as run,
+        pytest.raises(InputError, match=r"has 1 phase current.*or two phases or three"),
+    ):
+        read_recording(run, 1)
