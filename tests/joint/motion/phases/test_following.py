@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import cumulative_trapezoid
 from simulator import simulate
 
 from opamc_cli.joint.motion.phases.following import _followed, averaged_angle, follow_phases
@@ -57,3 +58,17 @@ def test_weak_currents_tell_their_angle_together():
     assert np.std(error[strong[50:1950]]) < 0.2
     # One by one they would be off by more.
     assert np.std(np.angle((vector * np.exp(-1j * angle)) ** 2)[50:1950] / 2) > 0.3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_weak_current_for_a_second_does_not_carry_the_angle_away(seed):
+    """Gravity and friction balance in the middle of a slow sweep: 1200 half turns were made up."""
+    rate, rng = 2000.0, np.random.default_rng(seed)
+    time_s = np.arange(int(16 * rate)) / rate
+    turned = cumulative_trapezoid(np.where(time_s < 1, 150.0, 12.0), dx=1 / rate, initial=0.0)
+    torque = 2.0 - 0.2 * time_s
+    vector = 1j * torque * np.exp(1j * turned)
+    phases = np.stack([(vector * np.exp(-2j * np.pi * k / 3)).real for k in range(3)], axis=1)
+    found = follow_phases(phases + 0.03 * rng.normal(size=phases.shape), rate)
+    known = found.strong & (np.abs(torque) > 0.2) & (time_s > 1.2)
+    assert np.ptp((found.angle_rad - turned)[known]) < 1.0
