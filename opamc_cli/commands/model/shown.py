@@ -83,6 +83,9 @@ def _headline(result: Mapping[str, Any]) -> str:
     if result.get("verdict") == "nothing-missing":
         noise, left = result.get("noise_a"), wording.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
+        if noise is not None and noise > result.get("before", {}).get("rmse_a", noise):
+            # Beside corners the error is a smoothed one, and the noise of samples is no part of it.
+            of_it = f"; noise between samples {noise:.2g} {unit}"
         if left is None:
             lacks = "nothing for certain" if result.get("unconfirmed") else "nothing worth naming"
             said = f"Axis {axis} lacks {lacks}: error {before} {unit}{logged}{of_it}"

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +84,13 @@ ONCE = (
     "axis {}: no place is passed twice the same way, so friction at one may be whatever came at "
     "that time"
 )
+ONE_TURN = (
+    "axis {}: ripples of orders {} are multiples of the first: rather something that happens once "
+    "in its turn, as where a brake rubs or a tooth is damaged, than a source for each"
+)
+SAME_ORDER = 0.01
+"""By which a multiple may miss: of 384 closings of strangers' joints two have three in a row, both
+of brakes that rub."""
 ANGLE = "joint-angle"
 DRIVEN_T = 6.0
 """Errors by which a closed model's friction drives where its current has the opposite sign: of 46
@@ -286,6 +294,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         if resists and values[0] < -DRIVEN_T * errors[0]:
             given = "; check its parameters, or give them" if term.parameters else ""
             doubts.append(DRIVES.format(axis, term.effect.name) + given)
+    orders = [step.term.parameters["order"] for step in loop.steps if _is_ripple(step.term)]
+    if family := one_turn(orders):
+        doubts.append(ONE_TURN.format(axis, ", ".join(f"{order:.4g}" for order in family)))
     unmissed = _unmissed(loop)
     if unmissed:
         doubts.append(UNMISSED.format(axis, ", ".join(unmissed)))
@@ -355,6 +366,25 @@ def _unmissed(loop: Loop) -> list[str]:
     return found
 
 
+def one_turn(orders: Sequence[float]) -> list[float]:
+    """Return one of some orders and its multiples in a row, if its second and third are there.
+
+    What happens at one angle of a turn is a sum of such lines; kinematic errors and eccentricity
+    have orders 1, 2 and 4.
+    """
+    for first in sorted(orders):
+        times = ((round(order / first), order) for order in orders)
+        family = {k: one for k, one in times if abs(one / first - k) < SAME_ORDER * k}
+        in_a_row = list(takewhile(family.__contains__, count(1)))
+        if len(in_a_row) > 2:
+            return [family[k] for k in in_a_row]
+    return []
+
+
+def _is_ripple(term: Term) -> bool:
+    return term.effect.name == "ripple"
+
+
 def _called(term: Term) -> str:
     """Name an effect that a joint may have several times."""
     if "order" in term.parameters:
@@ -371,7 +401,7 @@ def _of_the_program(term: Term, slowest: float) -> bool:
     """
     if term.effect.name == "payload_change":
         return "gripped_s" in term.parameters
-    return term.effect.name == "ripple" and term.parameters["order"] < slowest
+    return _is_ripple(term) and term.parameters["order"] < slowest
 
 
 def _write(

@@ -158,6 +158,16 @@ def test_an_error_that_is_mostly_noise_lacks_nothing_worth_naming(error: float) 
     assert loop_phrase(entry) == "nothing worth naming is missing"
 
 
+def test_noise_larger_than_the_smoothed_error_is_no_part_of_it() -> None:
+    """Phases beside sharp corners: 0.1684 A, "of which 0.23 A is noise"."""
+    entry = left_alone(0.1684, 0.23) | {"after": {"rmse_a": 0.1684, "as_logged_a": 0.2435}}
+    entry["before"] |= {"as_logged_a": 0.2435}
+    assert headline(entry) == (
+        "Axis 2 lacks nothing worth naming: error 0.1684 A (sample by sample 0.2435); "
+        "noise between samples 0.23 A"
+    )
+
+
 def test_what_the_sealed_data_do_not_bear_out_is_said_where_nothing_was_added() -> None:
     rejected = [{"effect": "inertia", "gain": 0.59, "why": "does not hold on the sealed data"}]
     entry = left_alone(0.0204, 0.02) | {"unconfirmed": ["inertia"], "rejected": rejected}
