@@ -47,9 +47,8 @@ def bridged(
     Angle and speed, (n,). As whole waves are resolved in satellite positioning: first the angle may
     change by any amount in every gap, and only speeds and accelerations of both sides tell how it
     goes on. Then each change is set to the nearest multiple of pi: the angle is steady within each
-    stretch of current, and on the same branch in all. A filter that guesses before it has seen the
-    other side loses count four times as early. In a long gap the speed goes straight from that of
-    one side to that of the other, or is nought between slow ones: a rest. Arguments are
+    stretch of current, and on the same branch in all. In a long gap the speed goes straight from
+    that of one side to that of the other, or is nought between slow ones: a rest. Arguments are
     those of `smoothed_angle`.
     """
     if not strong.any():
@@ -97,12 +96,16 @@ def without_slips(angle: PhaseAngle, sure: Bools, period: int | None, rate_hz: f
         return replace(angle, guessed_s=_unseen(angle, rate_hz))
     course, guessed_s = found
     repeated = path.copy()
-    slips: list[float] = []
-    slip, anchor = 0.0, None
+    slips, slip, anchor = list[float](), 0.0, None
+    # On the way to the first cycle's beginning a joint moves otherwise than one cycle later.
+    known = np.where(sure, angle.velocity_rad_s, np.nan)[: 2 * period].reshape(2, period)
+    differs = np.abs(known[1] - known[0]) > LARGEST_DRIFT * np.nanmax(np.abs(known))
+    led_in = int(np.max(np.flatnonzero(differs), initial=-1)) + 1
     for start, stop in pieces:
         rest = path[start:stop] - course[np.arange(start, stop) % period]
+        rest[: max(led_in - start, 0)] = np.nan
         # A cycle is no whole number of samples: the cycle before is nearer than the first.
-        later = np.arange(max(start, period), max(stop, period))
+        later = np.arange(max(start, period + led_in), max(stop, period + led_in))
         later = later[sure[later - period]]
         if later.size:
             rest = path[later] - repeated[later - period]
@@ -162,8 +165,7 @@ def _common_course(
     starts, stops = np.array(anchors).T
     gaps = (np.roll(starts, -1) - stops) % period
     turns = np.pi * np.round(left / np.pi)
-    if turns:
-        heights[np.lexsort((gaps, doubts))[-1] + 1 :] -= turns
+    heights[np.lexsort((gaps, doubts))[-1] + 1 :] -= turns
     course = np.full(period, np.nan)
     for (start, stop), place, height in zip(anchors, places, heights, strict=False):
         rows = np.flatnonzero(common[start:stop]) + start
@@ -191,6 +193,4 @@ def stretches(strong: Bools, rate_hz: float, gap_s: float = UNSEEN_S) -> list[tu
     if not rows.size:
         return []
     breaks = np.flatnonzero(np.diff(rows) > max(int(gap_s * rate_hz), 2))
-    starts = [int(rows[0]), *(int(rows[b + 1]) for b in breaks)]
-    stops = [*(int(rows[b]) + 1 for b in breaks), int(rows[-1]) + 1]
-    return list(zip(starts, stops, strict=True))
+    return [(int(part[0]), int(part[-1]) + 1) for part in np.split(rows, breaks + 1)]
