@@ -1,10 +1,14 @@
 """What every effect in the library says of itself."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 Parameters = dict[str, float]
+ByLoad = Callable[[Floats], tuple[Floats, Floats]]
+"""Regressor, (rows,), beside the load of some coefficients, (c,), and how it grows with each."""
 
 CHANNEL_REASONS = {
     "position": "no position, and the phases give no angle",
@@ -127,6 +131,10 @@ class Effect:
         if type(self).columns is Effect.columns:
             raise NotImplementedError
         return np.asarray(np.take(self.columns(track, parameters).T, rows, axis=-1).T)
+
+    def beside(self, track: Track, parameters: Parameters, carriers: Floats, rows: Ints) -> ByLoad:
+        """Regressor, at some samples, of one that follows the load of some `carriers`, (n, c)."""
+        raise NotImplementedError
 
     def variants(self, parameters: Parameters) -> list[tuple[Parameters, tuple[int, ...]]]:
         """Smaller forms of the effect: parameters and the columns that they keep."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from opamc_cli.joint.effects.base import Effect, Parameters, stack
+from opamc_cli.joint.effects.base import ByLoad, Effect, Parameters, stack
 from opamc_cli.joint.motion.track import Floats, Ints, Track
 
 
@@ -40,12 +40,22 @@ class LoadFriction(Effect):
 
     def columns_at(self, track: Track, parameters: Parameters, rows: Ints) -> Floats:
         """Direction times a power of the fitted load current that passes the gear."""
-        load = track.load_a[rows]
-        beyond = 1 - parameters.get("inertia_share", 1.0)
-        if beyond:
+        return stack(self.beside(track, parameters, track.load_a[:, None], rows)(np.ones(1))[0])
+
+    def beside(self, track: Track, parameters: Parameters, carriers: Floats, rows: Ints) -> ByLoad:
+        """Likewise, of any load."""
+        passing, exponent = carriers[rows], parameters.get("exponent", 1.0)
+        if beyond := 1 - parameters.get("inertia_share", 1.0):
             places, weights = track.inertia_weights
-            load = load - beyond * (weights @ track.load_a[places]) * track.acceleration[rows]
-        return stack(track.direction[rows] * np.abs(load) ** parameters.get("exponent", 1.0))
+            inertia = beyond * (weights @ carriers[places])
+            passing = passing - np.outer(track.acceleration[rows], inertia)
+
+        def by_load(values: Floats) -> tuple[Floats, Floats]:
+            load = passing @ values
+            along = track.direction[rows] * np.abs(load) ** (exponent - 1)
+            return along * np.abs(load), (exponent * along * np.sign(load))[:, None] * passing
+
+        return by_load
 
     def coefficient_units(self, parameters: Parameters, count: int, unit: str = "A") -> list[str]:
         """Return a share of the load, or one per unit of it."""

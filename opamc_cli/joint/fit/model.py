@@ -28,8 +28,6 @@ NEARLY = 0.01
 """Likewise where Newton steps find the load: by less they were near, and moved nothing again."""
 LOAD_SAMPLES = 10_000
 """Samples by which a load is found that friction follows; all are fitted beside it."""
-TINY = 1e-6
-"""Share of the largest load by which it is moved for its derivatives."""
 
 
 @dataclass(frozen=True)
@@ -267,11 +265,6 @@ class Fit:
         What the fast terms hold of the current is taken as fitted: of a ripple next to nothing is
         left in the averages of the coarse grid, by which nobody could fit it.
         """
-        slow, fast = self._on_coarse()
-        return self.dataset.sums((), False, *slow, fast[:, None]).less_last(), slow, fast
-
-    def _on_coarse(self) -> tuple[list[Floats], Floats]:
-        """Regressors of the slow terms on the coarse grid, and the fast terms' current there."""
         dataset, track = self.dataset, self.dataset.fine.track
         fast = np.zeros(track.size)
         for term, values in zip(self.terms, self.coefficients, strict=True):
@@ -279,7 +272,8 @@ class Fit:
                 fast += dataset.fine.spread(dataset.columns(term, True) @ values)
         smooth = averaged(fast, track.bounds, track.kernel)
         slow = [dataset.columns(term, False) for term in self.terms if not term.effect.fast]
-        return slow, block_mean(smooth, track.bounds, dataset.factor)
+        fast = block_mean(smooth, track.bounds, dataset.factor)
+        return dataset.sums((), False, *slow, fast[:, None]).less_last(), slow, fast
 
     @cached_property
     def drift_free_error(self) -> Floats:
@@ -412,41 +406,35 @@ def _with_newton_load(fitted: Fit) -> Dataset:
     columns, others = np.concatenate(some[:count], axis=1), some[count:]
     kept = dataset.sums((), True, *blocks[count:]).gram.sum(axis=0) / every
     carries, follows = np.repeat(roles[:count], widths[:count], axis=0).T
-    carrying = [block for (carries_it, _), block in zip(roles, blocks, strict=True) if carries_it]
-    carriers = np.concatenate([dataset.fine.spread(block) for block in carrying], axis=1)
-    largest = np.maximum(np.abs(carriers).max(axis=0), 1e-300)
-
-    def following(load: Floats) -> Floats:
-        moved = track.with_model(load, track.model_a, ())
-        return np.concatenate([t.columns(moved, rows) for t in terms if t.effect.follows_load], 1)
-
+    carriers = np.concatenate([dataset.fine.spread(b) for b in blocks[:count]], axis=1)[:, carries]
+    followers = [term for term in terms if term.effect.follows_load]
+    beside = [t.effect.beside(track, t.parameters, carriers, rows) for t in followers]
     values = start = np.concatenate(known)
-    best, least, step = track.load_a, np.inf, 0.0 * values
+    least, step = np.inf, 0.0 * values
     for _ in range(MOST_ROUNDS):
         own, *held = np.split(values, np.cumsum(widths)[count - 1 : -1])
-        load = carriers @ own[carries]
-        columns[:, follows] = following(load)
+        laid = [by_load(own[carries]) for by_load in beside]
+        columns[:, follows] = np.stack([regressor for regressor, _ in laid], axis=1)
         rest = track.current_a[rows] - columns @ own - sum(map(np.matmul, others, held))
         error = float(rest @ rest)
-        settled = abs(least - error) <= SETTLED * least < np.inf
-        if error < least:
-            best, least, start = load, error, values
+        falls, settled = error < least, abs(least - error) <= SETTLED * least < np.inf
+        if falls:
+            least, start = error, values
         if settled:
             break
-        if best is load:
+        if falls:
             jacobian = columns.copy()
-            tiny = TINY * np.abs(load).max() / largest
-            for place, size, carrier in zip(np.flatnonzero(carries), tiny, carriers.T, strict=True):
-                aside = (following(load + size * carrier) - columns[:, follows]) @ own[follows]
-                jacobian[:, place] += aside / max(size, 1e-300)
+            for (_, slopes), value in zip(laid, own[follows], strict=True):
+                jacobian[:, carries] += value * slopes
             asked = np.concatenate([jacobian, rest[:, None]], axis=1)
             found = np.concatenate([block.T @ asked for block in (jacobian, *others)])
-            beside = np.concatenate([found[own.size :, :-1].T, kept])
-            step = 2 * solve(np.block([found[:, :-1], beside]), found[:, -1])
+            of_held = np.concatenate([found[own.size :, :-1].T, kept])
+            step = 2 * solve(np.block([found[:, :-1], of_held]), found[:, -1])
         # A step that was too long is halved.
         step = step / 2
         values = start + step
-    return dataset.with_model(best, track.model_a, static_terms(fitted.terms))
+    load = carriers @ start[: own.size][carries]
+    return dataset.with_model(load, track.model_a, static_terms(fitted.terms))
 
 
 def _fit_once(dataset: Dataset, terms: tuple[Term, ...]) -> Fit:

@@ -19,6 +19,7 @@ from opamc_cli.signal.motion.smoothing import (
     blurred,
     clear_of_corners,
     derivatives,
+    filled,
     less_late,
     measurement_noise,
     noise_gain,
@@ -203,16 +204,6 @@ def moving_samples(motion: Motion, usable: Bools) -> Bools:
     moving[:half] = False
     moving[speeds.size - half :] = False
     return moving
-
-
-def filled(values: Floats) -> Floats:
-    """Values with gaps bridged by straight lines; unchanged if all are finite."""
-    values = np.asarray(values, dtype=np.float64)
-    good = np.isfinite(values)
-    if good.all() or not good.any():
-        return values
-    indices = np.arange(values.size)
-    return np.interp(indices, indices[good], values[good])
 
 
 def build_track(

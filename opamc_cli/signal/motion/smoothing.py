@@ -225,6 +225,16 @@ def _by_fft(path: Floats, weights: Floats) -> Floats:
     return found
 
 
+def filled(values: Floats) -> Floats:
+    """Values with gaps bridged by straight lines; unchanged if all are finite."""
+    values = np.asarray(values, dtype=np.float64)
+    good = np.isfinite(values)
+    if good.all() or not good.any():
+        return values
+    indices = np.arange(values.size)
+    return np.interp(indices, indices[good], values[good])
+
+
 def unstepped(values: Floats) -> Floats:
     """Bridge the steps of a slow channel that is logged coarsely, such as a temperature; (n,).
 

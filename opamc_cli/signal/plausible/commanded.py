@@ -8,6 +8,7 @@ from opamc_cli.signal.motion.smoothing import (
     averaged,
     averaging_kernel,
     derivatives,
+    filled,
     less_late,
     measurement_noise,
     noise_gain,
@@ -42,7 +43,7 @@ def apart(
         Standard deviation of what both differ by, of the root mean square of the speed, where that
         is more than filters and noise make of one speed; None where it may be the joint's own.
     """
-    position, logged = _known(position_rad), _known(velocity_rad_s)
+    position, logged = filled(position_rad), filled(velocity_rad_s)
     window = smoothing_window(position, rate_hz)
     speed, acceleration = (derivatives(position, rate_hz, window, k) for k in (1, 2))
     size = float(np.sqrt(np.mean(speed**2)))
@@ -57,8 +58,3 @@ def apart(
     quiet = measurement_noise(logged) < max(QUIET * size, step)
     least = max(APART * size, CERTAIN * noise, step)
     return apart / size if quiet and size > LEAST_SPEED_RAD_S and apart > least else None
-
-
-def _known(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    known = np.flatnonzero(np.isfinite(values))
-    return np.interp(np.arange(values.size), known, values[known])

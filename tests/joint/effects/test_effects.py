@@ -52,6 +52,27 @@ def test_a_place_is_sought_where_it_is_passed_both_ways():
     assert drag.guesses(one_way, None) == drag.guesses(track, None)
 
 
+@pytest.mark.parametrize("parameters", [{}, {"inertia_share": 0.3}, {"exponent": 2.0}])
+def test_friction_beside_any_load_is_laid_like_its_column_and_grows_as_differences_say(parameters):
+    _, track = track_of()
+    friction, rows = built_in_library()["load_friction"], np.flatnonzero(track.moving)[::7]
+    carriers = np.stack([track.acceleration, np.cos(track.position_rad), np.ones(track.size)], 1)
+    by_load = friction.beside(track, parameters, carriers, rows)
+
+    def laid(values):
+        loaded = track.with_model(carriers @ values, track.model_a, ())
+        return friction.columns_at(loaded, parameters, rows)[:, 0]
+
+    values, step = np.array([0.02, 1.5, 0.4]), 1e-6
+    regressor, slopes = by_load(values)
+    np.testing.assert_allclose(regressor, laid(values), atol=1e-9)
+    for k in range(3):
+        aside = step * np.eye(3)[k]
+        along = (laid(values + aside) - laid(values - aside)) / (2 * step)
+        # Where the load passes zero its size has a corner.
+        assert np.quantile(np.abs(along - slopes[:, k]), 0.99) < 1e-4 * np.abs(slopes[:, k]).max()
+
+
 def test_what_a_motion_never_shows_is_untestable():
     """A gear at one speed, one way: 74 165 A of a Stribeck curve were named, and `closed`."""
     _, track = track_of()

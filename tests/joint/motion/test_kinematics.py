@@ -8,7 +8,6 @@ from opamc_cli.joint.motion.kinematics import (
     Recording,
     build_track,
     direction_of,
-    filled,
     motion_from_position,
     motion_from_velocity,
     moving_samples,
@@ -29,12 +28,6 @@ def recorded(**channels):
 def motion(velocity, noise=0.0, window=11):
     zeros = np.zeros_like(velocity)
     return Motion(zeros, velocity, zeros, window, noise, np.ones(1))
-
-
-def test_gaps_are_bridged_by_straight_lines_and_ends_keep_their_value():
-    values = np.array([np.nan, 1.0, np.nan, np.inf, 4.0, np.nan])
-    np.testing.assert_array_equal(filled(values), [1, 1, 2, 3, 4, 4])
-    assert np.isnan(filled(np.full(3, np.nan))).all()
 
 
 def test_a_part_of_a_recording_has_that_part_of_every_channel():

@@ -10,6 +10,7 @@ from opamc_cli.signal.motion.smoothing import (
     averaging_kernel,
     block_mean,
     derivatives,
+    filled,
     measurement_noise,
     smoothing_window,
     taken_noise_gain,
@@ -125,3 +126,9 @@ def test_a_moving_average_does_not_reach_into_another_recording():
     impulse = np.zeros(12)
     impulse[3] = 3.0
     assert averaged(impulse, TWO, np.ones(3) / 3)[:7] == pytest.approx([0, 0, 1, 1, 1, 0, 0])
+
+
+def test_gaps_are_bridged_by_straight_lines_and_ends_keep_their_value():
+    values = np.array([np.nan, 1.0, np.nan, np.inf, 4.0, np.nan])
+    np.testing.assert_array_equal(filled(values), [1, 1, 2, 3, 4, 4])
+    assert np.isnan(filled(np.full(3, np.nan))).all()
