@@ -107,7 +107,7 @@ def close(
     """Find and add what the declared model lacks; writes loop.json and the extended model."""
     from opamc_cli.config.joint_model import load_joint_model
     from opamc_cli.stages.model import model as stage
-    from opamc_cli.stages.report.wording import far_from_noise
+    from opamc_cli.stages.report.wording.loop import far_from_noise
     from opamc_cli.storage.files.lock import output_lock
     from opamc_cli.storage.files.parquet import forgo_pandas
     from opamc_cli.storage.files.result import published, result

@@ -63,15 +63,15 @@ def _headline(result: Mapping[str, Any]) -> str:
     explained = [*words][:MOST_MEANINGS]
     if more := [*words.values()][MOST_MEANINGS:]:
         explained.append(f"{len(more)} more ({', '.join(dict.fromkeys(more))})")
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import loop as loop_words
 
     logged = _as_logged(result)
     error = f"error {before} → {after} {unit}{logged}"
-    fails = "".join(f"; {why}" for why in wording.unreliable(result))
-    functions = wording.without_name(steps)
+    fails = "".join(f"; {why}" for why in loop_words.unreliable(result))
+    functions = loop_words.without_name(steps)
     share = result.get("explained_share")
     reached = "how much can be explained is not known"
-    if share is not None and wording.ceiling_known(result):
+    if share is not None and loop_words.ceiling_known(result):
         reached = f"{share:.0%} of what can be explained{' has a name' if functions else ''}"
     elif result.get("verdict") == "closed":
         reached = "what is left is noise"
@@ -81,7 +81,7 @@ def _headline(result: Mapping[str, Any]) -> str:
         reached = "" if result.get("fails") else f", {reached}"
         return f"Axis {axis} lacks {'; '.join(explained)}{beside}: {error}{reached}{fails}"
     if result.get("verdict") == "nothing-missing":
-        noise, left = result.get("noise_a"), wording.beyond_noise(result)
+        noise, left = result.get("noise_a"), loop_words.beyond_noise(result)
         of_it = "" if noise is None else f", of which {noise:.2g} {unit} is noise between samples"
         if noise is not None and noise > result.get("before", {}).get("rmse_a", noise):
             # Beside corners the error is a smoothed one, and the noise of samples is no part of it.
@@ -91,7 +91,7 @@ def _headline(result: Mapping[str, Any]) -> str:
             said = f"Axis {axis} lacks {lacks}: error {before} {unit}{logged}{of_it}"
             return f"{said}{fails}"
         check = ""
-        if wording.beyond_noise(result, wording.FAR_ABOVE_NOISE) is not None:
+        if loop_words.beyond_noise(result, loop_words.FAR_ABOVE_NOISE) is not None:
             check = "; check how its motion was logged, units and gear ratio, or record more motion"
         return (
             f"Axis {axis}: nothing of the library explains the {left:.2g} {unit} that are left "
@@ -124,13 +124,13 @@ def _axes_beside(steps: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
     """Return all that a closed loop found on an axis, one object of loop.json's `axes`."""
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import loop as loop_words
 
     before, after, unit = result["before"], result["after"], result["unit"]
     shown: list[RenderableType] = [
         headline(result),
         f"{result['verdict']}; on sealed data r2 {before['r2']:.4f} → {after['r2']:.4f}; "
-        f"{wording.ceiling_phrase(result)}",
+        f"{loop_words.ceiling_phrase(result)}",
     ]
     if result["steps"]:
         errors = (f"{unit} before", f"{unit} after")
@@ -145,7 +145,7 @@ def loop_tables(result: Mapping[str, Any]) -> Sequence["RenderableType"]:
                 f"{step['rmse_before_a']:.4g}",
                 f"{step['rmse_after_a']:.4g}",
             )
-        shown += [table, wording.STEP_COLUMNS]
+        shown += [table, loop_words.STEP_COLUMNS]
     shown += [f"{step['effect']}: {step['interpretation']}" for step in result["steps"]]
     shown += [
         f"to tell {step['effect']} from {', '.join(step['ties'])}: {step['separating_experiment']}"

@@ -109,7 +109,7 @@ def _table(rows: list[dict[str, Any]], events: bool) -> Any:
     from rich.table import Table
 
     from opamc_cli.commands.terminal.streams import printable
-    from opamc_cli.stages.report.wording import number, p_value
+    from opamc_cli.stages.report.wording.numbers import number, p_value
 
     names = ["time", "robot", "axis", "kind", "text"] if events else [*SHOWN]
     if not events and len({(row["robot"], row["program"]) for row in rows}) > len(

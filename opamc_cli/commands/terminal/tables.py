@@ -33,19 +33,19 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
     from rich.console import Group
     from rich.text import Text
 
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import verdict as verdict_words
+    from opamc_cli.stages.report.wording.numbers import number, p_value
     from opamc_cli.storage.schemas.channels import axes_phrase
 
     axes = list(verdict.get("axes", ()))
     unhealthy = doubtful(verdict)
-    title = Text(wording.headline(verdict), style=_style_of(verdict))
+    title = Text(verdict_words.headline(verdict), style=_style_of(verdict))
     if not unhealthy:
         known = [a for a in axes if isinstance(a.get("health_index"), int | float)]
         if known:
             top = max(known, key=lambda a: float(a["health_index"]))
             title.append(
-                f" (largest health index {wording.number(top['health_index'])}, "
-                f"axis {top['axis']})",
+                f" (largest health index {number(top['health_index'])}, axis {top['axis']})",
                 style="dim",
             )
         return title
@@ -60,12 +60,12 @@ def verdict_table(verdict: Mapping[str, Any]) -> "RenderableType":
         table.add_row(
             str(entry.get("axis")),
             _state(state),
-            wording.number(entry.get("health_index")),
-            wording.p_value(entry.get("p_value")),
-            wording.p_value(entry.get("p_adjusted")),
-            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+            number(entry.get("health_index")),
+            p_value(entry.get("p_value")),
+            p_value(entry.get("p_adjusted")),
+            *(number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
-    shared = wording.shared_reasons(unhealthy)
+    shared = verdict_words.shared_reasons(unhealthy)
     lines = [line for entry in unhealthy for line in _explanation(entry, set(shared))]
     for reason, numbers in shared.items():
         lines += [Text(f"{axes_phrase(numbers)}:", style="bold"), _indented(reason)]
@@ -88,20 +88,21 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
     """
     from rich.text import Text
 
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import verdict as verdict_words
+    from opamc_cli.stages.report.wording.numbers import number, p_phrase
     from opamc_cli.stages.verdict.brief import foremost
 
     first = foremost(verdict.get("axes", ()))
     unhealthy = sorted(doubtful(verdict), key=lambda entry: entry is not first)
     if len(unhealthy) != 1 or not unhealthy[0].get("brief"):
-        lines = [Text(wording.headline(verdict), style=_style_of(verdict))]
+        lines = [Text(verdict_words.headline(verdict), style=_style_of(verdict))]
     else:
         lines = []  # the one joint's own line says it
     healthy = len(verdict.get("axes", ())) - len(unhealthy)
     for entry in unhealthy:
         known = entry.get("brief")
         if not known:
-            said = next(iter(entry.get("reasons", ())), wording.advice(entry) or "not judged")
+            said = next(iter(entry.get("reasons", ())), verdict_words.advice(entry) or "not judged")
             lines.append(Text(printable(f"axis {entry.get('axis')}: {said}")))
             continue
         others = f"; {healthy} other axes healthy" if len(unhealthy) == 1 and healthy > 1 else ""
@@ -109,7 +110,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
         state = {"fault": "at fault"}.get(str(entry.get("state")), str(entry.get("state")))
         title = Text(f"Axis {entry.get('axis')} {state}", style=_style(str(entry.get("state"))))
         title.append(
-            f": p {wording.p_phrase(entry.get('p_adjusted'))}, {wording.number(ratio)} times as "
+            f": p {p_phrase(entry.get('p_adjusted'))}, {number(ratio)} times as "
             f"far from the baseline as a healthy session{others}",
             style="not bold",
         )
@@ -133,8 +134,8 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
 
 def feature_table(inputs: "ReportInputs") -> "RenderableType":
     """Return the features of every axis, for a folder without a verdict."""
-    from opamc_cli.stages.report import wording
     from opamc_cli.stages.report.focus import choose_focus, pooled_features
+    from opamc_cli.stages.report.wording.numbers import number
 
     focus = choose_focus(inputs)
     table = FittedTable(
@@ -145,7 +146,7 @@ def feature_table(inputs: "ReportInputs") -> "RenderableType":
         table.add_row(
             str(axis),
             str(focus.order[axis]),
-            *(wording.number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
+            *(number(features.get(name)) for name in ("delta_mu", "delta_var", "ks")),
         )
     return table
 
@@ -159,13 +160,14 @@ def doubtful(verdict: Mapping[str, Any]) -> "list[Mapping[str, Any]]":
 def _explanation(entry: Mapping[str, Any], said_below: set[str]) -> "list[RenderableType]":
     from rich.text import Text
 
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import verdict as verdict_words
+    from opamc_cli.stages.report.wording.numbers import cause_phrase
 
     sentences = [str(r) for r in entry.get("reasons", ()) if str(r) not in said_below]
     cause = entry.get("cause")
     if cause and not any(str(cause.get("interpretation")) in said for said in sentences):
-        sentences.append(f"cause: {wording.cause_phrase(cause)}")
-    advice = wording.advice(entry)
+        sentences.append(f"cause: {cause_phrase(cause)}")
+    advice = verdict_words.advice(entry)
     if advice:
         sentences.append(advice)
     if not sentences:
@@ -191,9 +193,9 @@ def _state(state: str) -> "Text":
 
 def _style_of(verdict: Mapping[str, Any]) -> str:
     """Return the style of the worst state."""
-    from opamc_cli.stages.report import wording
+    from opamc_cli.stages.report.wording import verdict as verdict_words
 
-    worst = next(iter(wording.by_state(verdict)), "unknown")
+    worst = next(iter(verdict_words.by_state(verdict)), "unknown")
     return _style("unknown" if worst == "healthy" and doubtful(verdict) else worst)
 
 

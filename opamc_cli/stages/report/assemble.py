@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures.loading import undocumented
 from opamc_cli.stages.report.figures.palette import custom_properties, state_role, state_sign
 from opamc_cli.stages.report.focus import by_severity, choose_focus
@@ -17,6 +16,7 @@ from opamc_cli.stages.report.results.inputs import NothingToDrawError, ReportInp
 from opamc_cli.stages.report.results.provenance import provenance
 from opamc_cli.stages.report.templates import environment
 from opamc_cli.stages.report.views import axis_view, compared, heading, headline, loop_view
+from opamc_cli.stages.report.wording.numbers import moment, number, p_phrase, p_value
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 
@@ -185,10 +185,10 @@ def _draw(parts: "Sequence[tuple[str, Part]]", call: "Callable[[Part], Figure]")
 def _template() -> "jinja2.Template":
     found = environment(_resource)
     found.filters |= {
-        "number": wording.number,
-        "p_value": wording.p_value,
-        "p_phrase": wording.p_phrase,
-        "moment": wording.moment,
+        "number": number,
+        "p_value": p_value,
+        "p_phrase": p_phrase,
+        "moment": moment,
     }
     found.globals |= {"sign": state_sign, "role": state_role}
     return found.get_template("report.html.j2")

@@ -3,10 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.focus import Focus, pooled_features
 from opamc_cli.stages.report.onset import Onset, find_onset
 from opamc_cli.stages.report.results.inputs import ROLES, ReportInputs
+from opamc_cli.stages.report.wording import loop as loop_words
+from opamc_cli.stages.report.wording import verdict as verdict_words
+from opamc_cli.stages.report.wording.numbers import cause_phrase, effect_phrase, moment
 from opamc_cli.storage.runs.metadata import RunInfo
 
 CONDITIONS = (
@@ -23,9 +25,9 @@ MAX_VALUES = 4
 def headline(inputs: ReportInputs) -> str:
     """Return what the page is about in one sentence."""
     if inputs.verdict is not None:
-        return wording.headline(inputs.verdict)
+        return verdict_words.headline(inputs.verdict)
     if inputs.loop is not None:
-        return wording.loop_headline(inputs.loop)
+        return loop_words.loop_headline(inputs.loop)
     return "No verdict yet"
 
 
@@ -34,7 +36,7 @@ def heading(inputs: ReportInputs, title: str) -> str:
     verdict = inputs.verdict or {}
     robots = {s.info.robot for role in ROLES for s in inputs.roles[role].sources if s.info.robot}
     robot = verdict.get("robot") or (robots.pop() if len(robots) == 1 else None)
-    days = wording.day_span(verdict.get("target") or {})
+    days = verdict_words.day_span(verdict.get("target") or {})
     return " · ".join(part for part in (title, robot, days) if part)
 
 
@@ -43,16 +45,16 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
     entry = inputs.axis_verdict(axis) or {}
     features = dict(pooled_features(inputs, axis, focus.order[axis]) or {})
     features.update({k: v for k, v in (entry.get("features") or {}).items() if v is not None})
-    elsewhere = wording.said_elsewhere(entry)
+    elsewhere = verdict_words.said_elsewhere(entry)
     brief = entry.get("brief") or {}
     reasons = [str(reason) for reason in entry.get("reasons", ())]
     shown = [reason for reason in reasons if reason not in elsewhere]
     return {
         "axis": axis,
-        "inspect": wording.inspection(entry),
-        "likely": wording.likely_cause(entry),
-        "chance": wording.chance_phrase(entry, len((inputs.verdict or {}).get("axes", ()))),
-        "distance": wording.distance_phrase(entry),
+        "inspect": verdict_words.inspection(entry),
+        "likely": verdict_words.likely_cause(entry),
+        "chance": verdict_words.chance_phrase(entry, len((inputs.verdict or {}).get("axes", ()))),
+        "distance": verdict_words.distance_phrase(entry),
         "why": list(brief.get("evidence") or shown),
         "against": brief.get("against"),
         "more": [*(shown if brief else ()), *(entry.get("cause") or {}).get("why", ())],
@@ -62,12 +64,10 @@ def axis_view(inputs: ReportInputs, axis: int, focus: Focus) -> dict[str, Any]:
         "p_value": entry.get("p_value"),
         "p_adjusted": entry.get("p_adjusted"),
         "features": features,
-        "cause": wording.cause_phrase(entry.get("cause")),
-        "effect": wording.effect_phrase(entry["cause"]).replace("_", " ")
-        if entry.get("cause")
-        else "–",
+        "cause": cause_phrase(entry.get("cause")),
+        "effect": effect_phrase(entry["cause"]).replace("_", " ") if entry.get("cause") else "–",
         "reasons": reasons,
-        "advice": wording.advice(entry),
+        "advice": verdict_words.advice(entry),
         "since": _since(find_onset(inputs, axis, focus.order[axis])),
     }
 
@@ -86,7 +86,7 @@ def compared(inputs: ReportInputs) -> list[dict[str, Any]]:
                 inputs.scores["run"][mine], inputs.scores["cycle"][mine], strict=True
             )
         }
-        moments = [wording.moment(starts[0]), wording.moment(starts[-1])] if starts else []
+        moments = [moment(starts[0]), moment(starts[-1])] if starts else []
         rows.append(
             {
                 "role": role,
@@ -110,20 +110,18 @@ def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "axis": int(entry["axis"]),
         "unit": entry.get("unit", "A"),
-        "summary": wording.loop_phrase(entry),
+        "summary": loop_words.loop_phrase(entry),
         "declared": ", ".join(map(str, entry.get("declared", ()))),
         "sealed": ", ".join(map(str, entry.get("sealed", ()))),
         "before": entry.get("before") or {},
         "after": entry.get("after") or {},
         "orders": entry.get("orders"),
-        "remains": wording.remains(entry),
-        "steps": [
-            {**step, "effect_text": wording.effect_phrase(step)} for step in entry.get("steps", ())
-        ],
-        "columns": f"{wording.STEP_COLUMNS.capitalize()}.",
-        "experiments": wording.experiments(entry),
-        "rejected": [wording.set_aside(item) for item in entry.get("rejected", ())],
-        "untestable": [wording.set_aside(item) for item in entry.get("untestable", ())],
+        "remains": loop_words.remains(entry),
+        "steps": [{**step, "effect_text": effect_phrase(step)} for step in entry.get("steps", ())],
+        "columns": f"{loop_words.STEP_COLUMNS.capitalize()}.",
+        "experiments": loop_words.experiments(entry),
+        "rejected": [loop_words.set_aside(item) for item in entry.get("rejected", ())],
+        "untestable": [loop_words.set_aside(item) for item in entry.get("untestable", ())],
         "notes": [str(note) for note in entry.get("notes", ())],
     }
 
@@ -136,7 +134,7 @@ def _since(onset: Onset) -> str:
         )
     where = f"run {onset.first_run}"
     if onset.first_started_at:
-        where += f" (begun {wording.moment(onset.first_started_at)})"
+        where += f" (begun {moment(onset.first_started_at)})"
     if onset.first_cycle is not None and onset.first_cycle >= 0:
         where += f", cycle {onset.first_cycle}"
     return (

@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from opamc_cli.stages.report import wording
 from opamc_cli.stages.report.figures import partial_residuals
 from opamc_cli.stages.report.figures.figure import canvas, style, to_svg
 from opamc_cli.stages.report.figures.palette import PALETTE, colour
@@ -19,6 +18,8 @@ from opamc_cli.stages.report.onset import Onset, find_onset
 from opamc_cli.stages.report.results.columns import extremes, to_columns
 from opamc_cli.stages.report.results.inputs import ReportInputs, RoleTables, merged_config
 from opamc_cli.stages.report.views import _since
+from opamc_cli.stages.report.wording import verdict as verdict_words
+from opamc_cli.stages.report.wording.numbers import cause_phrase, moment, number
 
 
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(math.nan), max_size=300), st.integers(4, 60))
@@ -81,21 +82,21 @@ def test_null_numbers_become_nan() -> None:
     ],
 )
 def test_numbers_in_few_digits(value: object, text: str) -> None:
-    assert wording.number(value) == text
+    assert number(value) == text
 
 
 def test_the_headline_tells_which_joint_shakes_the_others() -> None:
     for index, said in ((101.0, " (axis 2 by far the most: look there first)"), (100.0, "")):
         axes = [(1, "fault", 10.0), (2, "fault", index), (3, "healthy", 0.1)]
         found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
-        said_of = wording.headline({"axes": found})
+        said_of = verdict_words.headline({"axes": found})
         assert said_of == f"Axes 1 and 2 at fault{said}; axis 3 healthy"
 
 
 def test_one_joint_shakes_the_others_whatever_they_are_called() -> None:
     axes = [(1, "fault", 3e7), (2, "changed", 700.0), (3, "changed", 3600.0)]
     found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
-    said = wording.headline({"axes": found})
+    said = verdict_words.headline({"axes": found})
     assert said == "Axis 1 at fault (by far the most: look there first); axes 2 and 3 changed"
 
 
@@ -107,10 +108,10 @@ def test_the_headline_tells_the_worst_first() -> None:
     states = {1: "healthy", 2: "changed", 3: "fault", 4: "healthy", 5: "fault"}
     verdict = {"axes": [{"axis": axis, "state": state} for axis, state in states.items()]}
     assert (
-        wording.headline(verdict)
+        verdict_words.headline(verdict)
         == "Axes 3 and 5 at fault; axis 2 changed; the other 2 axes healthy"
     )
-    assert wording.headline({"axes": []}) == "No axis was judged"
+    assert verdict_words.headline({"axes": []}) == "No axis was judged"
 
 
 def test_a_cause_names_effect_order_meaning_and_share() -> None:
@@ -120,16 +121,16 @@ def test_a_cause_names_effect_order_meaning_and_share() -> None:
         "interpretation": "flexspline tooth damage",
         "share": 0.834,
     }
-    assert wording.cause_phrase(cause) == (
+    assert cause_phrase(cause) == (
         "ripple (order 2.02, varies with speed): flexspline tooth damage; "
         "explains 83 % of the change"
     )
-    assert wording.cause_phrase(None) == "–"
+    assert cause_phrase(None) == "–"
 
 
 def test_moments_are_utc_and_nonsense_is_left_alone() -> None:
-    assert wording.moment("2026-03-01T08:30:00+02:00") == "2026-03-01 06:30 UTC"
-    assert wording.moment("yesterday") == "yesterday"
+    assert moment("2026-03-01T08:30:00+02:00") == "2026-03-01 06:30 UTC"
+    assert moment("yesterday") == "yesterday"
 
 
 def test_config_of_two_stages_is_merged_by_section() -> None:
@@ -259,7 +260,7 @@ def test_each_added_effect_has_a_panel_and_nothing_else_has(monkeypatch, count):
 def test_a_likely_cause_is_told_in_words_without_what_nobody_needs():
     """It was "..., by sublinear_friction; 0% remains unexplained; ... from thermal_viscous"."""
     cause = {"effect": "sublinear_friction", "interpretation": "friction: check grease"}
-    told = wording.likely_cause({"cause": cause | {"explained": 1.0, "ties": ["coulomb"]}})
+    told = verdict_words.likely_cause({"cause": cause | {"explained": 1.0, "ties": ["coulomb"]}})
     assert told == [
         "Friction",
         "explains 100% of the change",

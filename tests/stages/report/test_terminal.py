@@ -13,7 +13,7 @@ from opamc_cli.commands.model.shown import headline, loop_tables
 from opamc_cli.commands.terminal.tables import verdict_lines, verdict_table
 from opamc_cli.joint.explain.saturated import Ceiling
 from opamc_cli.joint.name.chain import PRICE
-from opamc_cli.stages.report.wording import (
+from opamc_cli.stages.report.wording.loop import (
     LEAST_CEILING,
     STEP_COLUMNS,
     ceiling_phrase,

@@ -9,7 +9,7 @@ from opamc_cli.decision.judge import Bundle
 from opamc_cli.decision.witnesses.amplitudes import AmplitudeCell, AmplitudeEvidence
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
-from opamc_cli.stages.report import wording
+from opamc_cli.stages.report.wording import verdict as verdict_words
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
 from opamc_cli.stages.verdict.brief import _tie, brief, foremost
 from opamc_cli.storage.sources import other_conditions
@@ -103,7 +103,7 @@ def test_a_sensor_s_noise_sends_nobody_to_the_gear():
     assert told["inspect"] == "Check before the gear: noise: check the sensor."
     assert "at standstill, too" in told["against"]
     entry = {"axis": 1, "state": "fault", "cause": cause}
-    assert wording.inspection(entry) == "Check the sensor; do that before opening the gear."
+    assert verdict_words.inspection(entry) == "Check the sensor; do that before opening the gear."
     assert _axis(entry, None).cause == "sensor_noise"
     # the same of an effect of the library that explains as little of a fault stands beside it
     assert _axis(entry | {"cause": cause | {"effect": "mains_hum"}}, None).cause is None
@@ -120,7 +120,7 @@ def test_a_late_current_sends_to_the_logger_first_and_to_the_gear_for_what_is_le
     assert told["inspect"] == f"Check before the gear: {late}."
     assert "moved in time as a whole (90% of the change)." in told["against"]
     entry = {"axis": 1, "state": "fault", "cause": cause}
-    assert wording.inspection(entry) == "Look at the logger; do that before opening the gear."
+    assert verdict_words.inspection(entry) == "Look at the logger; do that before opening the gear."
     assert _axis(entry, None).cause == "current_lag"
     cause["others"] = [{"effect": "ripple", "interpretation": "a tooth", "share": 0.08}]
     assert brief(judged, Bundle([], {}), cause)["against"].endswith("Besides: a tooth.")

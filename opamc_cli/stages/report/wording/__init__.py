@@ -1,0 +1,1 @@
+"""What a verdict and a loop say, in words."""
