@@ -25,6 +25,9 @@ REST_SHARE = 0.03
 REST_MARGIN_S = 0.02
 """Speed, relative to working speed, on both sides of a rest, and what makes a gap a long one."""
 
+LIKE = 0.33
+"""Of the larger: what speeds beside a gap that is passed evenly differ by at most (noise 0.2)."""
+
 FEWEST_CYCLES = 3
 LARGEST_DRIFT = 0.1
 AGREED = 2 / 3
@@ -47,9 +50,8 @@ def bridged(
     Angle and speed, (n,). As whole waves are resolved in satellite positioning: first the angle may
     change by any amount in every gap, and only speeds and accelerations of both sides tell how it
     goes on. Then each change is set to the nearest multiple of pi: the angle is steady within each
-    stretch of current, and on the same branch in all. In a long gap the speed goes straight from
-    that of one side to that of the other, or is nought between slow ones: a rest. Arguments are
-    those of `smoothed_angle`.
+    stretch of current, and on the same branch in all. In a long gap between like speeds the
+    joint goes on evenly, between slow ones it rests. Arguments are those of `smoothed_angle`.
     """
     if not strong.any():
         return np.zeros(strong.size), np.zeros(strong.size)
@@ -67,7 +69,8 @@ def bridged(
         sides = speed[max(first, stop - half) : stop], speed[start : min(last, start + half)]
         before, after = (float(np.median(side)) for side in sides)
         rests = min(max(abs(before), abs(after)), max(abs(speed[[stop - 1, start]]))) < slow
-        if rests or half > 2 * rate_hz / bandwidth_hz:
+        evenly = abs(after - before) < LIKE * max(abs(before), abs(after))
+        if rests or (evenly and half > 2 * rate_hz / bandwidth_hz):
             told[stop:start] = 0.0 if rests else np.linspace(before, after, start - stop)
             known[stop:start] = True
     angle, speed, _ = follow(told, known, rate_hz, bandwidth_hz)
