@@ -347,7 +347,7 @@ def test_wear_that_the_weather_hides_from_the_effect_is_no_lack_of_a_trend():
     start = "at fault, changed by 20%; distance from the baseline grows by "
     assert text.startswith(start), text
     assert text.endswith(
-        "a night, the change too unevenly to say when it reaches the 40% of a fault"
+        "a night, the change too unevenly to say when it reaches the fault level of 40%"
     )
     # what does not grow seldom seems to: the interval is one of 90 %
     still = [worn(0.0, 0.15, seed)[0] for seed in range(10)]
@@ -366,12 +366,10 @@ def test_few_nights_that_grow_by_more_than_nights_differ_grow():
     text, trend = said(0.4, 0.9, 1.4, 1.9)
     assert trend["distance"][0] == pytest.approx(0.5, abs=0.05)
     assert "distance from the baseline grows by 6" in text
-    assert text.endswith(" a night, too few nights to say when it reaches the 40% of a fault")
+    assert text.endswith(" a night, too few nights to say when it reaches the fault level of 40%")
     # where the effect is there already there is nothing to reach
     text, trend = said(0.4, 0.9, 1.4, 1.9, effect=0.5)
-    start = (
-        "at fault, changed by 50%; beyond the 40% of a fault, distance from the baseline grows by 6"
-    )
+    start = "at fault, changed by 50%; beyond the fault level of 40%, distance from the baseline grows by 6"
     assert (text.startswith(start), trend["reach"]) == (True, [0, 0])
     assert said(0.0, 2.0, 2.1, 2.0) == (
         "at fault, changed by 0%; too few nights for a trend",
@@ -392,7 +390,7 @@ def test_a_step_is_no_growth_and_what_is_reached_is_not_forecast():
     assert trend_phrase(grows | {"reach": [8, 80]}, 0.4).endswith("in 8 to 80 nights")
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4).endswith("in 8 nights at the earliest")
     grew = "distance from the baseline grows by 11 % (5.1 to 22) a night"
-    now = f"now beyond the 40% of a fault, {grew}"
+    now = f"now beyond the fault level of 40%, {grew}"
     assert trend_phrase(grows | {"reach": [8, 165]}, 0.4, reached=True) == now
 
 
@@ -415,7 +413,7 @@ def test_a_sensors_step_is_forecast_no_more_than_nights_that_stay():
     (alarm,) = settled(series).alarms
     assert (
         alarm.text
-        == "at fault, changed by 2%; was beyond the 40% of a fault before, not in this night"
+        == "at fault, changed by 2%; was beyond the fault level of 40% before, not in this night"
     )
 
 
@@ -604,7 +602,7 @@ def test_large_faults_that_come_back_are_an_alarm_that_says_so():
     told = [one for one in settled(rows).events if one.kind == "alarm"]
     assert [one.text for one in told] == [
         "axis 2: at fault, changed by 50%; comes and goes, in 3 nights until 2026-03-09; "
-        "now beyond the 40% of a fault, no trend"
+        "now beyond the fault level of 40%, no trend"
     ]
 
 

@@ -88,7 +88,7 @@ def trend_phrase(
     """
     if not trend:
         return "too few nights for a trend"
-    reach, level = trend["reach"], f"the {limit:.0%} of a fault"
+    reach, level = trend["reach"], f"the fault level of {limit:.0%}"
     farther = "a step, no trend since" if trend.get("step") else "no trend"
     if trend["distance"][1] > LEAP:
         farther = "distance from the baseline has leapt"
