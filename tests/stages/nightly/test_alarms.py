@@ -369,7 +369,8 @@ def test_few_nights_that_grow_by_more_than_nights_differ_grow():
     assert text.endswith(" a night, too few nights to say when it reaches the fault level of 40%")
     # where the effect is there already there is nothing to reach
     text, trend = said(0.4, 0.9, 1.4, 1.9, effect=0.5)
-    start = "at fault, changed by 50%; beyond the fault level of 40%, distance from the baseline grows by 6"
+    level = "at fault, changed by 50%; beyond the fault level of 40%"
+    start = f"{level}, distance from the baseline grows by 6"
     assert (text.startswith(start), trend["reach"]) == (True, [0, 0])
     assert said(0.0, 2.0, 2.1, 2.0) == (
         "at fault, changed by 0%; too few nights for a trend",
