@@ -40,7 +40,7 @@ GUESSED = (
 )
 COMMANDED = (
     "{}: axis{}_velocity is {:.1%} off the rate of change of the position and has no noise: "
-    "commanded, or filtered for long? It is left out; log the speed as it is measured, or none"
+    "commanded, or filtered for long? Logged speeds are left out; log them as measured, or none"
 )
 OTHER_RATIO = (
     "axis {}: beside the position the phases turn by {:.5g} electrical radians per radian, but "

@@ -301,7 +301,7 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     if unmissed:
         doubts.append(UNMISSED.format(axis, ", ".join(unmissed)))
     cancelling = _cancelling(loop.after)
-    if found & set(cancelling):
+    if len(cancelling) > 1 and found & set(cancelling):
         doubts.append(CANCEL.format(axis, " and ".join(cancelling), CANCELS))
     for names in sure.one:
         known = [name for name in names if not name.startswith("unnamed")]

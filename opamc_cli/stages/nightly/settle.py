@@ -185,8 +185,10 @@ def _missing(
                 weeks = min(_weeks_before(one, lacking, own) for one in gap)
                 if weeks == REST_WEEKS - 1:
                     text += f", as in the {weeks} weeks before; this weekday is not said again"
+                # Of a robot that had recorded for a year there would be other nights about it.
                 days = {one[5:] for one in gap}
-                if years := sorted(one for one in own if one[5:] in days and one < gap[0]):
+                first = min((one for one in own if one[5:] not in days), default=gap[0])
+                if years := sorted(one for one in own if one[5:] in days and one < first):
                     text += f"; it has files of {some(years)}: is its clock a year off?"
                 if not night:
                     text += f"; {HOW_TO_END}"

@@ -596,3 +596,8 @@ def test_a_robot_without_files_whose_clock_is_a_year_off_is_told_so():
     told = "; it has files of 2025-03-11: is its clock a year off?"
     said = missing([-355, *range(10), *range(11, 70)])
     assert said == [("2026-03-11", f"no file of 2026-03-11; others have some{told}")]
+    # one that recorded about that day, too, was there a year ago
+    said = missing([*range(-370, -340), *range(10), *range(11, 70)])
+    assert ("2026-03-11", "no file of 2026-03-11; others have some") in said
+    # and one that has no other night is no reason to give up
+    assert missing([-355])[0][1].startswith("no file of 2026-03-01")

@@ -102,7 +102,7 @@ def without_slips(angle: PhaseAngle, sure: Bools, period: int | None, rate_hz: f
     slips, slip, anchor = list[float](), 0.0, None
     # On the way to the first cycle's beginning a joint moves otherwise than one cycle later.
     known = np.where(sure, angle.velocity_rad_s, np.nan)[: 2 * period].reshape(2, period)
-    differs = np.abs(known[1] - known[0]) > LARGEST_DRIFT * np.nanmax(np.abs(known))
+    differs = np.abs(known[1] - known[0]) > LARGEST_DRIFT * np.nanmax(np.abs(known), initial=0.0)
     led_in = int(np.max(np.flatnonzero(differs), initial=-1)) + 1
     for start, stop in pieces:
         rest = path[start:stop] - course[np.arange(start, stop) % period]
