@@ -111,6 +111,19 @@ def _rendered(shown: "Sequence[RenderableType]") -> str:
     return text.getvalue()
 
 
+def _alike(texts: Sequence[str]) -> list[list[str]]:
+    """Group sentences, each once, that say the same of several files or axes, but for numbers."""
+    groups: dict[str, list[str]] = {}
+    for text in dict.fromkeys(texts):
+        subject, colon, rest = text.partition(": ")
+        if colon and FILE_NAME.fullmatch(subject):
+            text_of_all = re.sub(r"[0-9]+", "#", rest)
+        else:
+            text_of_all = re.sub(r"[0-9]+", "#", text) if subject.startswith("axis ") else text
+        groups.setdefault(text_of_all, []).append(text)
+    return list(groups.values())
+
+
 def gathered(failures: Sequence[str]) -> list[str]:
     """Return failures with one line for all files that fail alike, which it names.
 
@@ -123,13 +136,8 @@ def gathered(failures: Sequence[str]) -> list[str]:
     >>> gathered(["a.csv: cut off", "b.csv: no rate"])
     ['a.csv: cut off', 'b.csv: no rate']
     """
-    groups: dict[str, list[str]] = {}
-    for text in dict.fromkeys(failures):
-        subject, _, rest = text.partition(": ")
-        own = re.sub(r"[0-9]+", "#", rest) if FILE_NAME.fullmatch(subject) else text
-        groups.setdefault(own, []).append(text)
     lines = []
-    for first, *others in groups.values():
+    for first, *others in _alike(failures):
         names = [text.partition(": ")[0] for text in others]
         more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
         likewise = f"; likewise {', '.join(names[:MOST_NAMES])}{more}" if names else ""
@@ -153,16 +161,8 @@ def folded(texts: Sequence[str]) -> list[str]:
     >>> folded(["axis 3: no temperature", "axis 6: no temperature"])
     ['axes 3, 6: no temperature']
     """
-    groups: dict[str, list[str]] = {}
-    for text in dict.fromkeys(texts):
-        subject, colon, rest = text.partition(": ")
-        if colon and FILE_NAME.fullmatch(subject):
-            text_of_all = re.sub(r"[0-9]+", "#", rest)
-        else:
-            text_of_all = re.sub(r"[0-9]+", "#", text) if subject.startswith("axis ") else text
-        groups.setdefault(text_of_all, []).append(text)
     lines = []
-    for alike in groups.values():
+    for alike in _alike(texts):
         more = len(alike) - 1
         rests = {text.partition(": ")[2] for text in alike}
         if more and alike[0].startswith("axis ") and len(rests) == 1:
