@@ -8,6 +8,7 @@ from opamc_cli.decision.trend.slope import (
     LEAST_NIGHTS,
     NORMAL_999,
     is_step,
+    later_half,
     nights_until,
     robust_slope,
     slope_of_spread,
@@ -41,6 +42,31 @@ def test_the_forecast_holds_the_truth_in_nine_of_ten():
         low, high = nights_until(found, 0.5) or (np.inf, np.inf)
         inside += low <= (0.5 - (0.1 + 0.01 * 19)) / 0.01 <= high
     assert 0.8 <= inside / 400 <= 0.97
+
+
+def test_wear_that_quickens_is_forecast_by_its_later_nights():
+    """A straight line through all nights comes too late; 0.5 is reached 7 nights after the last."""
+    straight = quickened = 0
+    nights = np.arange(24.0)
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        values = 0.05 + 0.45 * (nights / 30) ** 1.5 + rng.normal(0, 0.03, 24)
+        found = robust_slope(nights, values)
+        lately = robust_slope(later_half(nights), later_half(values))
+        assert found is not None
+        low, high = nights_until(found, 0.5, lately) or (np.inf, np.inf)
+        quickened += np.floor(low) <= 7 <= high
+        straight += np.floor((nights_until(found, 0.5) or (np.inf,))[0]) <= 7
+    assert straight / 200 < 0.1
+    assert quickened / 200 > 0.85
+
+
+def test_the_later_half_is_of_six_nights_at_least():
+    assert [later_half(np.arange(float(n))).tolist() for n in (5, 9, 13)] == [
+        [0.0, 1.0, 2.0, 3.0, 4.0],
+        [3.0, 4.0, 5.0, 6.0, 7.0, 8.0],
+        [6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0],
+    ]
 
 
 def test_what_does_not_grow_has_no_forecast():

@@ -13,6 +13,7 @@ from opamc_cli.decision.trend.slope import (
     NORMAL_999,
     Slope,
     is_step,
+    later_half,
     nights_until,
     robust_slope,
     slope_of_spread,
@@ -62,7 +63,8 @@ def trend_of(
             return {}
         reached = median(effects[changed][-3:]) >= fault_effect
         return {"distance": _rounded(few), "reach": [0, 0] if reached else None, "step": step}
-    reach = nights_until(effect, fault_effect)
+    lately = robust_slope(later_half(nights), later_half(own[0]), sure)
+    reach = nights_until(effect, fault_effect, lately)
     return {
         "per_night": round(effect.per_night, 6),
         "low": round(effect.low, 6),
