@@ -841,3 +841,21 @@ def test_a_measured_arm_s_ripple_is_found_without_its_gear_ratio(tmp_path):
     loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
     assert loop["after"]["rmse_a"] <= after < loop["before"]["rmse_a"]
     assert "ripple" in {step["effect"] for step in loop["steps"]}
+
+
+@pytest.mark.parametrize("every", [1, 40])
+def test_names_of_a_cycle_of_few_samples_are_doubted(every, tmp_path, capsys):
+    """Five names for 17 samples of a screw's step held on sealed steps, copies of the others."""
+    made = simulate(3, ("quadratic_friction",), 15.0, rate=250.0, cycles=12)
+    rows = slice(0, made.current.size // every * every)
+    kept = {
+        name: values[rows].reshape(-1, every).mean(1)
+        for name, values in (("current", made.current), ("position", made.position))
+    }
+    columns = {f"axis1_{name}": values for name, values in kept.items()}
+    write_run(tmp_path / "run.parquet", 250.0 / every, **columns)
+    assert close(tmp_path, "--quiet", model=MODEL) in (0, 5)
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert "quadratic_friction" in {step["effect"] for step in entry["steps"]}
+    said = capsys.readouterr().err
+    assert ("are copies, which refute no name (quadratic_friction" in said) == (every == 40)
