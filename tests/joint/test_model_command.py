@@ -859,3 +859,23 @@ def test_names_of_a_cycle_of_few_samples_are_doubted(every, tmp_path, capsys):
     assert "quadratic_friction" in {step["effect"] for step in entry["steps"]}
     said = capsys.readouterr().err
     assert ("are copies, which refute no name (quadratic_friction" in said) == (every == 40)
+
+
+@pytest.mark.parametrize("begins", ["second", "nowhere"])
+def test_a_payload_since_a_recording_is_told_as_what_differs_there(begins, tmp_path, capsys):
+    """Two controllers of a screw: payload_change, since_s 5.33, where the second file begins."""
+    made = simulate(3, (), rate=250.0, cycles=8)
+    cut = made.current.size // 2
+    made.current[cut:] += np.std(made.current) * np.sin(made.position[cut:])
+    halves = (("first", slice(0, cut)), ("second", slice(cut, None)))
+    for name, rows in halves if begins == "second" else (("both", slice(None)),):
+        columns = {"axis1_current": made.current[rows], "axis1_position": made.position[rows]}
+        write_run(tmp_path / f"{name}.parquet", 250.0, **columns)
+    (tmp_path / "model.yaml").write_text(MODEL)
+    runs = sorted(tmp_path.glob("*.parquet"))
+    out = tmp_path / "out"
+    assert opamc("model", "close", *runs, "--model", tmp_path / "model.yaml", "--out", out) == 0
+    (entry,) = json.loads((out / "loop.json").read_text())["axes"]
+    assert "payload_change" in {step["effect"] for step in entry["steps"]}
+    said = "axis 1: payload_change is what differs from recording "
+    assert (said in capsys.readouterr().err) == (begins == "second")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, takewhile
+from itertools import count, pairwise, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +92,12 @@ ONCE = (
     "axis {}: no place is passed twice the same way, so friction at one may be whatever came at "
     "that time"
 )
+FROM_ONE_ON = (
+    "axis {}: payload_change is what differs from recording {} on: another program, controller or "
+    "mounting there would look like it"
+)
+AT_THE_START = 0.05
+"""Share of a recording by which a payload's time may miss its start: a true one ends 0.006 off."""
 ONE_TURN = (
     "axis {}: ripples of orders {} are multiples of the first: rather something that happens once "
     "in its turn, as where a brake rubs or a tooth is damaged, than a source for each"
@@ -322,6 +328,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     track = loop.after.dataset.fine.track
     if "position_drag" in found and "revisits" not in track.channels:
         laid.notes.append(ONCE.format(axis))
+    begun = _begins_with(loop, [one.name for one in laid.read.recordings])
+    if begun is not None:
+        laid.notes.append(FROM_ONE_ON.format(axis, begun))
     named = sorted(found & LIKE_ANOTHER_JOINT)
     if named and not any(one.others_rad for one in laid.read.recordings):
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)
@@ -373,8 +382,20 @@ def _of_a_cycle(loop: Loop) -> tuple[float, int]:
     numbers = sum(len(values) for values in loop.after.coefficients)
     numbers += sum(term.effect.searched(term.parameters) for term in terms)
     cycles = np.unique(grid.track.group[grid.parts.rows]).size
-    repeats = np.isfinite(grid.track.period_s) and cycles > 0
-    return (grid.parts.rows.size / cycles if repeats else np.inf), numbers
+    repeats = np.isfinite(grid.track.period_s) and len(grid.track.starts_s) == 1
+    return (grid.parts.rows.size / max(cycles, 1) if repeats else np.inf), numbers
+
+
+def _begins_with(loop: Loop, names: Sequence[str]) -> str | None:
+    """Name the recording with which a payload changes, within a twentieth of either beside it."""
+    track = loop.after.dataset.fine.track
+    edges_s = np.append(track.starts_s, track.time_s[-1])
+    near_s = [AT_THE_START * min(pair) for pair in pairwise(np.diff(edges_s))]
+    since = [step.term.parameters.get("since_s", np.inf) for step in loop.steps]
+    for name, start_s, within_s in zip(names[1:], edges_s[1:], near_s, strict=False):
+        if any(abs(since_s - start_s) < within_s for since_s in since):
+            return name
+    return None
 
 
 def _unmissed(loop: Loop) -> list[str]:
