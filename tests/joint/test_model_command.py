@@ -841,3 +841,41 @@ def test_a_measured_arm_s_ripple_is_found_without_its_gear_ratio(tmp_path):
     loop = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"][0]
     assert loop["after"]["rmse_a"] <= after < loop["before"]["rmse_a"]
     assert "ripple" in {step["effect"] for step in loop["steps"]}
+
+
+@pytest.mark.parametrize("every", [1, 40])
+def test_names_of_a_cycle_of_few_samples_are_doubted(every, tmp_path, capsys):
+    """Five names for 17 samples of a screw's step held on sealed steps, copies of the others."""
+    made = simulate(3, ("quadratic_friction",), 15.0, rate=250.0, cycles=12)
+    rows = slice(0, made.current.size // every * every)
+    kept = {
+        name: values[rows].reshape(-1, every).mean(1)
+        for name, values in (("current", made.current), ("position", made.position))
+    }
+    columns = {f"axis1_{name}": values for name, values in kept.items()}
+    write_run(tmp_path / "run.parquet", 250.0 / every, **columns)
+    assert close(tmp_path, "--quiet", model=MODEL) in (0, 5)
+    (entry,) = json.loads((tmp_path / "out" / "loop.json").read_text())["axes"]
+    assert "quadratic_friction" in {step["effect"] for step in entry["steps"]}
+    said = capsys.readouterr().err
+    assert ("are copies, which refute no name (quadratic_friction" in said) == (every == 40)
+
+
+@pytest.mark.parametrize("begins", ["second", "nowhere"])
+def test_a_payload_since_a_recording_is_told_as_what_differs_there(begins, tmp_path, capsys):
+    """Two controllers of a screw: payload_change, since_s 5.33, where the second file begins."""
+    made = simulate(3, (), rate=250.0, cycles=8)
+    cut = made.current.size // 2
+    made.current[cut:] += np.std(made.current) * np.sin(made.position[cut:])
+    halves = (("first", slice(0, cut)), ("second", slice(cut, None)))
+    for name, rows in halves if begins == "second" else (("both", slice(None)),):
+        columns = {"axis1_current": made.current[rows], "axis1_position": made.position[rows]}
+        write_run(tmp_path / f"{name}.parquet", 250.0, **columns)
+    (tmp_path / "model.yaml").write_text(MODEL)
+    runs = sorted(tmp_path.glob("*.parquet"))
+    out = tmp_path / "out"
+    assert opamc("model", "close", *runs, "--model", tmp_path / "model.yaml", "--out", out) == 0
+    (entry,) = json.loads((out / "loop.json").read_text())["axes"]
+    assert "payload_change" in {step["effect"] for step in entry["steps"]}
+    said = "axis 1: payload_change is what differs from recording "
+    assert (said in capsys.readouterr().err) == (begins == "second")

@@ -185,6 +185,12 @@ def test_a_position_tells_the_motions_that_a_coarse_speed_hides(tmp_path, encode
     if encoder == "turns":
         rows = run_stage(tmp_path, path).table.to_pylist()
         assert [r["direction"] for r in rows] == [m.direction for m in MOVES]
+        # a screw's mm: "axis1_velocity is beyond 60 rad/s (up to 87.8)" of one that reaches 109
+        by = 80 / np.abs(velocity).max()
+        faster = {name: values[name] * (by if "axis1_c" not in name else 1) for name in values}
+        notes = run_stage(tmp_path, save(tmp_path / "fast.parquet", faster, 1000.0)).notes
+        assert any("column axis1_position (its speed) is beyond 60 rad/s" in n for n in notes)
+        assert not any("column axis1_velocity is beyond" in n for n in notes)
         return
     with pytest.raises(InputError, match="no motion was found"):
         run_stage(tmp_path, path)

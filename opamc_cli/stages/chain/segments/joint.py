@@ -50,7 +50,7 @@ def joint_segments(
     """
     name = channels.current
     assert name is not None
-    velocity = _velocity(run, channels)
+    velocity, source = _velocity(run, channels)
     current = run.read([name])[name]
     known = current[np.isfinite(current)]
     if not known.size:
@@ -59,8 +59,8 @@ def joint_segments(
             "check the drive's log or leave the axis out"
         )
         raise InputError(msg)
-    speed_of = channels.velocity or f"{channels.position} (its speed)"
-    kind = "position" if channels.velocity is None else "velocity"
+    logged = source == channels.velocity
+    speed_of, kind = (source, "velocity") if logged else (f"{source} (its speed)", "position")
     beyond = [
         run.doubt(name),
         limited(run.path, name, known, LIMITS[run.info.current_unit]),
@@ -159,25 +159,22 @@ def _segments(
     ]
 
 
-def _of_position(
-    run: Run, name: str, logged: npt.NDArray[np.float64] | None = None
-) -> npt.NDArray[np.float64]:
-    """Return the speed of a position; the logged one where that is noise, too, or stands still."""
-    velocity = quiet_velocity(run.read([name])[name], run.sampling_rate_hz)
-    if logged is not None and (hides_motions(velocity) or not np.nan_to_num(velocity).any()):
-        return logged
-    return velocity
+def _velocity(run: Run, channels: AxisChannels) -> tuple[npt.NDArray[np.float64], str]:
+    """Return the joint's speed and the column it is of.
 
-
-def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
+    A position's where the logged speed is noise, unless that is noise, too, or stands still.
+    """
     # One column at the drive's rate: 8 h at 1 kHz are 230 MB.
-    if channels.velocity is not None:
-        velocity = run.read([channels.velocity])[channels.velocity].astype(np.float64)
-        if channels.position is not None and hides_motions(velocity):
-            velocity = _of_position(run, channels.position, velocity)
-    elif channels.position is not None:
-        velocity = _of_position(run, channels.position)
-    else:
+    velocity, source = np.zeros(0), channels.velocity
+    if source is not None:
+        velocity = run.read([source])[source].astype(np.float64)
+    if channels.position is not None and (source is None or hides_motions(velocity)):
+        by_place = quiet_velocity(
+            run.read([channels.position])[channels.position], run.sampling_rate_hz
+        )
+        if source is None or (np.nan_to_num(by_place).any() and not hides_motions(by_place)):
+            velocity, source = by_place, channels.position
+    if source is None:
         axis = channels.axis
         msg = (
             f"{run.path}: axis {axis} has axis{axis}_current only; its motions need "
@@ -185,7 +182,6 @@ def _velocity(run: Run, channels: AxisChannels) -> npt.NDArray[np.float64]:
         )
         raise InputError(msg)
     if not np.isfinite(velocity).any():
-        column = channels.velocity or channels.position
-        msg = f"{run.path}: column {column} holds no number; check the drive's log"
+        msg = f"{run.path}: column {source} holds no number; check the drive's log"
         raise InputError(msg)
-    return velocity
+    return velocity, source

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from opamc_cli.storage.ingest.guess.names import Meant, nearness, says_actual
+from opamc_cli.storage.ingest.guess.names import Meant, counts_time, nearness, says_actual
 from opamc_cli.storage.ingest.map.axes import MOST_AXES
 from opamc_cli.storage.schemas.channels import LOGGED, PHASES
 
@@ -71,9 +71,9 @@ def choose(meant: Sequence[Meant]) -> dict[str, Choice]:
 
 
 def time_channel(meant: Sequence[Meant]) -> Meant | None:
-    """Return the channel of time stamps."""
+    """Return the channel of time stamps; one that only its unit tells if there is no other."""
     stamps = [channel for channel in meant if channel.quantity == "time" and channel.measured]
-    return stamps[0] if stamps else None
+    return min(stamps, key=lambda channel: counts_time(channel.pattern), default=None)
 
 
 def _within(choice: Choice, axes: set[int]) -> Choice:

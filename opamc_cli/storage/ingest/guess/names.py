@@ -18,6 +18,9 @@ WORDS = {
 }
 """Words of a name by quantity, in the order in which they decide."""
 
+TIME_UNITS = ("ms", "us", "ns", "msec", "usec", "millis", "micros", "sec", "secs", "seconds")
+"""Last words of a name that is of time if nothing else is in it, such as `host_ms`."""
+
 NOT_MEASURED = (
     *("target", "command", "commanded", "cmd", "cmptd", "computed", "desired", "des", "setpoint"),
     *("ref", "reference", "limit", "error", "sm", "model", "std", "planned", "nominal"),
@@ -173,6 +176,8 @@ def _quantity(pattern: str, unit: str | None) -> str | None:
         # shares of a rated current are compared as well, those of an angle or a speed are no motion
         if any(word in known for word in words) and not (unit == "%" and quantity in LOGGED):
             return quantity
+    if unit is None and counts_time(pattern):
+        return "time"
     if unit is None or is_torque(unit):
         return None  # a torque may be of anything
     return next((each for each in TOLD_BY_UNIT if conversion(unit, each)), None)
@@ -180,6 +185,18 @@ def _quantity(pattern: str, unit: str | None) -> str | None:
 
 def _is_measured(pattern: str) -> bool:
     return not any(word in NOT_MEASURED for word in _words(pattern))
+
+
+def counts_time(pattern: str) -> bool:
+    """Return whether a name says by a unit at its end alone that it is of time.
+
+    Examples
+    --------
+    >>> counts_time("host_ms"), counts_time("time_ms"), counts_time("millis"), counts_time("msg")
+    (True, False, True, False)
+    """
+    words = _words(pattern)
+    return bool(words) and words[-1] in TIME_UNITS and not any(w in WORDS["time"] for w in words)
 
 
 def says_actual(pattern: str) -> bool:

@@ -46,6 +46,9 @@ ANGLE_UNITS = {
 RATES_HZ = (5.0, 20_000.0)
 """Rates at which arms are logged."""
 
+FASTEST_HZ = 1e6
+"""Of stamps in seconds, which no other unit makes a log of: a drive's capture, a probe."""
+
 DATES_S = (9.467e8, LATEST_S)
 """Seconds from 1970 to 2000 and to 2080: within, no two units of time take a number for a date."""
 
@@ -159,7 +162,7 @@ def time_unit(stamps: Float) -> Guess | None:
     for unit in ("s", "ms", "us", "ns"):
         if RATES_HZ[0] <= rates[unit] <= RATES_HZ[1]:
             return Guess(unit, f"steps of {step:.6g}")
-    return None
+    return Guess("s", f"steps of {step:.6g}") if RATES_HZ[1] < rates["s"] <= FASTEST_HZ else None
 
 
 def are_phases(a: Float, b: Float, c: Float) -> bool:

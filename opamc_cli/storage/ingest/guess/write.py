@@ -16,7 +16,7 @@ from opamc_cli.storage.ingest.convert import UNSIGNED, quarters_of
 from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
 from opamc_cli.storage.ingest.guess.channels import Choice, choose, time_channel
 from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
-from opamc_cli.storage.ingest.guess.names import Meant, meanings
+from opamc_cli.storage.ingest.guess.names import Meant, counts_time, meanings
 from opamc_cli.storage.ingest.guess.values import (
     MOST_TURNS,
     Float,
@@ -148,6 +148,8 @@ def _look(path: Path, encoding: str | None = None) -> _Look:
         program = _program(source)
         chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
         values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
+    if time and counts_time(time.pattern) and _time_guess(time, values[_key(time)]) is None:
+        time = None
     logged = choices.get("temperature", Choice("temperature", {}, ()))
     odd = {n: one for n, one in logged.by_axis.items() if _is_of_no_joint(values[_key(one)], one)}
     for axis in odd:

@@ -372,3 +372,27 @@ def test_channels_of_two_rates_have_none_that_could_be_pointed_to(tmp_path):
             [ChannelObject("drive", name, x, {"wf_increment": step}) for name, step in named]
         )
     assert "sampling_rate_hz:  #" in guess_map([path])
+
+
+@pytest.mark.parametrize(
+    ("columns", "line"),
+    [
+        # a servo's snapshots, `host_ms`: "no channel tells it: write the samples per second"
+        (
+            {"host_ms": 10 * T * 100},
+            "time: {source: host_ms, unit: ms} # steps of 10: 100 Hz, even",
+        ),
+        # another that only its unit tells, and how long a loop took
+        (
+            {"loop_us": 900 + 50 * ANGLE, "t": T},
+            "time: {source: t, unit: s} # steps of 0.01: 100 Hz, even",
+        ),
+        (
+            {"loop_us": 900 + 50 * ANGLE},
+            "sampling_rate_hz: # no channel tells it: write the samples per second",
+        ),
+    ],
+)
+def test_a_clock_whose_unit_alone_tells_that_it_is_one(tmp_path, columns, line):
+    path = table(tmp_path / "a.csv", {**columns, "pos": ANGLE, "cur": SPEED})
+    assert line in lines_of(path)[0]

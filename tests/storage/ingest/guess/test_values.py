@@ -138,6 +138,9 @@ def test_rates_are_those_of_loggers():
         assert rate_from_speed({1: np.arange(50.0) / rate}, {1: np.ones(50)}) == known
     for step, unit in ((0.19, "s"), (0.21, "ms"), (0.21e3, "us"), (5.1e-5, "s")):
         assert time_unit(np.arange(50) * step + 0.5).unit == unit, step
+    # a servo's current at 20 kHz, whose steps are 4.99999e-05: "t fits no unit of time"
+    for step in (50e-6 * (1 - 1e-9), 1e-5, 1.1e-6):
+        assert time_unit(np.arange(50) * step + 0.5).unit == "s", step
     assert time_unit(np.arange(50) * 1e-9 + 0.5) is None
 
 
