@@ -91,8 +91,7 @@ def late_means(
     Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
     no more than there are blocks; between samples it is what a straight line between them gives.
     """
-    blocks = sum((stop - start) // factor for start, stop in bounds)
-    means = np.empty((blocks, sums.shape[1]))
+    means = np.empty((sum((stop - start) // factor for start, stop in bounds), sums.shape[1]))
     _late_means(sums, np.array(bounds), samples, factor, means)
     return means
 

@@ -310,7 +310,9 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     track = loop.after.dataset.fine.track
     if "position_drag" in found and "revisits" not in track.channels:
         laid.notes.append(ONCE.format(axis))
-    named = sorted(found & LIKE_ANOTHER_JOINT)
+    # What follows the payloads that each run tells follows no other joint.
+    told = {step.term.effect.name for step in loop.steps if "per_kg" in step.term.parameters}
+    named = sorted((found - told) & LIKE_ANOTHER_JOINT)
     if named and not any(one.others_rad for one in laid.read.recordings):
         slowest = SLOWEST_ORDERS.get(loop.after.dataset.fine.track.angle_kind, 0.0)
         unlikely = any(_of_the_program(step.term, slowest) for step in loop.steps)
