@@ -80,7 +80,7 @@ class TimeDelay(Effect):
         if not parameters.get("filtered"):
             return self.meaning
         corner_hz = 1 / (2 * np.pi * parameters["delay_s"])
-        return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
+        return f"a current that is reported through a filter of {corner_hz:.0f} Hz: no fault"
 
 
 def late_means(
