@@ -83,7 +83,12 @@ class PayloadChange(Effect):
         early, late = times[widest : widest + 2]
         # Tools are changed between recordings.
         starts = [start for start in track.starts_s if early < start <= late]
-        return parameters | {"since_s": float(np.median(starts or (early, late)))}
+        since_s = float(np.median(starts or (early, late)))
+        told = times if track.payload_kg is None else track.payload_kg[rows]
+        # From then on the runs tell another one: what that asks holds elsewhere, too.
+        if told[0] != told[-1] and np.all(told == np.where(times < since_s, told[0], told[-1])):
+            return {"per_kg": 1.0}
+        return parameters | {"since_s": since_s}
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""

@@ -32,9 +32,8 @@ def opamc(*arguments):
     return int(stopped.value.code or 0)
 
 
-def closed_on(folder, told):
-    """Close the loop on five runs whose payloads are neither a step in time nor in order."""
-    payloads = (0.0, 2.5, 1.0, 3.0, 0.5, 2.0)
+def closed_on(folder, told, payloads=(0.0, 2.5, 1.0, 3.0, 0.5, 2.0)):
+    """Close the loop on runs with payloads, by default neither a step in time nor in order."""
     runs = [
         write_run(folder / f"run{k}.parquet", kg, kg if told else None, k)
         for k, kg in enumerate(payloads)
@@ -68,3 +67,9 @@ def test_payloads_that_nobody_tells_are_asked_for(tmp_path):
     axis = closed_on(tmp_path, told=False)
     assert not axis["steps"]
     assert any("payload_kg" in note for note in axis["notes"])
+
+
+def test_a_step_to_another_told_payload_is_told_by_the_kg(tmp_path):
+    axis = closed_on(tmp_path, told=True, payloads=(0.0, 0.0, 0.0, 2.0, 2.0, 2.0))
+    (step,) = axis["steps"]
+    assert step["parameters"] == {"per_kg": 1.0}
