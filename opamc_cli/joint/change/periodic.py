@@ -36,8 +36,7 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
         return [faint] if plain is None else [faint, plain]
     if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
         # One line is at the mesh's order for some number of pole pairs: of lost stiffness, too.
-        resolution = plain.evidence["order_resolution"]
-        other = read_line(plain.lines[0], compared.track, resolution)
+        other = read_line(plain.lines[0], compared.track, plain.evidence["order_resolution"])
         return [replace(other, power=plain.power), plain]
     return [] if plain is None else [plain]
 

@@ -208,8 +208,7 @@ def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:
 def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:
     ratio = track.joint.gear_ratio
     place, doubt = _frame(lines, track, resolution, poles)
-    near = [line for line in lines if abs(_corrected(line, poles) - 2.0) < 0.25] or lines
-    first = near[0]
+    first = ([line for line in lines if abs(_corrected(line, poles) - 2.0) < 0.25] or lines)[0]
     cycles = _near(first, poles, track, 0.25) or 2
     measured = 2 * _corrected(first, poles) / cycles
     # What grows between two recordings is rather damage: in doubt the flexspline is named first.

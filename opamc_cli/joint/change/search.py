@@ -157,8 +157,7 @@ class Grease:
         """
         thinner = not self.logged and self.wet < min(self.dry / 2, 0.0)
         logged = self.warmer_c is not None and self.warmer_c > 0 and self._within(self.whole)
-        warm = thinner if self.warmer_c is None else logged
-        return warm and shift.falls > 0
+        return (thinner if self.warmer_c is None else logged) and shift.falls > 0
 
     def cause(self, shift: Shift, p_value: float, ties: tuple[str, ...]) -> SlowCause:
         """Name it."""

@@ -67,8 +67,7 @@ class Compared:
         """Put other tracks on the fine and on the coarse grid."""
         fine, coarse = (grid_of(track, whole=True) for track in tracks)
         # Another dataset, for what was kept is of the other units.
-        dataset = Dataset(fine, coarse, self.dataset.factor, self.dataset.grouping)
-        return Compared(dataset, after)
+        return Compared(Dataset(fine, coarse, self.dataset.factor, self.dataset.grouping), after)
 
     def enough(self) -> "Compared":
         """Leave units out of which one of the grids shows next to nothing."""

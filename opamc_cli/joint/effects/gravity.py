@@ -30,8 +30,7 @@ class Gravity(Effect):
         """Travels of the joint from a few degrees to a whole turn, where nobody knows it."""
         if "scale" in track.channels:
             return [{}]
-        travel = max(track.travel_rad, 1e-9)
-        return [{"joint_rad_per_rad": joint / travel} for joint in TRAVELS_RAD]
+        return [{"joint_rad_per_rad": joint / max(track.travel_rad, 1e-9)} for joint in TRAVELS_RAD]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to somewhat more than a turn of the joint."""

@@ -65,11 +65,9 @@ class MainsHum(Effect):
                 if last > first:
                     best = first + int(np.argmax(power[first:last]))
                     found.append((float(power[best]), float(frequencies[best]), float(turning)))
-        found = [one for one in found if one[0] > 0.5 * LEAST_LINE * np.count_nonzero(residual)]
-        found.sort(reverse=True)
-        return [
-            {"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found[:2]
-        ]
+        least = 0.5 * LEAST_LINE * np.count_nonzero(residual)
+        found = sorted((one for one in found if one[0] > least), reverse=True)[:2]
+        return [{"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found]
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
         """Half of what two frequencies have to differ by."""

@@ -7,8 +7,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, stack
 from opamc_cli.joint.motion.track import Floats, Track
 
-GUESSES = 32
-NEAR = 4
+GUESSES, NEAR = 32, 4
 LEAST_SIDE = 0.03
 """Share of the open samples before or after the step."""
 RESTS = 8
@@ -16,7 +15,7 @@ RESTS = 8
 
 
 class PayloadChange(Effect):
-    """Gravity and inertia that step at some time, or between the same rests of every cycle."""
+    """Gravity and inertia that step at some time, between a cycle's rests, or as metadata tell."""
 
     name = "payload_change"
     domain = "load"
@@ -24,7 +23,7 @@ class PayloadChange(Effect):
     of_its_recordings = True
     origin = "load"
     changes_in_time = True
-    searches = ("since_s", "gripped_s", "released_s")
+    searches = ("since_s", "gripped_s", "released_s", "per_kg")
     meaning = "another payload: check the tool, not the gear"
     needs = ("scale", "revisits")
     from_motion = True
@@ -45,6 +44,9 @@ class PayloadChange(Effect):
         # Where phases follow the joint, half turns that are lost from rest to rest look the same.
         held = "logged" in track.channels and np.isfinite(track.period_s)
         pairs = combinations(_rests(track) if held else (), 2)
+        # What each run is told to carry is no step, and is known of those left out, too.
+        if track.payload_kg is not None and np.ptp(track.payload_kg) > 0:
+            steps.append({"per_kg": 1.0})
         return [*steps, *({"gripped_s": one, "released_s": other} for one, other in pairs)]
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
@@ -58,6 +60,8 @@ class PayloadChange(Effect):
             place = track.run_time_s % track.period_s
             since, until = parameters["gripped_s"], parameters["released_s"]
         after = ((place >= since) & (place < until)).astype(float)
+        if "per_kg" in parameters:
+            after = np.zeros(track.size) if track.payload_kg is None else track.payload_kg
         return stack(
             after * np.sin(track.position_rad),
             after * np.cos(track.position_rad),
@@ -79,10 +83,17 @@ class PayloadChange(Effect):
         early, late = times[widest : widest + 2]
         # Tools are changed between recordings.
         starts = [start for start in track.starts_s if early < start <= late]
-        return parameters | {"since_s": float(np.median(starts or (early, late)))}
+        since_s = float(np.median(starts or (early, late)))
+        told = times if track.payload_kg is None else track.payload_kg[rows]
+        # From then on the runs tell another one: what that asks holds elsewhere, too.
+        if told[0] != told[-1] and np.all(told == np.where(times < since_s, told[0], told[-1])):
+            return {"per_kg": 1.0}
+        return parameters | {"since_s": since_s}
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Say whether it changes in every cycle."""
+        if "per_kg" in parameters:
+            return "payloads as the recordings' payload_kg tells: no fault"
         held = "a payload held from {gripped_s:.3g} to {released_s:.3g} s of every cycle: no fault"
         return held.format(**parameters) if "gripped_s" in parameters else self.meaning
 

@@ -80,7 +80,7 @@ class TimeDelay(Effect):
         if not parameters.get("filtered"):
             return self.meaning
         corner_hz = 1 / (2 * np.pi * parameters["delay_s"])
-        return f"the current is reported through a filter of {corner_hz:.0f} Hz: no fault"
+        return f"a current that is reported through a filter of {corner_hz:.0f} Hz: no fault"
 
 
 def late_means(
@@ -91,8 +91,7 @@ def late_means(
     Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
     no more than there are blocks; between samples it is what a straight line between them gives.
     """
-    blocks = sum((stop - start) // factor for start, stop in bounds)
-    means = np.empty((blocks, sums.shape[1]))
+    means = np.empty((sum((stop - start) // factor for start, stop in bounds), sums.shape[1]))
     _late_means(sums, np.array(bounds), samples, factor, means)
     return means
 

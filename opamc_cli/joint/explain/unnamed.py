@@ -158,8 +158,7 @@ def stretched(values: Floats, members: Bools, rows: Ints | slice = slice(None)) 
     levels = np.interp(np.linspace(0, known.size - 1, QUANTILES), np.arange(known.size), known)
     span = max(float(levels[-1] - levels[0]), 1e-300)
     rank = np.interp(values, levels, np.linspace(0, 1, QUANTILES))
-    linear = np.clip((values - levels[0]) / span, 0, 1)
-    return np.asarray(0.5 * (rank + linear))
+    return np.asarray(0.5 * (rank + np.clip((values - levels[0]) / span, 0, 1)))
 
 
 def travel_since_reversal(track: Track) -> Floats:

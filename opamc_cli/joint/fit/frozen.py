@@ -50,7 +50,10 @@ class Applied:
 
 def why_not_applied(term: Term, track: Track) -> str | None:
     """Say why a term's coefficients mean nothing on other recordings; None where they do."""
-    if term.effect.of_its_recordings:
+    told = "per_kg" in term.parameters
+    if told and track.payload_kg is None:
+        return "payload_kg is not in the metadata of every run"
+    if term.effect.of_its_recordings and not told:
         return "its coefficients are of the recordings that it was fitted to"
     if term.effect.domain in PLACED and "logged" not in track.channels:
         return "the phases tell how far the joint turns, but not where it begins: log the position"

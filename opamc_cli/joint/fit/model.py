@@ -190,8 +190,7 @@ def dataset_of(
     pieces = thinned(track, grouping, grouping.open, most)
     if not ends:
         return _dataset(cut(track, pieces), grouping)
-    sealed = thinned(track, grouping, grouping.sealed, most)
-    both = cut(track, sorted((*pieces, *sealed)))
+    both = cut(track, sorted((*pieces, *thinned(track, grouping, grouping.sealed, most))))
     return replace(_dataset(cut(track, pieces), grouping), opened=_dataset(both, grouping))
 
 

@@ -200,8 +200,7 @@ class Sums:
     @cached_property
     def coefficients(self) -> Floats:
         """Fit to all units but each one, shape (units, k)."""
-        moment = self.parts.elsewhere(self.moment)
-        return np.asarray(np.einsum("uij,uj->ui", self.inverses, moment))
+        return np.asarray(np.einsum("uij,uj->ui", self.inverses, self.parts.elsewhere(self.moment)))
 
     def held_out(self) -> Floats:
         """Sum of squared errors of each part, of the fit to all units but its own; shape (p,)."""
@@ -216,5 +215,4 @@ class Sums:
 
 def _summed(values: Floats, places: Ints) -> Floats:
     """Sum parts' values over each place; places ascend from 0, and none is left out."""
-    firsts = np.flatnonzero(np.diff(places, prepend=-1))
-    return np.asarray(np.add.reduceat(values, firsts, axis=0))
+    return np.asarray(np.add.reduceat(values, np.flatnonzero(np.diff(places, prepend=-1)), axis=0))

@@ -59,6 +59,8 @@ class Recording:
     """With `position_rad`, `velocity_rad_s`: joint side; (n,) or None."""
     started_s: float | None = None
     """Start of the run on a clock common to all runs."""
+    payload_kg: float | None = None
+    """What the run's metadata say that the arm carries."""
     others_rad: Mapping[int, Floats] = field(default_factory=dict)
     """Positions of the arm's other joints by axis, where they are logged; (n,) each."""
 
@@ -348,6 +350,7 @@ def _one(
         joint=joint,
         channels=frozenset(name for name, known in channels.items() if known),
         temperature_c=None if temperature is None else unstepped(filled(temperature)),
+        payload_kg=None if recording.payload_kg is None else np.full(n, recording.payload_kg),
         electrical_rad=electrical,
         kernel=motion.kernel,
         evenly_smooth=motion.evenly_smooth,

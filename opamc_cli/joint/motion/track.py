@@ -76,8 +76,9 @@ class Track:
     """What was logged or follows from it: position, logged (motion beside the current), scale,
     temperature, phases, electrical."""
     temperature_c: Floats | None = None
+    payload_kg: Floats | None = None
     electrical_rad: Floats | None = None
-    """With `temperature_c`: where known; (n,) or None."""
+    """With `temperature_c`, `payload_kg`: where known; (n,) or None."""
     static_terms: "Terms" = ()
     """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None

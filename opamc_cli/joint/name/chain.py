@@ -130,8 +130,7 @@ class Chain:
         them do, with fewer coefficients: they follow a slow noise better than any one step.
         """
         before, left = (float(one.fit.sums.held_out().sum()) for one in (other, self))
-        offsets = float(other.fit.drift_free_error.sum())
-        as_drift = before - left < EXACT * (before - offsets)
+        as_drift = before - left < EXACT * (before - float(other.fit.drift_free_error.sum()))
         return self.gain_beside_drift(other)[0] < least_share and as_drift
 
     def gain_beside_smoothing(self, other: "Chain") -> float:

@@ -37,8 +37,7 @@ def refined(term: Term, beside: Beside) -> Term:
         return moved
 
     def lost(values: Floats) -> float:
-        moved = outwards(values)
-        tried = sketch | {name: moved[name] for name in names}
+        tried = sketch | {k: value for k, value in outwards(values).items() if k in limits}
         return -beside.candidate(Term(term.effect, tried, term.keep)).gain
 
     start, step = np.empty((2, len(names)))

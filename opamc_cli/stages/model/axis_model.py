@@ -197,7 +197,12 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         If a run is too short.
     """
     recordings = [
-        replace(read_recording(run, axis), others_rad=positions_beside(run, axis)) for run in runs
+        replace(
+            read_recording(run, axis),
+            others_rad=positions_beside(run, axis),
+            payload_kg=run.info.payload_kg,
+        )
+        for run in runs
     ]
     robots = sorted({run.info.robot for run in runs if run.info.robot is not None})
     if len(robots) > 1:

@@ -51,6 +51,10 @@ def declared_term(effect: Effect, declared: DeclaredEffect, track: Track) -> Ter
             "above 0"
         )
         raise ConfigError(msg)
+    # What is placed by other parameters, as a payload by the rests of a cycle, needs none of these.
+    otherwise = {*given} & {*effect.searches} - {*searched}
+    if otherwise:
+        searched, defaults = {}, dict.fromkeys(effect.forms, 0.0)
     for name in searched:
         if name not in given:
             msg = (

@@ -319,7 +319,10 @@ def test_a_tool_is_changed_between_recordings_if_nothing_open_tells(begins_s, si
     """In the middle of what is sealed half of that was predicted with the wrong payload."""
     rows = np.r_[0:30, 61:100]
     track = SimpleNamespace(
-        open_samples=rows, time_s=np.arange(100) / 10, starts_s=np.array([0.0, begins_s])
+        open_samples=rows,
+        time_s=np.arange(100) / 10,
+        starts_s=np.array([0.0, begins_s]),
+        payload_kg=None,
     )
     found = built_in_library()["payload_change"].settled({"since_s": 3.3}, track)
     assert found["since_s"] == pytest.approx(since)

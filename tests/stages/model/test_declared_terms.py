@@ -81,3 +81,14 @@ def test_a_column_that_an_effect_has_not_is_refused():
     term = declared_term(built_in_library()["gravity"], declared, track)
     with pytest.raises(ConfigError, match="'gravity' has no column 7; its 2 count from 0"):
         term.columns(track)
+
+
+def test_a_payload_that_is_held_in_every_cycle_is_declared_by_its_rests():
+    """`model evaluate` refused its own closed model: "declared without 'since_s'"."""
+    path = np.cumsum(np.sin(np.arange(2000) / 100)) / 100
+    track = build_track([Recording("r", 250.0, current_a=path, position_rad=path)], Joint())
+    held = {"gripped_s": 0.5, "released_s": 2.0}
+    declared = DeclaredEffect(effect="payload_change", parameters=held)
+    term = declared_term(built_in_library()["payload_change"], declared, track)
+    assert term is not None
+    assert term.parameters == held

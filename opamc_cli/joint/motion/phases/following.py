@@ -141,8 +141,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
         bandwidth = narrower
         angle, velocity, acceleration = smoothed()
     limit = NOISIEST_SHARE * float(np.std(acceleration[strong])) if strong.any() else 0.0
-    per_radian = acceleration_noise(1.0, rate_hz, bandwidth)
-    clear = strong & (per_radian * angle_noise <= limit)
+    clear = strong & (acceleration_noise(1.0, rate_hz, bandwidth) * angle_noise <= limit)
     window = int(rate_hz / bandwidth) | 1
     path = np.where(strong, measured, angle)
     sizes = [int(times * rate_hz / bandwidth) | 1 for times in (0.5, 2)]
@@ -158,8 +157,7 @@ def _turning(vector: NDArray[np.complex128], rate_hz: float) -> tuple[Floats, Fl
     smooth = uniform_filter1d(turns, 15, mode="constant")
     weight = uniform_filter1d(np.abs(turns), 15, mode="constant")
     coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
-    speed: Floats = np.concatenate([[0.0], np.angle(smooth)]) * rate_hz
-    return speed, np.concatenate([[0.0], coherence])
+    return np.concatenate([[0.0], np.angle(smooth)]) * rate_hz, np.concatenate([[0.0], coherence])
 
 
 def averaged_angle(
@@ -170,8 +168,7 @@ def averaged_angle(
     Returns which samples tell an angle, alone or averaged, and that angle modulo pi, both (n,). The
     noise is that of each of the vector's components; below the floor no vector counts.
     """
-    length = np.abs(vector)
-    alone = length > max(STRONG * noise, floor)
+    alone = np.abs(vector) > max(STRONG * noise, floor)
     width = max(int(AVERAGE_S * rate_hz), 1) | 1
     turned_back = vector * np.exp(-1j * angle_rad)
     square = uniform_filter1d(turned_back**2, width, mode="constant")

@@ -61,8 +61,7 @@ class PhaseAngle:
         fast = np.abs(speed) > FAST * float(np.quantile(np.abs(speed), 0.95))
         ratios = self.velocity_rad_s[rows][fast] / speed[fast]
         slope = _slope(angle, position, speed, float(np.median(ratios)) if fast.any() else 1.0)
-        rest = np.exp(2j * (angle - slope * position))
-        lag_s = _lag(rest, slope * speed, LONGEST_LAG_S)
+        lag_s = _lag(np.exp(2j * (angle - slope * position)), slope * speed, LONGEST_LAG_S)
         time_s = np.arange(position_rad.size) / rate_hz
         path = slope * np.interp(time_s - lag_s, time_s, position_rad)
         offset = complex(np.mean(np.exp(2j * (angle - path[rows]))))
