@@ -64,7 +64,7 @@ def close(
         msg = "moves too little"
         raise RefusedError(msg)
     anew = None if "windows" in without_rules else ways.fit_anew
-    loop = close_loop(fit, library, seed, without_rules, anew)
+    loop = close_loop(fit, library, seed, without_rules, anew, ways.turned)
     return Closed(
         loop.rmse_before_a,
         loop.rmse_after_a,

@@ -117,12 +117,19 @@ def close_loop(
     seed: int = 0,
     without_rules: Collection[str] = (),
     anew: Anew | None = None,
+    turned: Callable[[Fit], Fit | None] | None = None,
 ) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
     The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off. Where
     `anew` finds a better motion beside what may lack, or beside what was found, that is closed.
     """
+    for _ in range(3 if turned is not None else 0):
+        named = beam(chain_of(before, 0), Pool.of(before.dataset, library, without=without_rules))
+        sided = turned(named.fit)
+        if sided is None:
+            break
+        before = sided
     told = anew(before, ()) if anew is not None else None
     loop = _closed(told or before, library, seed, without_rules, before)
     if told is not None and loop.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.

@@ -8,6 +8,7 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.time_delay import TimeDelay
+from opamc_cli.joint.explain.sides import turned_by
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES
@@ -89,6 +90,26 @@ class Ways:
         if best == present and _left(searched) >= BETTER * _left(fit_terms(dataset, kept)):
             return None
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
+
+    def turned(self, named: Fit) -> Fit | None:
+        """Fit the declared model to strokes that a model with names has turned, if it turns any.
+
+        Phases alone lose the side of the torque axis where there is no current.
+        """
+        if not {"phases", "logged"}.isdisjoint(named.dataset.fine.track.channels) and "logged" in named.dataset.fine.track.channels or "phases" not in named.dataset.fine.track.channels:
+            return None
+        recordings, joint = self._laid
+        track, _ = grouped_track(*self._laid)
+        signs = turned_by(named, track)
+        if signs is None:
+            return None
+        both = zip(recordings, track.bounds, strict=True)
+        turned = [
+            replace(one, turned=signs[start:stop] * (1.0 if one.turned is None else one.turned))
+            for one, (start, stop) in both
+        ]
+        self._laid = turned, joint
+        return self.best_fit()
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0, late: bool = False) -> Way:
         """Return the way that leaves least beside functions, or a delay (`late`), or the first."""
