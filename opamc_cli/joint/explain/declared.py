@@ -8,8 +8,8 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.time_delay import TimeDelay
-from opamc_cli.joint.explain.sides import turned_by
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
+from opamc_cli.joint.explain.sides import turned_by
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
@@ -49,6 +49,8 @@ class Ways:
         self._laid = recordings, joint
         self._declared = declared
         self._short: dict[Way, Dataset] = {}
+        self.strokes_turned = 0
+        """Of phases alone, by `turned`."""
 
     def best_fit(self, without_rules: Collection[str] = ()) -> Fit | None:
         """Fit the model to what is differentiated in the way that predicts best.
@@ -92,23 +94,19 @@ class Ways:
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
 
     def turned(self, named: Fit) -> Fit | None:
-        """Fit the declared model to strokes that a model with names has turned, if it turns any.
+        """Fit the declared model to phases alone of which a model with names turns strokes.
 
-        Phases alone lose the side of the torque axis where there is no current.
+        None where it turns none, or a motion is logged.
         """
-        if not {"phases", "logged"}.isdisjoint(named.dataset.fine.track.channels) and "logged" in named.dataset.fine.track.channels or "phases" not in named.dataset.fine.track.channels:
-            return None
-        recordings, joint = self._laid
-        track, _ = grouped_track(*self._laid)
-        signs = turned_by(named, track)
+        track = grouped_track(*self._laid)[0]
+        signs = None if "logged" in track.channels else turned_by(named, track)
         if signs is None:
             return None
-        both = zip(recordings, track.bounds, strict=True)
-        turned = [
-            replace(one, turned=signs[start:stop] * (1.0 if one.turned is None else one.turned))
-            for one, (start, stop) in both
-        ]
+        recordings, joint = self._laid
+        own = (signs[start:stop] for start, stop in track.bounds)
+        turned = [replace(r, turned=r.sides * one) for r, one in zip(recordings, own, strict=True)]
         self._laid = turned, joint
+        self.strokes_turned = int(np.count_nonzero(np.diff(signs, prepend=1.0) < 0))
         return self.best_fit()
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0, late: bool = False) -> Way:

@@ -58,7 +58,7 @@ class Recording:
     temperature_c: Floats | None = None
     """With `position_rad`, `velocity_rad_s`: joint side; (n,) or None."""
     turned: Floats | None = None
-    """Of phases alone: -1 where they lie on the other side of the torque axis; (n,) or None."""
+    """Of phases alone, -1 where they lie on the other side of the torque axis; (n,) or None."""
     started_s: float | None = None
     """Start of the run on a clock common to all runs."""
     others_rad: Mapping[int, Floats] = field(default_factory=dict)
@@ -69,6 +69,11 @@ class Recording:
         """Number of samples."""
         logged = (self.current_a, self.phases_a, self.position_rad)
         return next((len(values) for values in logged if values is not None), 0)
+
+    @property
+    def sides(self) -> Floats:
+        """Side of the torque axis beside the one that is found; 1 or -1, (n,)."""
+        return np.ones(self.size) if self.turned is None else self.turned
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
@@ -286,7 +291,7 @@ def _one(
         current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
-            side = side if recording.turned is None else side * recording.turned
+            side = side * recording.sides
             current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)
