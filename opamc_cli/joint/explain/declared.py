@@ -98,8 +98,10 @@ class Ways:
 
         None where it turns none, or a motion is logged.
         """
+        if "logged" in named.dataset.fine.track.channels:
+            return None
         track = grouped_track(*self._laid)[0]
-        signs = None if "logged" in track.channels else turned_by(named, track)
+        signs = turned_by(named, track)
         if signs is None:
             return None
         recordings, joint = self._laid
