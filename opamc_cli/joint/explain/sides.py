@@ -26,18 +26,18 @@ def turned_by(fit: Fit, track: Track) -> Floats | None:
     rows = np.flatnonzero(grid.fit)
     blocks = [grid.spread(fit.dataset.columns(term, fine=True))[rows] for term in fit.terms]
     columns, current = np.concatenate(blocks, axis=1), grid.track.current_a[rows]
-    stroke = np.unique(_strokes(grid.track.moving)[rows], return_inverse=True)[1]
-    count = int(stroke.max()) + 1
-    moments = np.zeros((count, columns.shape[1]))
-    np.add.at(moments, stroke, columns * current[:, None])
+    _, firsts, stroke = np.unique(
+        _strokes(grid.track.moving)[rows], return_index=True, return_inverse=True
+    )
+    moments = np.add.reduceat(columns * current[:, None], firsts)
     solving, power = inverse(columns.T @ columns), float(current @ current)
-    begins = grid.track.run_time_s[rows[np.searchsorted(stroke, np.arange(count))]]
-    signs = np.ones(count)
+    groups = _alike(grid.track.run_time_s[rows[firsts]], grid.track.period_s)
+    signs = np.ones(firsts.size)
     first = least = power - _explained(signs @ moments, solving)
     for _ in range(MOST_TURNS):
         rest = signs[stroke] * current - columns @ (solving @ (signs @ moments))
         own = np.bincount(stroke, rest**2)
-        ways = [np.where(some, -signs, signs) for some in _alike(begins, grid.track.period_s)]
+        ways = [np.where(some, -signs, signs) for some in groups]
         left = [power - _explained(way @ moments, solving) for way in ways]
         falls = [
             one if one < least - CLEARLY * own[way != signs].sum() else np.inf
