@@ -63,8 +63,8 @@ def close(
     if fit is None:
         msg = "moves too little"
         raise RefusedError(msg)
-    anew = None if "windows" in without_rules else ways.fit_anew
-    loop = close_loop(fit, library, seed, without_rules, anew)
+    ways = None if "windows" in without_rules else ways
+    loop = close_loop(fit, library, seed, without_rules, ways)
     return Closed(
         loop.rmse_before_a,
         loop.rmse_after_a,

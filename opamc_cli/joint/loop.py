@@ -1,11 +1,12 @@
 """Close the loop: explain, name, and open the sealed data once."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from opamc_cli.joint.effects.library import Library
+from opamc_cli.joint.explain.declared import Ways
 from opamc_cli.joint.explain.saturated import Ceiling, ceiling, saturations, unnamed_library
 from opamc_cli.joint.fit.model import Fit, Term
 from opamc_cli.joint.fit.parts import ROUNDING
@@ -107,8 +108,6 @@ class Loop:
 
 
 TAKEN_UP = ("quadratic_friction", "asymmetric_friction")
-Anew = Callable[[Fit, Sequence[Term]], Fit | None]
-"""Fits the declared model again, to the motion as it is differentiated best beside found terms."""
 
 
 def close_loop(
@@ -116,21 +115,21 @@ def close_loop(
     library: Library,
     seed: int = 0,
     without_rules: Collection[str] = (),
-    anew: Anew | None = None,
+    ways: Ways | None = None,
 ) -> Loop:
     """Find, name and add what the declared model, fitted to the open groups, lacks.
 
     The sealed ones are looked at once, at the end. Rules of docs/loop.md can be switched off. Where
-    `anew` finds a better motion beside what may lack, or beside what was found, that is closed.
+    `ways` has a better motion beside what may lack, or beside what was found, that is closed.
     """
-    told = anew(before, ()) if anew is not None else None
-    loop = _closed(told or before, library, seed, without_rules, before)
+    told = ways.fit_anew(before) if ways is not None else None
+    loop = _closed(told or before, library, seed, without_rules, before, ways)
     if told is not None and loop.rmse_after_a > loop.rmse_before_a:  # As all that does not hold.
         return _closed(before, library, seed, without_rules, before)
     # An open Stribeck curve may have taken up such friction, of which a function is left.
     left = [s for s in loop.steps if s.term.effect.unnamed and s.term.effect.domain == "velocity"]
     beside = loop.asked or tuple(Term(library[n], {}) for n in TAKEN_UP if left and n in library)
-    again = anew(loop.before, beside) if anew is not None and beside else None
+    again = ways.fit_anew(loop.before, beside) if ways is not None and beside else None
     if again is None:
         return loop
     other = _closed(again, library, seed, without_rules, before)
@@ -140,7 +139,12 @@ def close_loop(
 
 
 def _closed(
-    before: Fit, library: Library, seed: int, without_rules: Collection[str], best_before: Fit
+    before: Fit,
+    library: Library,
+    seed: int,
+    without_rules: Collection[str],
+    best_before: Fit,
+    ways: Ways | None = None,
 ) -> Loop:
     start = chain_of(before, 0)
     unnamed = Pool.of(before.dataset, unnamed_library(), without=without_rules)
@@ -150,7 +154,10 @@ def _closed(
     arm = replace(pool, library={n: e for n, e in library.items() if "others" in e.needs})
     linked = beam(start, arm)
     chains = [beam(one, pool) for one in ((start,) if linked is start else (start, linked))]
-    best, named = settled(min(chains, key=lambda one: one.score), pool, unnamed)
+    best = min(chains, key=lambda one: one.score)
+    if ways is not None and (turned := ways.turned(best.fit)) is not None:
+        return _closed(turned, library, seed, without_rules, turned)
+    best, named = settled(best, pool, unnamed)
     best, named, shares = _with_true_names(best, named, pool, unnamed)
     final = worth_their_price(beam(best, unnamed, width=1))
     if "unnamed" not in without_rules:  # Or beside the functions that explain most.

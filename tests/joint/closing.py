@@ -30,7 +30,7 @@ def close_recording(made, current, base=DECLARED, without=(), seed=0):
     )
     joint = Joint(made.gear_ratio, made.pole_pairs)
     ways = Ways([recording], joint, terms_of(base))
-    return made, close_loop(ways.best_fit(), built_in_library(without), seed, anew=ways.fit_anew)
+    return made, close_loop(ways.best_fit(), built_in_library(without), seed, ways=ways)
 
 
 def fit_declared(recordings, joint=None, base=DECLARED):

@@ -9,6 +9,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect
 from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.explain.saturated import saturated, unnamed_library, with_links
+from opamc_cli.joint.explain.sides import turned_by
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, dataset_of, fit_terms
 from opamc_cli.joint.fit.thinning import MOST_SAMPLES
 from opamc_cli.joint.motion.groups import Grouping
@@ -48,6 +49,8 @@ class Ways:
         self._laid = recordings, joint
         self._declared = declared
         self._short: dict[Way, Dataset] = {}
+        self.strokes_turned = 0
+        """Of phases alone, by `turned`."""
 
     def best_fit(self, without_rules: Collection[str] = ()) -> Fit | None:
         """Fit the model to what is differentiated in the way that predicts best.
@@ -89,6 +92,24 @@ class Ways:
         if best == present and _left(searched) >= BETTER * _left(fit_terms(dataset, kept)):
             return None
         return fit_terms(dataset, tuple(term for term in searched.terms if term not in found))
+
+    def turned(self, named: Fit) -> Fit | None:
+        """Fit the declared model to phases alone of which a model with names turns strokes.
+
+        None where it turns none, or a motion is logged.
+        """
+        if "logged" in named.dataset.fine.track.channels:
+            return None
+        track = grouped_track(*self._laid)[0]
+        signs = turned_by(named, track)
+        if signs is None:
+            return None
+        recordings, joint = self._laid
+        own = (signs[start:stop] for start, stop in track.bounds)
+        turned = [replace(r, turned=r.sides * one) for r, one in zip(recordings, own, strict=True)]
+        self._laid = turned, joint
+        self.strokes_turned = int(np.count_nonzero(np.diff(signs, prepend=1.0) < 0))
+        return self.best_fit()
 
     def _best_of(self, first: Way, model: Declared, functions: int = 0, late: bool = False) -> Way:
         """Return the way that leaves least beside functions, or a delay (`late`), or the first."""

@@ -38,7 +38,7 @@ SLOWEST_SHARE = 0.02
 joint that goes less than this share of the way beside is held still."""
 STEADY = 0.9
 """Share of samples with current over the angle's window, from which on its speed is no guess."""
-LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c")
+LOGGED = ("current_a", "phases_a", "position_rad", "velocity_rad_s", "temperature_c", "turned")
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,8 @@ class Recording:
     velocity_rad_s: Floats | None = None
     temperature_c: Floats | None = None
     """With `position_rad`, `velocity_rad_s`: joint side; (n,) or None."""
+    turned: Floats | None = None
+    """Of phases alone, -1 where they lie on the other side of the torque axis; (n,) or None."""
     started_s: float | None = None
     """Start of the run on a clock common to all runs."""
     payload_kg: float | None = None
@@ -69,6 +71,11 @@ class Recording:
         """Number of samples."""
         logged = (self.current_a, self.phases_a, self.position_rad)
         return next((len(values) for values in logged if values is not None), 0)
+
+    @property
+    def sides(self) -> Floats:
+        """Side of the torque axis beside the one that is found; 1 or -1, (n,)."""
+        return np.ones(self.size) if self.turned is None else self.turned
 
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
@@ -286,6 +293,7 @@ def _one(
         current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
+            side = side * recording.sides
             current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)

@@ -13,7 +13,6 @@ from opamc_cli.joint.effects.library import Library, built_in_library, effect_na
 from opamc_cli.joint.explain.declared import Declared, Ways
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Dataset, Fit
-from opamc_cli.joint.loop import Anew
 from opamc_cli.joint.motion.groups import FEWEST_MOVING
 from opamc_cli.joint.motion.kinematics import Recording, moving_beside
 from opamc_cli.joint.motion.recordings import SHORTEST_TRAVEL_RAD, grouped_track, is_moving
@@ -74,7 +73,7 @@ class AxisModel:
     """Counted from 1."""
     fit: Fit
     """The declared model, fitted to the open data; parameters that were not given are found."""
-    anew: Anew
+    ways: Ways
     """Fits it to the motion as it is differentiated best beside terms that were found."""
     declared: tuple[tuple[Effect, DeclaredEffect], ...]
     """Model as declared."""
@@ -167,7 +166,7 @@ def lay(
             read.doubts.append(OTHER_RATIO.format(axis, worst, by, stated))
             read.notes.append(read.doubts[-1])
     allowed = {name: effect for name, effect in library.items() if name not in model.without}
-    return AxisModel(axis, fit, ways.fit_anew, declared, allowed, read)
+    return AxisModel(axis, fit, ways, declared, allowed, read)
 
 
 def declared_effects(

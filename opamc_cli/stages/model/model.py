@@ -60,6 +60,10 @@ ONE_PROGRAM = (
 OF_THE_PLACE = {
     "gravity", "hysteresis", "load_friction", "payload_change", "position_drag", "ripple", "spring",
 }  # fmt: skip
+TURNED = (
+    "axis {}: {} strokes' current is taken with the opposite sign: beside what was found the "
+    "phases lie on the other side of the torque axis than friction and inertia alone tell"
+)
 DOUBTED = (
     "axis {}: {} may be wrong: the place, which is behind it, is a guess where no current was seen "
     "(gaps: {}, {:.1f} s in all); log the position to be certain"
@@ -290,7 +294,7 @@ def _drives(closed: Fit) -> bool:
 
 def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) -> _Closed:
     laid = lay(model, runs, axis)
-    loop = close_loop(laid.fit, laid.library, seed, anew=laid.anew)
+    loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
     # What a heavy joint of an arm that moves all of them draws tells its sign only beside what the
     # others ask.
     others = laid.dataset.fine.track.others is not None
@@ -298,8 +302,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
         negative = lay(model, runs, axis, opposite=True)
         if negative.read.opposite:  # Of phase currents there is none.
             laid = negative
-            loop = close_loop(laid.fit, laid.library, seed, anew=laid.anew)
+            loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
             laid.notes.append(OPPOSITE.format(axis))
+    if laid.ways.strokes_turned:
+        laid.notes.append(TURNED.format(axis, laid.ways.strokes_turned))
     found = {step.term.effect.name for step in loop.steps}
     placed, guessed_s = sorted(found & OF_THE_PLACE), loop.after.dataset.fine.track.guessed_s
     doubts = []

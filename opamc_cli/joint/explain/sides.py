@@ -1,0 +1,75 @@
+"""On which side of the torque axis strokes lie, asked again of a model that has names."""
+
+import numpy as np
+
+from opamc_cli.joint.fit.frozen import apply_frozen
+from opamc_cli.joint.fit.model import Fit
+from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track
+from opamc_cli.signal.transform.least_squares import inverse
+
+MUCH = 0.9
+"""Of the squared error: what is turned has to leave less, or nothing is."""
+CLEARLY = 0.5
+"""Of a stroke's own squared error, by which that of all has to fall where it is turned."""
+ALIKE_S = 0.05
+"""Within which the same stroke of two cycles begins."""
+MOST_TURNS = 50
+
+
+def turned_by(fit: Fit, track: Track) -> Floats | None:
+    """Tell which strokes of a whole track a model would turn, fitted to some of it; -1 or 1, (n,).
+
+    What else a joint has than friction, inertia and a smooth function of the place may have put
+    a stroke on the other side, in every cycle alike. None where turning explains no more.
+    """
+    grid = fit.dataset.fine
+    rows = np.flatnonzero(grid.fit)
+    blocks = [grid.spread(fit.dataset.columns(term, fine=True))[rows] for term in fit.terms]
+    columns, current = np.concatenate(blocks, axis=1), grid.track.current_a[rows]
+    _, firsts, stroke = np.unique(
+        _strokes(grid.track.moving)[rows], return_index=True, return_inverse=True
+    )
+    moments = np.add.reduceat(columns * current[:, None], firsts)
+    solving, power = inverse(columns.T @ columns), float(current @ current)
+    groups = _alike(grid.track.run_time_s[rows[firsts]], grid.track.period_s)
+    signs = np.ones(firsts.size)
+    first = least = power - _explained(signs @ moments, solving)
+    for _ in range(MOST_TURNS):
+        rest = signs[stroke] * current - columns @ (solving @ (signs @ moments))
+        own = np.bincount(stroke, rest**2)
+        ways = [np.where(some, -signs, signs) for some in groups]
+        left = [power - _explained(way @ moments, solving) for way in ways]
+        falls = [
+            one if one < least - CLEARLY * own[way != signs].sum() else np.inf
+            for one, way in zip(left, ways, strict=True)
+        ]
+        if not np.isfinite(min(falls)):
+            break
+        signs, least = ways[int(np.argmin(falls))], min(falls)
+    if least > MUCH * first:
+        return None
+    widths = [block.shape[1] for block in blocks]
+    values = np.split(solving @ (signs @ moments), np.cumsum(widths)[:-1])
+    applied = apply_frozen(track, fit.terms, values)
+    every = _strokes(track.moving)
+    works = np.bincount(every, applied.current_a * (applied.current_a - applied.residual_a))
+    return np.where(track.moving & (works[every] < 0), -1.0, 1.0)
+
+
+def _strokes(moving: Bools) -> Ints:
+    """Count the strokes up to each sample, (n,): where a joint rests its current may slip."""
+    return np.cumsum(np.diff(moving, prepend=False) & moving)
+
+
+def _explained(moment: Floats, solving: Floats) -> float:
+    return float(moment @ solving @ moment)
+
+
+def _alike(begins_s: Floats, period_s: float) -> list[Bools]:
+    """Each stroke by itself, and with those that begin as long after a cycle's beginning."""
+    alone = list(np.eye(begins_s.size, dtype=bool))
+    if not np.isfinite(period_s):
+        return alone
+    apart = begins_s[:, None] - begins_s
+    near = np.abs(apart - period_s * np.round(apart / period_s)) < ALIKE_S
+    return alone + list(np.unique(near, axis=0))
