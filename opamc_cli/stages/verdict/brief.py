@@ -103,11 +103,16 @@ def shaken_by(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the entry at fault that others may be shaken by; None where that is not clear.
 
     Of joints without a cause that lie nearly as far the farthest was the wrong one in one of four.
+    A sensor of the drive's own shakes the joint that it controls, and that one others: none that
+    only the logger reads does.
     """
     first = foremost(axes)
-    if first is None or first["state"] != "fault" or lies_outside(first.get("cause") or {}):
+    if first is None or first["state"] != "fault":
         return None
-    return first if _explained(first) or first is by_far(axes) else None
+    cause, far = first.get("cause") or {}, first is by_far(axes)
+    if lies_outside(cause):
+        return first if far and cause.get("origin") == "measurement" else None
+    return first if _explained(first) or far else None
 
 
 def _unhealthy(entry: Mapping[str, Any]) -> bool:
