@@ -205,6 +205,20 @@ def test_since_does_not_move_with_the_nights_after_the_alarm():
     assert told[0] in ("2026-03-10", "2026-03-11")
 
 
+@pytest.mark.parametrize("before", [1, 2, 3, 8])
+@pytest.mark.parametrize("gross", [True, False])
+def test_a_change_that_comes_at_once_began_in_its_first_night(before, gross):
+    """A gear that was exchanged was said to differ since two healthy nights before."""
+    after = 1 if gross else 2
+    distances = [0.05 * (-1) ** day for day in range(before)] + [5.0] * after
+    series = nights_of(["healthy"] * before + ["fault"] * after, distances)
+    for night in series[before:]:
+        night["effect"] = 2.0 if gross else 0.4
+    (alarm,) = settle_robot("r1", series, (), (), AlarmConfig(), 0.4, 6).alarms
+    assert alarm.raised == series[-1]["night"]
+    assert alarm.since == series[before]["night"]
+
+
 def raised(states, distances):
     """Return the days on which alarms were raised."""
     series = nights_of(states, distances)
