@@ -41,6 +41,10 @@ nothing and some of it; less tells no direction. So of a current vector that tur
 REVERSING = 0.1
 """Share of the samples with the rarer sign, from which on a current that has none lost it."""
 
+ONE_WAY = 0.5
+"""Of a reported current's level its mean: from here on a load leads, whose direction no wear turns.
+Where the current is as large as it was, and of the other sign, the log is."""
+
 RETURNING = 0.1
 """Share of the way in the rarer direction, from which on a joint moves both ways: one that moves
 one way alone has a current of one sign, and leans as its load does."""
@@ -88,6 +92,7 @@ class Reference:
     leaning: Mapping[int, float]
     reversing: Mapping[int, float]
     level: Mapping[int, float]
+    one_way: Mapping[int, float]
     returning: Mapping[int, float]
     turning: Mapping[int, float]
     changing: Mapping[int, float]
@@ -116,6 +121,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.one_way for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.turning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
@@ -316,6 +322,13 @@ def _other_sign(own: Measured, reference: Reference) -> str | None:
         return (
             f"the current of axis {own.axis} drives against the motion where the baseline's drives "
             "it: is the sign of the current or of the position inverted?"
+        )
+    way, usual_way = own.one_way or 0.0, reference.one_way[own.axis]
+    leads = way * usual_way < 0 and min(abs(way), abs(usual_way)) >= ONE_WAY
+    if leads and as_large and _away(own, own.axis, reference, ("current",)) <= math.log(ALIKE):
+        return (
+            f"the current of axis {own.axis} is as large as the baseline's, and of the other sign "
+            "throughout: is it inverted?"
         )
     return None
 
