@@ -8,8 +8,11 @@ from itertools import combinations
 from statistics import median_low
 
 import numpy as np
+import numpy.typing as npt
 
 from opamc_cli.stages.verdict.agreement.measured import Measured
+
+Floats = npt.NDArray[np.float64]
 
 LARGEST_RATIO = 20.0
 """Of the current's size to the baseline's: a healthy joint's load, warmth and wear change it by
@@ -22,6 +25,13 @@ are of another size by the same factor: a fault that asks for so much more leave
 
 ALL_SCALED = 2.0
 """Likewise where it is one factor for all axes of a recording: no payload, warmth or fault is."""
+
+WITH_NOISE, AS_ONE = 1.2, 1.1
+"""Likewise where the axes' noise is of another size by that factor, too, within a tenth: a load and
+its friction leave the sensors' noise as it was."""
+
+ROOT_MEAN_SQUARE = math.sqrt(2.0)
+"""Of a sine its peak, which drives report as often."""
 
 ALIKE, UNLIKE = 1.2, 1.5
 """Two joints are exchanged if every channel of each is within 20 % of the other's size in the
@@ -185,14 +195,30 @@ def _all_scaled(measured: Sequence[Measured], reference: Reference) -> list[Find
         if len(axes) < 2 or min(usual) <= 0:
             continue
         times = np.array([own.size["current"] for own in axes]) / usual
-        if times.max() > ALIKE * times.min() or abs(np.log(np.median(times))) < np.log(ALL_SCALED):
+        middle = float(np.median(times))
+        noise, least = "", ALL_SCALED
+        if _noise_scaled(axes, times, reference):
+            noise, least = ", and their noise,", WITH_NOISE
+        if times.max() > ALIKE * times.min() or abs(math.log(middle)) < math.log(least):
             continue
+        peaks = abs(abs(math.log(middle)) - math.log(ROOT_MEAN_SQUARE)) <= math.log(AS_ONE) / 2
+        unit = "root mean square for peak" if peaks else "mA for A"
         why = (
-            f"the currents of all its axes are {np.median(times):.3g} times the baseline's: "
-            "another unit (mA for A)? Check the map of `opamc ingest`, and the sensors"
+            f"the currents of all its axes{noise} are {middle:.3g} times the baseline's: "
+            f"another unit ({unit})? Check the map of `opamc ingest`, and the sensors"
         )
         found += [Finding(run, own.axis, why) for own in axes]
     return found
+
+
+def _noise_scaled(axes: Sequence[Measured], times: Floats, reference: Reference) -> bool:
+    """Whether the noise of all axes is of another size by the one factor of their currents."""
+    noise = np.array([own.noise for own in axes])
+    usual = np.array([reference.noise[own.axis] for own in axes])
+    if min(*noise, *usual) <= 0:
+        return False
+    apart = np.abs(np.log(np.concatenate([times, noise / usual]) / np.median(times)))
+    return bool(apart.max() <= math.log(AS_ONE))
 
 
 def _all_filtered(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
