@@ -9,6 +9,7 @@ from opamc_cli.stages.verdict.agreement.findings import (
     _all_filtered,
     _all_scaled,
     _coarser,
+    _far_too_large,
     _other_steps,
     _other_unit,
     _still,
@@ -150,3 +151,24 @@ def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
     own = SimpleNamespace(axis=2, signal=("x",), size={"current": current, "position": position})
     usual = SimpleNamespace(size={(2, "current"): 1.0, (2, "position"): 0.5})
     assert said in _still(own, usual)
+
+
+@pytest.mark.parametrize(
+    ("current", "position", "said"),
+    [
+        (1.0, 28.6, "the position of axis 2 is 57.2 times the baseline's: another unit (degrees)?"),
+        (25.0, 0.0, "the current of axis 2 is 25 times the baseline's"),
+        (1.0, 0.0, None),
+        (1.0, 0.6, None),
+    ],
+)
+def test_degrees_for_radians_are_no_joint_that_stands_still(current, position, said):
+    """Of a program logged in degrees no motion is found: it would be too fast for any robot."""
+    sizes = {"current": current, "position": position}
+    own = SimpleNamespace(axis=2, size=sizes, steps=(0.0, 0.01))
+    usual = SimpleNamespace(
+        size={(2, "current"): 1.0, (2, "position"): 0.5}, steps={2: (0.0, 0.01)}
+    )
+    told = _far_too_large(own, usual)
+    assert (told is None) == (said is None)
+    assert said is None or told.startswith(said)

@@ -300,8 +300,11 @@ def _scaled(own: Measured, reference: Reference, times: float) -> bool:
 
 
 def _far_too_large(own: Measured, reference: Reference) -> str | None:
-    usual = reference.size.get((own.axis, "current"), 0.0)
-    return _other_unit(own, reference) if own.size["current"] > LARGEST_RATIO * usual else None
+    for kind, size in own.size.items():
+        usual = reference.size.get((own.axis, kind), math.inf)
+        if size > (LARGEST_RATIO if kind == "current" else SCALED) * usual:
+            return _other_unit(own, reference)
+    return None
 
 
 def _unbalanced(own: Measured, reference: Reference) -> str | None:
