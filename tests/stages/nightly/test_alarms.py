@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.errors import NotEnoughDataError
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
 from opamc_cli.stages.nightly.morning import as_told, tell
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
+from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, Event, NightRow
 
 
@@ -125,6 +127,27 @@ def test_a_night_that_was_judged_in_part_is_not_called_failed():
         ("partial", f"2026-03-01 to 2026-03-03 (2 nights): in part not judged: {sign}"),
         ("failed", f"2026-03-02: {slow}"),
     ]
+
+
+def test_of_a_program_that_stays_faster_the_command_is_said_once_it_lasts():
+    """A program at 110 % had to be looked up in the docs, a joint that was not judged had not."""
+    with pytest.raises(NotEnoughDataError) as refused:
+        refuse_all({1: ("its motions last 0.91 times as long.",)})
+    fast = str(refused.value)
+
+    def said(*whys):
+        rows = [
+            NightRow("r1", f"2026-03-{day:02d}", "", "failed", 0, why)
+            for day, why in enumerate(whys, start=1)
+        ]
+        events = settle_robot("r1", (), rows, (), AlarmConfig(), 0.4, 6).events
+        return [one.text for one in events]
+
+    command = "; if that is meant to stay: opamc nightly rebaseline ROBOT --from 2026-03-01 --why"
+    assert [command in text for text in said(*[fast] * 2)] == [False]
+    assert [command in text for text in said(*[fast] * 8)] == [True, True]
+    # what broke the nights is not meant to stay
+    assert command not in " ".join(said(*["took longer than 5 s (limits.seconds)"] * 8))
 
 
 def test_an_acknowledged_alarm_is_another_after_a_new_baseline():
