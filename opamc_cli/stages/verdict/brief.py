@@ -39,6 +39,11 @@ had such a one; of seven by 2 to 10 times it was its neighbour in two."""
 SLIGHT = 0.02
 """By which a size differs that is said last: nobody looks for 1.01 times, however sure it is."""
 
+SMALLEST_PART = 0.03
+HARDLY_ANY = "There is besides, if hardly any of the change: {}."
+"""A line of the mesh that has grown for sure is told however little it is: early damage is. It was
+"a smaller part of the change" where its share was 0 %."""
+
 SHAKEN = "Axis {}, which is at fault, may shake it: see to that one first."
 
 UNLIKE = (
@@ -163,7 +168,8 @@ def _inspect(
     outside = lies_outside(cause)
     little = excuses_little(cause) if outside else explains_little(cause)
     if little:
-        return f"{GEAR} {SMALLER_PART.format(meaning)}"
+        hardly = float(cause.get("share", 1.0)) < SMALLEST_PART
+        return f"{GEAR} {(HARDLY_ANY if hardly else SMALLER_PART).format(meaning)}"
     return f"Check before the gear: {meaning}." if outside else f"Inspect the joint for {meaning}."
 
 

@@ -11,7 +11,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report.wording import verdict as verdict_words
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.brief import _tie, brief, foremost, shaken_by
+from opamc_cli.stages.verdict.brief import _inspect, _tie, brief, foremost, shaken_by
 from opamc_cli.storage.sources import other_conditions
 
 
@@ -258,3 +258,12 @@ def test_what_a_cause_is_not_told_from_is_said_in_words():
     assert _tie({"ties": ["sublinear_friction", "coulomb"]}).endswith(
         "from: shear-thinning or starved lubricant."
     )
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [(0.0, "hardly any of the change: a tooth"), (0.3, "part of the change is a")],
+)
+def test_a_cause_that_holds_next_to_nothing_is_no_part_of_the_change(share, told):
+    cause = CRACK | {"interpretation": "a tooth", "explained": 0.3, "share": share}
+    assert told in _inspect(cause, SimpleNamespace(), Bundle([], {}), "")
