@@ -73,7 +73,9 @@ def test_a_current_in_other_steps_than_the_baselines_is_another_log(usual, tonig
         ((1.3, 1.3, 1.3), (1, 1, 1), None),  # warmth does so
         ((1.42, 1.4, 1.41), (1.41, 1.45, 1.38), "and their noise, are 1.41 times the baseline's: "),
         ((0.7, 0.71, 0.72), (0.71, 0.7, 0.7), "another unit (root mean square for peak)?"),
+        ((1.42, 1.4, 1.41), (1.41, 1.6, 1.38), "and their noise, are 1.41 times"),
         ((1.42, 1.4, 1.41), (1.41, 1.1, 1.38), None),
+        ((1.42, 1.4, 1.41), (1.2, 1.2, 1.41), None),
         ((1.15, 1.15, 1.15), (1.15, 1.15, 1.15), None),
         ((3.0,), (3,), None),
     ],

@@ -27,8 +27,8 @@ ALL_SCALED = 2.0
 """Likewise where it is one factor for all axes of a recording: no payload, warmth or fault is."""
 
 WITH_NOISE, AS_ONE = 1.2, 1.1
-"""Likewise where the axes' noise is of another size by that factor, too, within a tenth: a load and
-its friction leave the sensors' noise as it was."""
+"""Likewise where the axes' noise is of another size by that factor, too, in the middle within a
+tenth: a load and its friction leave the sensors' noise as it was."""
 
 ROOT_MEAN_SQUARE = math.sqrt(2.0)
 """Of a sine its peak, which drives report as often."""
@@ -217,8 +217,11 @@ def _noise_scaled(axes: Sequence[Measured], times: Floats, reference: Reference)
     usual = np.array([reference.noise[own.axis] for own in axes])
     if min(*noise, *usual) <= 0:
         return False
-    apart = np.abs(np.log(np.concatenate([times, noise / usual]) / np.median(times)))
-    return bool(apart.max() <= math.log(AS_ONE))
+    middle = np.median(times)
+    sizes, noises = (np.abs(np.log(one / middle)) for one in (times, noise / usual))
+    # of a current in steps the noise is known to some per cent alone
+    as_noisy = np.median(noises) <= math.log(AS_ONE) and noises.max() <= math.log(ALIKE)
+    return bool(sizes.max() <= math.log(AS_ONE) and as_noisy)
 
 
 def _all_filtered(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
