@@ -3,6 +3,10 @@
 import sqlite3
 from contextlib import closing, suppress
 
+import pytest
+
+from opamc_cli.errors import UsageError
+from opamc_cli.storage.history import history
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import Declared, Event, NightRow
 
@@ -14,6 +18,17 @@ def test_a_file_tells_the_layout_that_it_has(tmp_path):
     History(path).__exit__()
     with closing(sqlite3.connect(path)) as db:
         assert db.execute("PRAGMA user_version").fetchone() == (1,)
+
+
+def test_a_file_that_another_program_has_open_is_no_full_disk(tmp_path, monkeypatch):
+    path = tmp_path / "history.sqlite"
+    History(path).__exit__()
+    monkeypatch.setattr(history, "BUSY_S", 0.01)
+    with closing(sqlite3.connect(path, isolation_level=None)) as viewer:
+        viewer.execute("BEGIN EXCLUSIVE")
+        said = r"\(database is locked\); another program has it open"
+        with History(path) as kept, pytest.raises(UsageError, match=said):
+            kept.replace_missing([Event("2026-03-02T00:00:00Z", "R1", None, "missing", "no files")])
 
 
 def test_missing_nights_are_written_anew_only_if_they_differ(tmp_path):

@@ -20,7 +20,7 @@ the damage or more. At the alarms of twelve virtual joints that wear (benchmarks
 power is worse for plain rises."""
 
 
-def onset(nights: FloatArray, values: FloatArray) -> int:
+def onset(nights: FloatArray, values: FloatArray, least: int = LEAST_AFTER) -> int:
     """Return the index of the first night of a change.
 
     Parameters
@@ -30,6 +30,8 @@ def onset(nights: FloatArray, values: FloatArray) -> int:
     values : ndarray, shape (T,)
         Finite; a level, and from some night on a rise or another level. Nights long after the
         beginning say how it went on, not when it began: leave them out.
+    least : int
+        Nights that the change must have lasted: one, if one night alone tells it for sure.
 
     Returns
     -------
@@ -47,10 +49,10 @@ def onset(nights: FloatArray, values: FloatArray) -> int:
     52000) the middle is right within five nights for 6, the best for 4.
     """
     n = len(values)
-    if n < 2 * LEAST_AFTER:
+    if n < 2 * least:
         return 0
     starts, errors = [], []
-    for start in range(1, n - LEAST_AFTER + 1):
+    for start in range(1, n - least + 1):
         before, after = values[:start], values[start:]
         level = median(before)
         below = float(np.abs(before - level).sum())

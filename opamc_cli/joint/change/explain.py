@@ -105,13 +105,13 @@ def explain_change(
     compared = plain = with_model(compared, population)
     if not cycles:
         compared = compared.less_repeated(terms)
+        late = compared.after
         population = learn(compared, terms)
         compared = with_model(compared, population)
 
     slow = find_slow_causes(compared, population, library)
     residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
-    rows = residual != 0
-    squares = np.bincount(compared.track.group[rows], residual[rows] ** 2, late.size)
+    squares = np.bincount(compared.track.group + 1, residual**2, late.size + 1)[1:]
     left = squares / compared.dataset.fine.parts.counts
     risen = bool(np.median(left[late]) > np.median(left[~late]))
     periodic = find_periodic(compared, residual, LINES_DIFFER if cycles else 0.0)

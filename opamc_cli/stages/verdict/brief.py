@@ -39,6 +39,11 @@ had such a one; of seven by 2 to 10 times it was its neighbour in two."""
 SLIGHT = 0.02
 """By which a size differs that is said last: nobody looks for 1.01 times, however sure it is."""
 
+SMALLEST_PART = 0.03
+HARDLY_ANY = "There is besides, if hardly any of the change: {}."
+"""A line of the mesh that has grown for sure is told however little it is: early damage is. It was
+"a smaller part of the change" where its share was 0 %."""
+
 SHAKEN = "Axis {}, which is at fault, may shake it: see to that one first."
 
 UNLIKE = (
@@ -103,11 +108,16 @@ def shaken_by(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Return the entry at fault that others may be shaken by; None where that is not clear.
 
     Of joints without a cause that lie nearly as far the farthest was the wrong one in one of four.
+    A sensor of the drive's own shakes the joint that it controls, and that one others: none that
+    only the logger reads does.
     """
     first = foremost(axes)
-    if first is None or first["state"] != "fault" or lies_outside(first.get("cause") or {}):
+    if first is None or first["state"] != "fault":
         return None
-    return first if _explained(first) or first is by_far(axes) else None
+    cause, far = first.get("cause") or {}, first is by_far(axes)
+    if lies_outside(cause):
+        return first if far and cause.get("origin") == "measurement" else None
+    return first if _explained(first) or far else None
 
 
 def _unhealthy(entry: Mapping[str, Any]) -> bool:
@@ -158,7 +168,8 @@ def _inspect(
     outside = lies_outside(cause)
     little = excuses_little(cause) if outside else explains_little(cause)
     if little:
-        return f"{GEAR} {SMALLER_PART.format(meaning)}"
+        hardly = float(cause.get("share", 1.0)) < SMALLEST_PART
+        return f"{GEAR} {(HARDLY_ANY if hardly else SMALLER_PART).format(meaning)}"
     return f"Check before the gear: {meaning}." if outside else f"Inspect the joint for {meaning}."
 
 

@@ -1,6 +1,7 @@
 """Parquet files that others may have written or damaged: whatever the reader makes of them."""
 
 import hashlib
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -12,6 +13,9 @@ import pyarrow.parquet as pq
 
 from opamc_cli.config.reading import require_regular_file, shown
 from opamc_cli.errors import InputError
+
+MAGIC = b"PAR1"
+"""With which a file begins and ends."""
 
 MOST_ROWS = 50_000_000
 """Of a stage table, which is read as a whole: years of nights have less."""
@@ -59,8 +63,20 @@ def reading(path: Path, advice: str, what: str = "cannot be read as Parquet") ->
     except Exception as error:  # of another's library, whose errors no list keeps up with
         lines = str(error).strip().splitlines()
         reason = shown_line(lines[0]) if lines else type(error).__name__
+        if _cut_off(path):
+            reason = "it begins as Parquet and has no end: cut off, or still being written"
         msg = f"{path}: {what} ({reason}); {advice}"
         raise InputError(msg) from error
+
+
+def _cut_off(path: Path) -> bool:
+    try:
+        with path.open("rb") as file:
+            begins = file.read(len(MAGIC))
+            file.seek(-len(MAGIC), os.SEEK_END)
+            return begins == MAGIC != file.read()
+    except OSError:
+        return False
 
 
 def shown_line(text: str) -> str:

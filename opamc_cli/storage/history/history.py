@@ -144,7 +144,10 @@ class History:
             if any(word in str(error) for word in ("not a database", "malformed", "decode")):
                 msg = f"{self.path}: is no history of opamc ({error}); move it away"
                 raise InputError(msg) from error
-            msg = f"{self.path}: cannot be written or read ({error}); check space and permissions"
+            advice = "check space and permissions"
+            if "locked" in str(error):  # another opamc would hold the lock of `out`
+                advice = "another program has it open; close that one, or wait, and start again"
+            msg = f"{self.path}: cannot be written or read ({error}); {advice}"
             raise UsageError(msg) from error
 
     @contextmanager

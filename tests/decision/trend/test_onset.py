@@ -48,3 +48,7 @@ def test_onsets_by_hand():
     assert onset(nights, np.array([0.0] * 6 + [1.0])) < 6
     assert onset(np.arange(3.0), np.array([0.0, 5.0, 5.0])) == 0
     assert onset(np.arange(4.0), np.array([0.0, 5.0, 5.0, 5.0])) == 1
+    # one, where that tells for sure
+    assert onset(nights, np.array([0.0] * 6 + [1.0]), 1) == 6
+    assert onset(np.arange(2.0), np.array([0.0, 5.0]), 1) == 1
+    assert onset(np.arange(1.0), np.array([5.0]), 1) == 0

@@ -1,9 +1,11 @@
 """What changed between a baseline and a target, on the tests' own simulator."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from sessions import recordings
 from simulator import simulate
 
 from opamc_cli.joint.change import explain
@@ -261,3 +263,15 @@ def test_more_friction_at_the_same_temperature_is_not_harmless():
     change = change_of("friction")
     assert "viscous" in {change.causes[0].effect, *change.causes[0].ties}
     assert not change.harmless
+
+
+@pytest.mark.parametrize("moved", ["target", "baseline"])
+def test_a_recording_whose_strokes_no_other_has_hides_no_cause(moved):
+    """Of a short one nothing may be left once what all have alike is taken out."""
+    before = recordings(5, seed=1)
+    after = recordings(4, lambda q, v, a, t: 0.3 * np.sign(v), seed=2)
+    side = before if moved == "baseline" else after
+    side[1] = replace(side[1], position_rad=side[1].position_rad + 6.0)
+    change = explain_change(before, after, Joint())
+    assert change.causes[0].effect == "coulomb"
+    assert change.units == ((4, 4) if moved == "baseline" else (5, 3))

@@ -123,3 +123,14 @@ def test_cycles_of_another_speed_than_the_others(speeds, odd):
         rows += [{**row, "run": "run0", "cycle": cycle} for row in table([speed]).to_pylist()]
     found = odd_cycles(pa.Table.from_pylist(rows))
     assert found == ({("run0", axis): pytest.approx(odd, rel=1e-2) for axis in (1, 2) if odd})
+
+
+@pytest.mark.parametrize(("carriers", "odd"), [((60.0, 60.2, 59.9), {}), ((60, 60, 48), {2: 1.25})])
+def test_a_cycle_whose_carrier_is_as_ever_is_of_the_same_speed(carriers, odd):
+    """A joint that creeps into its stop was told that its speed had been changed midway."""
+    rows = []
+    for cycle, (speed, carrier) in enumerate(zip((1.0, 1.0, 0.8), carriers, strict=True)):
+        motions = table([speed], carrier=carrier).to_pylist()
+        rows += [{**row, "run": "run0", "cycle": cycle} for row in motions]
+    found = odd_cycles(pa.Table.from_pylist(rows))
+    assert found == ({("run0", axis): pytest.approx(odd, rel=1e-2) for axis in (1, 2) if odd})

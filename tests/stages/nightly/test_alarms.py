@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from opamc_cli.config.cell import AlarmConfig
+from opamc_cli.errors import NotEnoughDataError
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
 from opamc_cli.stages.nightly.morning import as_told, tell
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
+from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.storage.history.rows import EXCUSED, AlarmRow, Declared, Event, NightRow
 
 
@@ -127,6 +129,27 @@ def test_a_night_that_was_judged_in_part_is_not_called_failed():
     ]
 
 
+def test_of_a_program_that_stays_faster_the_command_is_said_once_it_lasts():
+    """A program at 110 % had to be looked up in the docs, a joint that was not judged had not."""
+    with pytest.raises(NotEnoughDataError) as refused:
+        refuse_all({1: ("its motions last 0.91 times as long.",)})
+    fast = str(refused.value)
+
+    def said(*whys):
+        rows = [
+            NightRow("r1", f"2026-03-{day:02d}", "", "failed", 0, why)
+            for day, why in enumerate(whys, start=1)
+        ]
+        events = settle_robot("r1", (), rows, (), AlarmConfig(), 0.4, 6).events
+        return [one.text for one in events]
+
+    command = "; if that is meant to stay: opamc nightly rebaseline ROBOT --from 2026-03-01 --why"
+    assert [command in text for text in said(*[fast] * 2)] == [False]
+    assert [command in text for text in said(*[fast] * 8)] == [True, True]
+    # what broke the nights is not meant to stay
+    assert command not in " ".join(said(*["took longer than 5 s (limits.seconds)"] * 8))
+
+
 def test_an_acknowledged_alarm_is_another_after_a_new_baseline():
     series = nights_of(["healthy"] * 5 + ["fault"] * 3)
     known = Declared("t", "r1", 2, "acknowledged", "2026-03-07", "gear ordered")
@@ -203,6 +226,20 @@ def test_since_does_not_move_with_the_nights_after_the_alarm():
         told.append(alarm.since)
     assert len(set(told)) == 1, told
     assert told[0] in ("2026-03-10", "2026-03-11")
+
+
+@pytest.mark.parametrize("before", [1, 2, 3, 8])
+@pytest.mark.parametrize("gross", [True, False])
+def test_a_change_that_comes_at_once_began_in_its_first_night(before, gross):
+    """A gear that was exchanged was said to differ since two healthy nights before."""
+    after = 1 if gross else 2
+    distances = [0.05 * (-1) ** day for day in range(before)] + [5.0] * after
+    series = nights_of(["healthy"] * before + ["fault"] * after, distances)
+    for night in series[before:]:
+        night["effect"] = 2.0 if gross else 0.4
+    (alarm,) = settle_robot("r1", series, (), (), AlarmConfig(), 0.4, 6).alarms
+    assert alarm.raised == series[-1]["night"]
+    assert alarm.since == series[before]["night"]
 
 
 def raised(states, distances):

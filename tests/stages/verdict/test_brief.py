@@ -11,7 +11,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report.wording import verdict as verdict_words
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.brief import _tie, brief, foremost
+from opamc_cli.stages.verdict.brief import _inspect, _tie, brief, foremost, shaken_by
 from opamc_cli.storage.sources import other_conditions
 
 
@@ -220,6 +220,20 @@ def test_an_excused_joint_beside_one_at_fault_may_be_shaken_by_it(cause, shaken)
     assert (first, others) == (said if shaken else "It differs.", ["Compared."])
 
 
+@pytest.mark.parametrize(
+    ("origin", "index", "shakes"),
+    [("measurement", 4e5, 1), ("measurement", 4e3, None), ("load", 4e5, None)],
+)
+def test_a_drive_s_own_sensor_shakes_the_joint_and_others(origin, index, shakes):
+    """The neighbour of a joint whose phase was measured 12 % too large was to be seen to first."""
+    gain = {"effect": "sensor_gain", "origin": origin, "explained": 1.0}
+    axes = [
+        {"axis": 1, "state": "fault", "health_index": index, "cause": gain},
+        {"axis": 2, "state": "fault", "health_index": 2e3, "cause": None},
+    ]
+    assert (shaken_by(axes) or {}).get("axis") == shakes
+
+
 @pytest.mark.parametrize(("ratio", "first"), [(1.01, "spectrum"), (1.2, "amplitude")])
 def test_a_size_of_1_01_times_is_said_last(ratio, first):
     sessions = np.zeros((6, 8))
@@ -244,3 +258,12 @@ def test_what_a_cause_is_not_told_from_is_said_in_words():
     assert _tie({"ties": ["sublinear_friction", "coulomb"]}).endswith(
         "from: shear-thinning or starved lubricant."
     )
+
+
+@pytest.mark.parametrize(
+    ("share", "told"),
+    [(0.0, "hardly any of the change: a tooth"), (0.3, "part of the change is a")],
+)
+def test_a_cause_that_holds_next_to_nothing_is_no_part_of_the_change(share, told):
+    cause = CRACK | {"interpretation": "a tooth", "explained": 0.3, "share": share}
+    assert told in _inspect(cause, SimpleNamespace(), Bundle([], {}), "")

@@ -79,6 +79,18 @@ def test_a_recording_of_one_way_alone_shows_one_sign(tmp_path):
     assert "inverted" in refusal(turned, forth)
 
 
+def test_a_current_that_a_load_leads_has_a_sign_too(tmp_path):
+    """A shoulder's turned sign was an alarm: magnets weaker by 200 %."""
+    usual = measured(tmp_path, "usual", there_and_back(8), load=-9.0)
+    turned = measured(tmp_path, "turned", there_and_back(9), load=-9.0, alter=np.negative)
+    assert "of the other sign throughout" in refusal(turned, usual)
+    assert all(found.of_log for found in findings([turned], reference_of([usual])))
+    # neither what a load changes by nor a position of the other sign is a turned current
+    other = measured(tmp_path, "other", there_and_back(9), load=6.0)
+    assert refusal(other, usual) == refusal(usual, other) == ""
+    assert refusal(measured(tmp_path, "own", there_and_back(9), load=-9.5), usual) == ""
+
+
 @pytest.mark.parametrize("logged", ["position", "velocity"])
 def test_beside_a_logged_motion_exchanged_phases_turn_against_it(tmp_path, logged):
     """Whatever the program: its motions there and back may be alike."""

@@ -9,6 +9,7 @@ from opamc_cli.stages.verdict.agreement.findings import (
     _all_filtered,
     _all_scaled,
     _coarser,
+    _far_too_large,
     _other_steps,
     _other_unit,
     _still,
@@ -64,22 +65,29 @@ def test_a_current_in_other_steps_than_the_baselines_is_another_log(usual, tonig
 
 
 @pytest.mark.parametrize(
-    ("times", "said"),
+    ("times", "noise", "said"),
     [
-        ((3.0, 3.2, 2.9), "the currents of all its axes are 3 times the baseline's"),
-        ((0.1, 0.1, 0.11), "the currents of all its axes are 0.1 times the baseline's"),
-        ((3.0, 1.0, 3.0), None),  # one axis is as it was: the others may be at fault
-        ((1.3, 1.3, 1.3), None),  # warmth does so
-        ((3.0,), None),
+        ((3.0, 3.2, 2.9), (1, 1, 1), "the currents of all its axes are 3 times the baseline's"),
+        ((0.1, 0.1, 0.11), (1, 1, 1), "of all its axes are 0.1 times the baseline's: another unit"),
+        ((3.0, 1.0, 3.0), (3, 3, 3), None),  # one axis is as it was: the others may be at fault
+        ((1.3, 1.3, 1.3), (1, 1, 1), None),  # warmth does so
+        ((1.42, 1.4, 1.41), (1.41, 1.45, 1.38), "and their noise, are 1.41 times the baseline's: "),
+        ((0.7, 0.71, 0.72), (0.71, 0.7, 0.7), "another unit (root mean square for peak)?"),
+        ((1.42, 1.4, 1.41), (1.41, 1.6, 1.38), "and their noise, are 1.41 times"),
+        ((1.42, 1.4, 1.41), (1.41, 1.1, 1.38), None),
+        ((1.42, 1.4, 1.41), (1.2, 1.2, 1.41), None),
+        ((1.15, 1.15, 1.15), (1.15, 1.15, 1.15), None),
+        ((3.0,), (3,), None),
     ],
 )
-def test_currents_that_are_all_of_another_size_are_of_another_unit(times, said):
+def test_currents_that_are_all_of_another_size_are_of_another_unit(times, noise, said):
     """Ten times as large on all axes was tooth damage on two of them, from a healthy robot."""
     own = [
-        SimpleNamespace(run="r", axis=axis, size={"current": 0.5 * axis * one})
-        for axis, one in enumerate(times, start=1)
+        SimpleNamespace(run="r", axis=axis, size={"current": 0.5 * axis * one}, noise=0.1 * own)
+        for axis, (one, own) in enumerate(zip(times, noise, strict=True), start=1)
     ]
-    usual = SimpleNamespace(size={(one.axis, "current"): 0.5 * one.axis for one in own})
+    sizes = {(one.axis, "current"): 0.5 * one.axis for one in own}
+    usual = SimpleNamespace(size=sizes, noise=dict.fromkeys(range(1, len(times) + 1), 0.1))
     found = _all_scaled(own, usual)
     assert [one.axis for one in found] == ([one.axis for one in own] if said else [])
     assert all(said in one.why for one in found)
@@ -145,3 +153,24 @@ def test_a_dead_sensor_is_no_joint_that_stands(current, position, said):
     own = SimpleNamespace(axis=2, signal=("x",), size={"current": current, "position": position})
     usual = SimpleNamespace(size={(2, "current"): 1.0, (2, "position"): 0.5})
     assert said in _still(own, usual)
+
+
+@pytest.mark.parametrize(
+    ("current", "position", "said"),
+    [
+        (1.0, 28.6, "the position of axis 2 is 57.2 times the baseline's: another unit (degrees)?"),
+        (25.0, 0.0, "the current of axis 2 is 25 times the baseline's"),
+        (1.0, 0.0, None),
+        (1.0, 0.6, None),
+    ],
+)
+def test_degrees_for_radians_are_no_joint_that_stands_still(current, position, said):
+    """Of a program logged in degrees no motion is found: it would be too fast for any robot."""
+    sizes = {"current": current, "position": position}
+    own = SimpleNamespace(axis=2, size=sizes, steps=(0.0, 0.01))
+    usual = SimpleNamespace(
+        size={(2, "current"): 1.0, (2, "position"): 0.5}, steps={2: (0.0, 0.01)}
+    )
+    told = _far_too_large(own, usual)
+    assert (told is None) == (said is None)
+    assert said is None or told.startswith(said)

@@ -69,12 +69,15 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
 def odd_cycles(motions: pa.Table) -> dict[tuple[str, int], dict[int, float]]:
     """Find cycles of another speed than most of their recording: it was changed midway.
 
+    Where a joint creeps into its stop, a motion found from phase currents ends there in one cycle
+    and before it in the next. The carrier tells that both are of one speed.
+
     Returns
     -------
     dict of (str, int) to dict of int to float
         By run and axis, how many times as long as the others its odd cycles last, by number.
     """
-    run, axis, ratio, samples, *_ = _lasting(motions)
+    run, axis, ratio, samples, _, carrier = _lasting(motions)
     cycle = np.asarray(motions["cycle"])[_whole_motions(motions)]
     found = {}
     for name, number in sorted(set(zip(run.tolist(), axis.tolist(), strict=True))):
@@ -84,8 +87,15 @@ def odd_cycles(motions: pa.Table) -> dict[tuple[str, int], dict[int, float]]:
         open_ = 2 * MOVED + OPEN_SAMPLES / float(np.median(samples[own]))
         alike = (np.abs(times[:, None] / times - 1) <= open_).sum(axis=0)
         # of as many the speed of the reference
-        most = times[np.lexsort((np.abs(times - 1), -alike))[0]]
-        odd = {k: float(v / most) for k, v in lasting.items() if abs(v / most - 1) > open_}
+        first = [*lasting][np.lexsort((np.abs(times - 1), -alike))[0]]
+        most = lasting[first]
+        turning = {k: float(np.median(carrier[own & (cycle == k)])) for k in lasting}
+        odd = {
+            k: float(v / most)
+            for k, v in lasting.items()
+            # without a carrier this is NaN, which is near to nothing
+            if abs(v / most - 1) > open_ and not abs(turning[k] / turning[first] - 1) <= MOVED
+        }
         if odd:
             found[name, number] = dict(sorted(odd.items()))
     return found

@@ -12,6 +12,9 @@ from opamc_cli.stages.nightly.alarms.course import JUDGED, day
 from opamc_cli.stages.nightly.alarms.together import kind
 from opamc_cli.storage.history.rows import EXCUSED, UNJUDGED, Event, NightRow, told_by
 
+NO_AXIS = "no axis can be judged"
+"""As a diagnosis of another speed, program, unit or log ends."""
+
 LASTS = 3
 """Nights after which what keeps a joint from being judged may have been done to it on purpose."""
 
@@ -151,6 +154,10 @@ def failed(robot: str, nights: Sequence[NightRow], remind_after: int) -> Iterato
                 judged = any(row.status != "baseline" for row in rows)
                 when += f": in part not {'judged' if judged else 'used'}"
             text = f"{when}: {_in_one(dates, reasons)}"
+            lasts = len(rows) >= LASTS and rows[-1] is dated[-1]
+            if lasts and all(NO_AXIS in reason for reason in reasons):
+                again = REBASELINE.replace("DATE", dates[0])
+                text = f"{text.removesuffix('.')}; if that is meant to stay: {again}"
             for index in said_in(dates, reasons, remind_after):
                 yield Event(dates[index], robot, None, of, text)
 

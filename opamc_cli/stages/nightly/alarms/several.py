@@ -119,8 +119,8 @@ def _at_once(nights: Sequence[Sequence[Row]], where: str, remind_after: int) -> 
         text = (
             f"{len(last)} of {total} joints moved together{where} in {span(dates)}, "
             f"{ratios[0]:.2g} to {ratios[-1]:.2g} times as far as in a healthy session: check "
-            f"payload, tool and temperature; {excused}: not told from unusual conditions, and a "
-            "fault that looks alike would not be"
+            f"payload, tool, temperature and the currents' scale; {excused}: not told from unusual "
+            "conditions, and a fault that looks alike would not be"
         )
         unjudged: dict[str, list[Row]] = {}
         for row in last:

@@ -184,7 +184,8 @@ _COMMON = (
 )
 _MOST_MOVED = (
     "and other joints have moved, too, if not as far: what moves several is no fault of one, but "
-    "would hide it; check payload, temperature and program, and record again, or a new baseline."
+    "would hide it; check payload, temperature, program and the currents' scale, and record again, "
+    "or a new baseline."
 )
 _SHAKEN = (
     "and a joint at fault, axis {0}, may have shaken it, which would hide a fault of this one; see "

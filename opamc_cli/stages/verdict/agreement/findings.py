@@ -8,8 +8,11 @@ from itertools import combinations
 from statistics import median_low
 
 import numpy as np
+import numpy.typing as npt
 
 from opamc_cli.stages.verdict.agreement.measured import Measured
+
+Floats = npt.NDArray[np.float64]
 
 LARGEST_RATIO = 20.0
 """Of the current's size to the baseline's: a healthy joint's load, warmth and wear change it by
@@ -22,6 +25,13 @@ are of another size by the same factor: a fault that asks for so much more leave
 
 ALL_SCALED = 2.0
 """Likewise where it is one factor for all axes of a recording: no payload, warmth or fault is."""
+
+WITH_NOISE, AS_ONE = 1.2, 1.1
+"""Likewise where the axes' noise is of another size by that factor, too, in the middle within a
+tenth: a load and its friction leave the sensors' noise as it was."""
+
+ROOT_MEAN_SQUARE = math.sqrt(2.0)
+"""Of a sine its peak, which drives report as often."""
 
 ALIKE, UNLIKE = 1.2, 1.5
 """Two joints are exchanged if every channel of each is within 20 % of the other's size in the
@@ -40,6 +50,10 @@ nothing and some of it; less tells no direction. So of a current vector that tur
 
 REVERSING = 0.1
 """Share of the samples with the rarer sign, from which on a current that has none lost it."""
+
+ONE_WAY = 0.5
+"""Of a reported current's level its mean: from here on a load leads, whose direction no wear turns.
+Where the current is as large as it was, and of the other sign, the log is."""
 
 RETURNING = 0.1
 """Share of the way in the rarer direction, from which on a joint moves both ways: one that moves
@@ -88,6 +102,7 @@ class Reference:
     leaning: Mapping[int, float]
     reversing: Mapping[int, float]
     level: Mapping[int, float]
+    one_way: Mapping[int, float]
     returning: Mapping[int, float]
     turning: Mapping[int, float]
     changing: Mapping[int, float]
@@ -116,6 +131,7 @@ def reference_of(baseline: Sequence[Measured]) -> Reference:
         {axis: _middle([own.leaning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.reversing for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.level for own in runs]) for axis, runs in by_axis.items()},
+        {axis: _middle([own.one_way for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.returning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.turning for own in runs]) for axis, runs in by_axis.items()},
         {axis: _middle([own.changing for own in runs]) for axis, runs in by_axis.items()},
@@ -179,14 +195,33 @@ def _all_scaled(measured: Sequence[Measured], reference: Reference) -> list[Find
         if len(axes) < 2 or min(usual) <= 0:
             continue
         times = np.array([own.size["current"] for own in axes]) / usual
-        if times.max() > ALIKE * times.min() or abs(np.log(np.median(times))) < np.log(ALL_SCALED):
+        middle = float(np.median(times))
+        noise, least = "", ALL_SCALED
+        if _noise_scaled(axes, times, reference):
+            noise, least = ", and their noise,", WITH_NOISE
+        if times.max() > ALIKE * times.min() or abs(math.log(middle)) < math.log(least):
             continue
+        peaks = abs(abs(math.log(middle)) - math.log(ROOT_MEAN_SQUARE)) <= math.log(AS_ONE) / 2
+        unit = "root mean square for peak" if peaks else "mA for A"
         why = (
-            f"the currents of all its axes are {np.median(times):.3g} times the baseline's: "
-            "another unit (mA for A)? Check the map of `opamc ingest`, and the sensors"
+            f"the currents of all its axes{noise} are {middle:.3g} times the baseline's: "
+            f"another unit ({unit})? Check the map of `opamc ingest`, and the sensors"
         )
         found += [Finding(run, own.axis, why) for own in axes]
     return found
+
+
+def _noise_scaled(axes: Sequence[Measured], times: Floats, reference: Reference) -> bool:
+    """Whether the noise of all axes is of another size by the one factor of their currents."""
+    noise = np.array([own.noise for own in axes])
+    usual = np.array([reference.noise[own.axis] for own in axes])
+    if min(*noise, *usual) <= 0:
+        return False
+    middle = np.median(times)
+    sizes, noises = (np.abs(np.log(one / middle)) for one in (times, noise / usual))
+    # of a current in steps the noise is known to some per cent alone
+    as_noisy = np.median(noises) <= math.log(AS_ONE) and noises.max() <= math.log(ALIKE)
+    return bool(sizes.max() <= math.log(AS_ONE) and as_noisy)
 
 
 def _all_filtered(measured: Sequence[Measured], reference: Reference) -> list[Finding]:
@@ -268,8 +303,11 @@ def _scaled(own: Measured, reference: Reference, times: float) -> bool:
 
 
 def _far_too_large(own: Measured, reference: Reference) -> str | None:
-    usual = reference.size.get((own.axis, "current"), 0.0)
-    return _other_unit(own, reference) if own.size["current"] > LARGEST_RATIO * usual else None
+    for kind, size in own.size.items():
+        usual = reference.size.get((own.axis, kind), math.inf)
+        if size > (LARGEST_RATIO if kind == "current" else SCALED) * usual:
+            return _other_unit(own, reference)
+    return None
 
 
 def _unbalanced(own: Measured, reference: Reference) -> str | None:
@@ -316,6 +354,13 @@ def _other_sign(own: Measured, reference: Reference) -> str | None:
         return (
             f"the current of axis {own.axis} drives against the motion where the baseline's drives "
             "it: is the sign of the current or of the position inverted?"
+        )
+    way, usual_way = own.one_way or 0.0, reference.one_way[own.axis]
+    leads = way * usual_way < 0 and min(abs(way), abs(usual_way)) >= ONE_WAY
+    if leads and as_large and _away(own, own.axis, reference, ("current",)) <= math.log(ALIKE):
+        return (
+            f"the current of axis {own.axis} is as large as the baseline's, and of the other sign "
+            "throughout: is it inverted?"
         )
     return None
 

@@ -74,6 +74,9 @@ class Measured:
     """Of a reported current: share of the samples that have the rarer of both signs."""
     level: float | None = None
     """Of a reported current: root mean square with its mean, which no sign changes."""
+    one_way: float | None = None
+    """Of a reported current: its mean over its level, -1..1, as a load leaves it that does not
+    turn."""
     returning: float | None = None
     """Beside a reported current: share of the joint's way that leads in the rarer direction."""
     turning: float | None = None
@@ -258,11 +261,14 @@ def _signs(looks: Sequence[Mapping[str, Floats]], current: str, motion: str) -> 
     speeds = np.concatenate([_speed(look, motion) for look in looks])
     drawn, size = np.nansum(values * np.sign(speeds)), np.nansum(np.abs(values))
     forth, back = (float(np.nansum(np.maximum(way * speeds, 0.0))) for way in (1, -1))
+    level = _rms([values])
+    mean = float(np.nanmean(values)) if np.isfinite(values).any() else 0.0
     signed = [int(np.count_nonzero(values > 0)), int(np.count_nonzero(values < 0))]
     return {
         "leaning": float(drawn / size) if size else 0.0,
         "reversing": min(signed) / max(sum(signed), 1),
-        "level": _rms([values]),
+        "level": level,
+        "one_way": mean / level if level else 0.0,
         "returning": min(forth, back) / (forth + back) if forth + back else 0.0,
     }
 
