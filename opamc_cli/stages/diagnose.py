@@ -19,6 +19,7 @@ from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
+from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
@@ -176,7 +177,7 @@ def _diagnose(
         unlike = other_conditions(sides.baseline.sources, sides.target.sources)
         refuse_all(unjudged.axes, unlike)
     scored = score.compare_sides(sides, config, out, models=models)
-    decided = verdict.decide(sides, config)
+    decided = decide(sides, config)
     differing = decided.differing(config.score) if config.joint.explain else []
     causes: dict[int, dict[str, Any]] = {}
     notes: list[str] = []
