@@ -29,7 +29,7 @@ from opamc_cli.stages.model.loaded_effects import load_user_effects
 from opamc_cli.stages.model.users_effects import users_effects_named
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
-from opamc_cli.stages.verdict.reasons import (
+from opamc_cli.stages.verdict.wording.reasons import (
     AT_REST,
     CURRENT_LAG,
     IN_SPIKES,

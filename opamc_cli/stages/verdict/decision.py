@@ -13,7 +13,7 @@ from opamc_cli.errors import InputError
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.reasons import is_small
+from opamc_cli.stages.verdict.wording.reasons import is_small
 from opamc_cli.storage.sources import RunSource
 
 MOST_FILES = 16

@@ -20,11 +20,11 @@ from opamc_cli.stages.recordings.sessions import Sessions, started
 from opamc_cli.stages.verdict.agreement.common import not_sure
 from opamc_cli.stages.verdict.agreement.exchanged_joints import exchanged_joints
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.brief import brief
 from opamc_cli.stages.verdict.decision import Decided
 from opamc_cli.stages.verdict.findings import NOTHING_FOUND, Findings
-from opamc_cli.stages.verdict.reasons import is_excused, reasons
 from opamc_cli.stages.verdict.state import among_siblings, believed, with_cause
+from opamc_cli.stages.verdict.wording.brief import brief
+from opamc_cli.stages.verdict.wording.reasons import is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import current_unit, other_conditions
