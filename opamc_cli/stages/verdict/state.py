@@ -10,7 +10,7 @@ from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Judgement
 from opamc_cli.joint.change.search import SCALE
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.stages.verdict.cause import meaning
+from opamc_cli.stages.verdict.wording.causes import meaning
 from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, is_small, logged
 
 MAIN_SHARE = 0.5
