@@ -18,8 +18,7 @@ from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import Floats, Joint
 from opamc_cli.signal.motion.reported import unwrapped
 from opamc_cli.stages.model.kept_tracks import following
-from opamc_cli.stages.model.loaded_effects import load_user_effects
-from opamc_cli.stages.model.users_effects import users_effects_named
+from opamc_cli.stages.model.users_effects import load_user_effects, users_effects_named
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
 from opamc_cli.stages.verdict.wording.causes import (
