@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config import Config
+from opamc_cli.decision.judge import Bundle
 from opamc_cli.errors import ExitCode
 from opamc_cli.joint.change.search import SMALLEST_WARMTH_C
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
@@ -27,7 +28,10 @@ from opamc_cli.stages.verdict.wording.brief import brief
 from opamc_cli.stages.verdict.wording.reasons import is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
 from opamc_cli.storage.schemas import files
-from opamc_cli.storage.sources import current_unit, other_conditions
+from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
+
+Divergences = dict[tuple[str, int, int, int, int], list[float]]
+"""By role, axis, motion, order and delay."""
 
 
 @dataclass(frozen=True)
@@ -111,25 +115,8 @@ def content(
         if final.state == "insufficient-data":
             final = replace(final, health_index=math.nan, p_value=math.nan, p_adjusted=math.nan)
         bundle = decided.bundles[axis]
-        motions = [
-            {
-                "motion": cell.motion,
-                "order": cell.order,
-                "tau": cell.tau,
-                "jsd_baseline": jsd.get(("baseline", axis, cell.motion, cell.order, cell.tau), []),
-                "jsd_target": jsd.get(("target", axis, cell.motion, cell.order, cell.tau), []),
-            }
-            for cell in bundle.cells
-        ]
-        runs = {
-            role: [source for source in sources if source.name in _runs_of(axis, rows)]
-            for role, sources, rows in zip(
-                ("baseline", "target"),
-                (decided.baseline_sources(axis), decided.target_sources(axis)),
-                decided.sides.rows,
-                strict=True,
-            )
-        }
+        motions = _motions(axis, bundle, jsd)
+        runs = _compared(axis, decided)
         lacking = _not_compared(axis, decided)
         which = decided.sessions_at_fault(axis)
         excused = is_excused(final, config.score)
@@ -216,6 +203,33 @@ def _warmer_c(
     return 0.0 if usual_too else warmer
 
 
+def _motions(axis: int, bundle: Bundle, jsd: Divergences) -> list[dict[str, Any]]:
+    """Return the divergences of both sides' segments by motion, order and delay."""
+    return [
+        {
+            "motion": cell.motion,
+            "order": cell.order,
+            "tau": cell.tau,
+            **{
+                f"jsd_{role}": jsd.get((role, axis, cell.motion, cell.order, cell.tau), [])
+                for role in ("baseline", "target")
+            },
+        }
+        for cell in bundle.cells
+    ]
+
+
+def _compared(axis: int, decided: Decided) -> dict[str, list[RunSource]]:
+    """Return, by role, the recordings by which an axis is judged."""
+    of_both = (decided.baseline_sources(axis), decided.target_sources(axis))
+    sides = zip(("baseline", "target"), of_both, decided.sides.rows, strict=True)
+    return {
+        role: [source for source in sources if source.name in there]
+        for role, sources, rows in sides
+        for there in [_runs_of(axis, rows)]
+    }
+
+
 def _not_compared(axis: int, decided: Decided) -> dict[str, list[str]]:
     """Return, by role, the runs of a side that have no part in what is said of an axis."""
     found, sides = {}, decided.sides
@@ -228,8 +242,8 @@ def _not_compared(axis: int, decided: Decided) -> dict[str, list[str]]:
     return {role: names for role, names in found.items() if names}
 
 
-def _divergences(scores: pa.Table) -> dict[tuple[str, int, int, int, int], list[float]]:
-    found: dict[tuple[str, int, int, int, int], list[float]] = {}
+def _divergences(scores: pa.Table) -> Divergences:
+    found: Divergences = {}
     names = ["role", "axis", "motion", "order", "tau", "jsd"]
     for row in scores.select(names).to_pylist():
         if row["jsd"] is not None and math.isfinite(row["jsd"]):
