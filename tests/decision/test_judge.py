@@ -8,14 +8,13 @@ import pytest
 from scipy.stats import kstest
 
 from opamc_cli.decision.comparison import Shift, common_log_ratio
-from opamc_cli.decision.judge import (
+from opamc_cli.decision.judge import Bundle, Policy
+from opamc_cli.decision.judge import judge as decide
+from opamc_cli.decision.one_session import (
     HEALTHY_SHIFT_SPREAD,
-    Bundle,
-    Policy,
     one_session_log_ratio,
     one_session_shift,
 )
-from opamc_cli.decision.judge import judge as decide
 from opamc_cli.decision.significance.spread import Spread, moderated_spread
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision import known_fleet
