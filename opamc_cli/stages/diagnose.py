@@ -20,7 +20,6 @@ from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
 from opamc_cli.stages.verdict.decision import Decided, decide
-from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
@@ -204,7 +203,7 @@ def _diagnose(
     in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
     found = findings.Findings(causes, unjudged.axes, unjudged.foreign)
     findings.write_findings(out, found)
-    head = header(sources, every_note, out, tables)
+    head = verdict.header(sources, every_note, out, tables)
     written = verdict.write(decided, scored, config, out, found, head)
     progress("report")
     title = config.report.title

@@ -16,7 +16,6 @@ from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict import verdict
 from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.stages.verdict.findings import read_findings
-from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import other_robot
@@ -70,7 +69,7 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     if any(axis not in found.causes for axis in decided.differing(config.score)):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)
-    head = header(sources, notes, out, score.FILES)
+    head = verdict.header(sources, notes, out, score.FILES)
     head["tables"] |= _beside(folder, (baseline, target))
     written = verdict.write(decided, scored, config, out, found, head)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)

@@ -2,14 +2,17 @@
 
 import json
 import math
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
+from opamc_cli import __version__
 from opamc_cli.config import Config
 from opamc_cli.decision.judge import Bundle
 from opamc_cli.errors import ExitCode
@@ -27,8 +30,11 @@ from opamc_cli.stages.verdict.state import among_siblings, believed, with_cause
 from opamc_cli.stages.verdict.wording.brief import brief
 from opamc_cli.stages.verdict.wording.reasons import is_excused, reasons
 from opamc_cli.storage.files.atomic import write_text
+from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import RunSource, current_unit, other_conditions
+
+SCHEMA_VERSION = 1
 
 Divergences = dict[tuple[str, int, int, int, int], list[float]]
 """By role, axis, motion, order and delay."""
@@ -79,6 +85,46 @@ def write(
     path = out / files.VERDICT
     write_text(path, json.dumps(verdict, indent=2, allow_nan=False) + "\n")
     return VerdictOutcome(path, verdict, exit_code(verdict))
+
+
+def header(
+    sources: Sequence[RunSource],
+    notes: Sequence[str],
+    folder: Path,
+    tables: Iterable[str],
+) -> dict[str, Any]:
+    """Return the fields of verdict.json beside `axes`.
+
+    Parameters
+    ----------
+    sources
+        The recordings of both sides.
+    notes
+        What is worth knowing of the diagnosis as a whole.
+    folder, tables
+        The tables that the verdict rests on, as paths below their folder; the verdict holds
+        their hashes, and no report mixes it with others.
+    """
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "version": __version__,
+        "created_at": _now().isoformat(timespec="seconds"),
+        "robot": _common(source.info.robot for source in sources),
+        "program": _common(source.info.program for source in sources),
+        "notes": list(notes),
+        "tables": {name: file_sha256(folder / name) for name in sorted(tables)},
+    }
+
+
+def _now() -> datetime:
+    """Return the time, or what SOURCE_DATE_EPOCH says: two runs can then be compared bytewise."""
+    fixed = os.environ.get("SOURCE_DATE_EPOCH", "")
+    return datetime.fromtimestamp(int(fixed), UTC) if fixed.isdecimal() else datetime.now(UTC)
+
+
+def _common(values: Iterable[str | None]) -> str | None:
+    known = {value for value in values if value is not None}
+    return known.pop() if len(known) == 1 else None
 
 
 def exit_code(verdict: Mapping[str, Any]) -> ExitCode:
