@@ -28,7 +28,7 @@ from sklearn.ensemble import IsolationForest
 
 from opamc_cli.config import load_config
 from opamc_cli.decision.judge import Bundle, Judgement
-from opamc_cli.decision.odd_session import judge_without_odd
+from opamc_cli.decision.sessions.odd_session import judge_without_odd
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field, replace
 
 from opamc_cli.config import Config
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import FAR, Bundle, Judgement, Policy
-from opamc_cli.decision.odd_session import judge_without_odd
+from opamc_cli.decision.sessions.each_session import LoneSession, apart, each_session
+from opamc_cli.decision.sessions.odd_session import judge_without_odd
 from opamc_cli.errors import InputError
 from opamc_cli.stages.chain.compared.side import Side, Sides
 from opamc_cli.stages.recordings.sessions import BY_SESSION, Sessions, started
