@@ -190,9 +190,8 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     Returns
     -------
     float
-        Median over the siblings, the lower one of an even number, as a log ratio, or in units of
-        each joint's own spread if that is more; 0 if negative, with fewer than two siblings, or
-        if the joint itself was not compared.
+        Median over the siblings, the lower one of an even number, as a log ratio; 0 if negative,
+        with fewer than two siblings, or if the joint itself was not compared.
     """
     others = [shift for key, shift in shifts.items() if key != axis]
     if axis not in shifts or len(others) < 2:
@@ -200,9 +199,7 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     if largest:
         return max(0.0, *(shift.log_ratio for shift in others))
     # of two siblings the one that moved less: else one that fails would excuse the others
-    plain = of_siblings({key: shift.log_ratio for key, shift in shifts.items()}, axis)
-    moved = {key: shift.log_ratio / shift.spread.scale for key, shift in shifts.items()}
-    return max(plain, of_siblings(moved, axis) * shifts[axis].spread.scale)
+    return of_siblings({key: shift.log_ratio for key, shift in shifts.items()}, axis)
 
 
 def of_siblings(values: Mapping[int, float], axis: int) -> float:
