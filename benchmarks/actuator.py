@@ -28,13 +28,13 @@ from sklearn.ensemble import IsolationForest
 
 from opamc_cli.config import load_config
 from opamc_cli.decision.judge import Bundle, Judgement
-from opamc_cli.decision.odd_session import judge_without_odd
+from opamc_cli.decision.sessions.odd_session import judge_without_odd
 from opamc_cli.signal.ordinal.patterns import ordinal_counts
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.cause import explain, moving_samples
 from opamc_cli.stages.verdict.evidence import bundles
-from opamc_cli.stages.verdict.verdict import believed, with_cause
+from opamc_cli.stages.verdict.state import believed, with_cause
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 

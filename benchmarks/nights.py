@@ -26,7 +26,7 @@ from scipy.stats import kstest
 
 from opamc_cli.config import load_config
 from opamc_cli.config.testbed import TestbedConfig, load_testbed
-from opamc_cli.decision.odd_session import judge_without_odd
+from opamc_cli.decision.sessions.odd_session import judge_without_odd
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict.evidence import bundles

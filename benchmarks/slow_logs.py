@@ -25,6 +25,7 @@ from opamc_cli.stages.chain import score
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.verdict import verdict
+from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run
 from opamc_cli.storage.schemas import files
@@ -97,7 +98,7 @@ def judged(channels: dict, rate_hz: float, folder: Path) -> dict:
         target = run_chain([folder / name], config, out, reference=baseline.motions)
         sides = Sides(read_side(baseline.patterns), read_side(target.patterns))
         scored = score.compare_sides(sides, config, out)
-        written = verdict.write(verdict.decide(sides, config), scored, config, out)
+        written = verdict.write(decide(sides, config), scored, config, out)
         errors = (*baseline.errors, *target.errors)
         axes = {a["axis"]: a for a in written.verdict["axes"]}
         found[severity] = (axes, errors, plain_distances(sides))

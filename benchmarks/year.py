@@ -32,7 +32,7 @@ from opamc_cli.stages.chain import identify, patterns, segment
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.verdict.verdict import decide
+from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.storage.history.rows import AlarmRow
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.writing import save_run

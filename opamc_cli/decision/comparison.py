@@ -56,7 +56,7 @@ MAD_EFFICIENCY = 0.37
 """Share of the values that a median absolute deviation is worth (Huber, 1981)."""
 
 FAR_OUT = Spread(1.0, BETWEEN_SESSIONS.dof)
-"""Of places by all voices together above their median: one voice may carry them there."""
+"""Of places by all voices together: one voice may carry them above their median."""
 
 LEAST_SCALE = 0.01
 """Distances that agree to a percent agree: none weighs infinitely."""
@@ -190,9 +190,8 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     Returns
     -------
     float
-        Median over the siblings, the lower one of an even number, as a log ratio, or in units of
-        each joint's own spread if that is more; 0 if negative, with fewer than two siblings, or
-        if the joint itself was not compared.
+        Median over the siblings, the lower one of an even number, as a log ratio; 0 if negative,
+        with fewer than two siblings, or if the joint itself was not compared.
     """
     others = [shift for key, shift in shifts.items() if key != axis]
     if axis not in shifts or len(others) < 2:
@@ -200,9 +199,7 @@ def common_log_ratio(shifts: Mapping[int, Shift], axis: int, *, largest: bool = 
     if largest:
         return max(0.0, *(shift.log_ratio for shift in others))
     # of two siblings the one that moved less: else one that fails would excuse the others
-    plain = of_siblings({key: shift.log_ratio for key, shift in shifts.items()}, axis)
-    moved = {key: shift.log_ratio / shift.spread.scale for key, shift in shifts.items()}
-    return max(plain, of_siblings(moved, axis) * shifts[axis].spread.scale)
+    return of_siblings({key: shift.log_ratio for key, shift in shifts.items()}, axis)
 
 
 def of_siblings(values: Mapping[int, float], axis: int) -> float:
@@ -257,15 +254,6 @@ class Joint:
     def depends_on_conditions(self, voice: Voice) -> bool:
         """Whether unusual conditions move a voice by more than its own error allows for."""
         return voice[1] == "orthogonal" and self._evidence[voice[0]].depends_on_conditions
-
-    def far_in(self) -> Spread:
-        """Return the spread of places below their median.
-
-        One voice can carry a soft maximum up, but all of them have to be low for it to be low:
-        it is then their mean, and they hardly depend on each other.
-        """
-        weights = np.array(self.weights(self.voices))
-        return Spread(float(np.linalg.norm(weights) / weights.sum()), math.inf)
 
     def unusual(self) -> float:
         """How much further along the target lies than a healthy session does, as a log ratio."""
@@ -325,7 +313,7 @@ class Joint:
         places = self.places(scales, taken_off)
         above = int((places[:-1] >= places[-1]).sum())
         gaps, place = places[:-1] - np.median(places), float(places[-1] - np.median(places))
-        by_rank = spliced_p_value(gaps, place, FAR_OUT, above, self.far_in())
+        by_rank = spliced_p_value(gaps, place, FAR_OUT, above)
         # the first of all is in the lowest step; how deep in it, only the tails know
         half_step = 0.5 / len(places)
         return by_rank if above else min(max(by_rank, half_step), max(tail, 1e-300))

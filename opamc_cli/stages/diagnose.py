@@ -19,7 +19,7 @@ from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
 from opamc_cli.stages.verdict.agreement.unjudged import refuse_all
-from opamc_cli.stages.verdict.header import header
+from opamc_cli.stages.verdict.decision import Decided, decide
 from opamc_cli.storage.files.result import published_text, result
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.run import Run
@@ -176,42 +176,9 @@ def _diagnose(
         unlike = other_conditions(sides.baseline.sources, sides.target.sources)
         refuse_all(unjudged.axes, unlike)
     scored = score.compare_sides(sides, config, out, models=models)
-    decided = verdict.decide(sides, config)
-    differing = decided.differing(config.score) if config.joint.explain else []
-    causes: dict[int, dict[str, Any]] = {}
-    notes: list[str] = []
-    if differing:
-        watch, cause = progress("cause"), _cause()
-        moving = [cause.moving_samples(side.patterns) for side in (sides.baseline, sides.target)]
-        strokes = [
-            cause.strokes_of(read_table(one.segments, "segment", SEGMENTS))
-            for one in (normal, other)
-        ]
-        for done, axis in enumerate(differing):
-            watch(done, len(differing))
-            times = {**moving[0].get(axis, {}), **moving[1].get(axis, {})}
-            try:
-                named = cause.explain(
-                    axis,
-                    decided.baseline_sources(axis),
-                    decided.target_sources(axis),
-                    config.joint,
-                    times,
-                    kept,
-                    [moves.get(axis, {}) for moves in strokes],
-                )
-            except (
-                ArithmeticError,
-                LookupError,
-                ValueError,
-                InputError,
-                NotEnoughDataError,
-            ) as error:
-                # a verdict must not be lost because its explanation failed on odd recordings
-                notes.append(f"axis {axis}: no cause could be sought ({error})")
-                continue
-            # empty: sought in vain
-            causes[axis] = named if named.get("explained", 0.0) >= LEAST_SHARE else {}
+    decided = decide(sides, config)
+    segments = (normal.segments, other.segments)
+    causes, in_vain = _causes(decided, segments, config, kept, progress)
     blind = decided.blind(config.score)
     of_both = (
         repeats.notes,
@@ -219,7 +186,7 @@ def _diagnose(
         other.notes,
         scored.notes,
         decided.notes(),
-        notes,
+        in_vain,
         blind,
     )
     # what both sides give alike is said once
@@ -236,7 +203,7 @@ def _diagnose(
     in_part = frozenset(axis for error in of_target for axis in error.axes or decided.judgements)
     found = findings.Findings(causes, unjudged.axes, unjudged.foreign)
     findings.write_findings(out, found)
-    head = header(sources, every_note, out, tables)
+    head = verdict.header(sources, every_note, out, tables)
     written = verdict.write(decided, scored, config, out, found, head)
     progress("report")
     title = config.report.title
@@ -253,6 +220,50 @@ def _diagnose(
         warnings=(*check_comparable(sides.baseline.sources, sides.target.sources), *blind),
         notes=every_note,
     )
+
+
+def _causes(
+    decided: Decided,
+    segments: Sequence[Path],
+    config: Config,
+    kept: KeptResults | None,
+    progress: Steps,
+) -> tuple[dict[int, dict[str, Any]], list[str]]:
+    """Seek what has changed in each axis that differs.
+
+    Returns
+    -------
+    dict of int to dict
+        By axis; empty where a cause was sought in vain.
+    list of str
+        Which could not be sought, and why.
+    """
+    differing = decided.differing(config.score) if config.joint.explain else []
+    causes: dict[int, dict[str, Any]] = {}
+    notes: list[str] = []
+    if not differing:
+        return causes, notes
+    watch, cause, sides = progress("cause"), _cause(), decided.sides
+    moving = [cause.moving_samples(side.patterns) for side in (sides.baseline, sides.target)]
+    strokes = [cause.strokes_of(read_table(path, "segment", SEGMENTS)) for path in segments]
+    for done, axis in enumerate(differing):
+        watch(done, len(differing))
+        try:
+            named = cause.explain(
+                axis,
+                decided.baseline_sources(axis),
+                decided.target_sources(axis),
+                config.joint,
+                {**moving[0].get(axis, {}), **moving[1].get(axis, {})},
+                kept,
+                [moves.get(axis, {}) for moves in strokes],
+            )
+        except (ArithmeticError, LookupError, ValueError, InputError, NotEnoughDataError) as error:
+            # a verdict must not be lost because its explanation failed on odd recordings
+            notes.append(f"axis {axis}: no cause could be sought ({error})")
+            continue
+        causes[axis] = named if named.get("explained", 0.0) >= LEAST_SHARE else {}
+    return causes, notes
 
 
 def _cause() -> ModuleType:

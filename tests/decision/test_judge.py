@@ -8,15 +8,9 @@ import pytest
 from scipy.stats import kstest
 
 from opamc_cli.decision.comparison import Shift, common_log_ratio
-from opamc_cli.decision.judge import (
-    HEALTHY_SHIFT_SPREAD,
-    Bundle,
-    Policy,
-    one_session_log_ratio,
-    one_session_shift,
-)
+from opamc_cli.decision.judge import Bundle, Policy
 from opamc_cli.decision.judge import judge as decide
-from opamc_cli.decision.significance.spread import Spread, moderated_spread
+from opamc_cli.decision.significance.spread import Spread
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision import known_fleet
 from tests.decision.fleet import Fleet, cells, judge, spectra
@@ -181,32 +175,32 @@ def test_the_decision_does_not_depend_on_the_order_of_sessions():
 
 DIGITS = {
     "six sessions": """
-healthy 0.9251 0.9251 0.9825 0.1837 0.5526 -0.8801 0 0 0 0.5766 0.8616 0.7119
+healthy 0.8803 0.8803 0.9147 0.1837 0.5526 -0.8801 0 0 0 0.5766 0.8616 0.7119
 healthy 0.005728 0.01146 0.01146 0.00421 5.397 5.011 0.4992 0 0 0.0005766 0.8181 0.7103
 fault 9.147e-07 4.574e-06 4.574e-06 0.0008709 18.4 21.51 0 0.3974 0 0.6574 4.574e-07 0.6649
 changed 0.0001482 0.0004447 0.0004776 0.06827 6.899 7.114 0 0 0.2669 1 0.6558 5.93e-05
 healthy 1.359e-05 5.438e-05 5.438e-05 4.634e-5 41.36 76.76 0.07622 0 0.08286 1.36e-06 0.4196 0.4504
 """,
     "six sessions, two lack a motion": """
-healthy 0.9385 0.9385 0.9848 0.2096 0.5067 -0.8533 0 0 0 0.6448 0.8207 0.7123
+healthy 0.8829 0.8829 0.9119 0.2096 0.5067 -0.8533 0 0 0 0.6448 0.8207 0.7123
 fault 0.001458 0.004375 0.004376 0.006749 4.832 3.552 0.4947 0 0 0.0001461 0.7911 0.7277
 fault 1.206e-05 6.03e-05 6.03e-05 0.001617 18.08 17.29 0 0.3981 0 0.6558 6.03e-06 0.6579
 changed 0.0004088 0.001635 0.001648 0.04969 7.229 5.787 0 0 0.2664 0.9999 0.6199 0.0001636
 healthy 0.07198 0.144 0.1522 0.08453 2.09 0.7139 0.07622 0.02145 0.08286 0.009075 0.299 0.4285
 """,
     "six sessions, all joints move": """
-healthy 0.003116 0.006232 1 2.496 7.079 7.098 0.2698 0 0 0.0003127 0.8616 0.7119
-healthy 0.005728 0.006232 1 2.272 5.397 5.011 0.4992 0 0 0.0005766 0.8181 0.7103
-fault 9.147e-07 4.573e-06 4.574e-06 0.05821 19.49 22.87 0.2782 0.3974 0 0.0009113 4.574e-07 0.6649
+healthy 0.003116 0.006232 1 2.274 7.079 7.098 0.2698 0 0 0.0003127 0.8616 0.7119
+healthy 0.005728 0.006232 1 2.032 5.397 5.011 0.4992 0 0 0.0005766 0.8181 0.7103
+fault 9.147e-07 4.573e-06 4.574e-06 0.05757 19.49 22.87 0.2782 0.3974 0 0.0009113 4.574e-07 0.6649
 changed 0.0001482 0.0004446 0.0006368 0.08113 6.989 7.228 0.2481 0 0.2669 0.09779 0.6558 5.93e-05
 healthy 1.359e-05 5.438e-05 1 3.906 41.36 76.76 0.07622 0 0.08286 1.36e-06 0.4196 0.4504
 """,
     "two sessions": """
-healthy 0.7874 1 1 0 0.6552 -1.054 0.1325 0 0.09458 0.7861
+healthy 0.7767 1 1 0 0.6552 -1.054 0.1325 0 0.09458 0.7861
 healthy 0.003535 0.01767 0.01767 0 9.762 19.38 0.5761 0.05654 0.1022 0.003535
-healthy 0.5084 1 1 0 0.6704 -1.013 0.136 0.3937 0.1105 0.7721
-insufficient-data 0.5464 1 1 0 0.6925 -0.9565 0.136 0.01837 0.3623 0.7519
-healthy 0.6245 1 1 0 0.9277 -0.4426 0.1723 0 0.1037 0.5567
+healthy 0.5158 1 1 0 0.6704 -1.013 0.136 0.3937 0.1105 0.7721
+insufficient-data 0.553 1 1 0 0.6925 -0.9565 0.136 0.01837 0.3623 0.7519
+healthy 0.6275 1 1 0 0.9277 -0.4426 0.1723 0 0.1037 0.5567
 """,
     "one session": """
 healthy 0.4489 1 1 0 1.033 0.01236 0.2308 nan nan 0.4489
@@ -233,7 +227,7 @@ healthy 0.303 0.6059 0.6751 0.05467 1.005 -0.3269 0.07147 0.0257 0 0.06188 0.584
 healthy 0.9331 0.9331 0.9421 0.1419 0.7297 -0.5577 0 0 0 0.3375 0.9431 0.5922
 fault 5.918e-10 2.367e-09 2.367e-09 0.002806 6.761 9.1 0.5164 0 0 5.918e-11 0.8185 0.6611
 fault 3.091e-26 1.545e-25 1.545e-25 0.0001901 41.2 63.74 0 0.3972 0 0.5633 1.545e-26 0.5961
-changed 3.447e-08 1.034e-07 1.034e-07 4.211e-07 12.43 18.19 0 0 0.2976 1 0.8838 1.379e-08
+changed 3.447e-08 1.034e-07 1.034e-07 4.154e-07 12.43 18.19 0 0 0.2976 1 0.8838 1.379e-08
 healthy 5.931e-07 1.186e-06 1.186e-06 0.01283 3.187 3.428 0 0 0.03256 5.931e-08 0.4533 0.5392
 """,
 }
@@ -259,18 +253,6 @@ def test_verdicts_of_a_fleet_without_chance_to_the_digit(plan):
         assert (found.n_baseline_cycles, found.n_target_cycles) == (4 * n_baseline, 4 * n_target)
 
 
-def test_one_session_without_some_motions():
-    """Motions that either side lacks say nothing; without any nothing is known."""
-    whole = known_fleet.bundle(2, 1, 1, (), 0.0).cells
-    no_baseline = replace(whole[1], baseline=0 * whole[1].baseline)
-    no_target = replace(whole[1], target=0 * whole[1].target)
-    alone = one_session_log_ratio(whole[:1])
-    assert one_session_log_ratio([whole[0], no_baseline]) == alone
-    assert one_session_log_ratio([whole[0], no_target]) == alone
-    assert one_session_log_ratio(whole) != alone
-    assert np.isnan(one_session_log_ratio([no_baseline, no_target]))
-
-
 def test_cycles_are_counted_in_the_motion_that_has_most():
     cells = known_fleet.bundle(2, 6, 1, (), 0.0).cells
     fewer = replace(cells[1], cycles=cells[1].cycles[:20], target_cycles=cells[1].target_cycles[:3])
@@ -280,34 +262,16 @@ def test_cycles_are_counted_in_the_motion_that_has_most():
 
 def test_what_siblings_have_in_common_is_that_of_the_middle_one():
     def shifts(*ratios):
-        spreads = (0.1, 0.2, 0.1, 0.4, 0.1)
-        return {
-            k: Shift(r, 1.0, Spread(s, 5))
-            for k, (r, s) in enumerate(zip(ratios, spreads, strict=False))
-        }
+        return {k: Shift(r, 1.0, Spread(0.1, 5)) for k, r in enumerate(ratios)}
 
-    # of two the lower one, as a ratio or in units of the spread, whichever is more
+    # of two the lower one
     assert common_log_ratio(shifts(9.0, 2.0, 3.0), 0) == pytest.approx(2.0)
     assert common_log_ratio(shifts(9.0, 2.0, 0.6), 0) == pytest.approx(0.6)
-    assert common_log_ratio(shifts(9.0, 2.0, 0.6), 1) == pytest.approx(1.2)
     assert common_log_ratio(shifts(9.0, 2.0, 3.0), 0, largest=True) == 3.0
     assert common_log_ratio(shifts(9.0, -2.0, -3.0), 0, largest=True) == 0.0
     assert common_log_ratio(shifts(9.0, -2.0, -3.0), 0) == 0.0
     assert common_log_ratio(shifts(9.0, 2.0), 0) == 0.0
     assert common_log_ratio(shifts(9.0, 2.0, 3.0), 7) == 0.0
-
-
-def test_a_joint_among_its_siblings_of_one_session():
-    lone = one_session_shift({1: 0.7, 2: 0.1, 3: np.nan}, 1)
-    prior = HEALTHY_SHIFT_SPREAD
-    assert (lone.log_ratio, lone.unit) == (0.7, prior.scale)
-    assert lone.spread.scale == pytest.approx(prior.scale * np.sqrt(1 + 1 / 6))
-    # 0 stands for published joints beside the two siblings: median 0.1, deviations 0.1 and 0.2
-    beside = one_session_shift({1: 0.7, 2: 0.1, 3: 0.3}, 1)
-    assert beside.log_ratio == pytest.approx(0.6)
-    blended = moderated_spread((1.4826 * 0.1) ** 2, 0.37 * 2, prior)
-    assert beside.unit == blended.scale
-    assert beside.spread == Spread(pytest.approx(blended.scale * np.sqrt(1 + 1 / 3)), blended.dof)
 
 
 def test_a_robot_of_one_motion_is_judged():
@@ -331,17 +295,3 @@ def test_a_gross_change_from_one_or_two_baseline_sessions_is_not_called_healthy(
     assert found["one session"].unknown_change == pytest.approx(0.303, abs=1e-3)
     assert np.isnan(found["six sessions"].unknown_change)
     assert known_fleet.judged("one session")[5].state == "healthy"
-
-
-def test_what_a_single_baseline_session_would_have_shown_lies_between_what_it_shows_and_not():
-    found = known_fleet.judged("one session")
-    assert found[2].state == "fault"
-    seen = found[2].effects["patterns"]
-    for axis in (1, 3, 5):
-        assert found[axis].effects["patterns"] < found[axis].least_effect < seen
-    strict = judge(
-        {axis: known_fleet.bundle(axis, 1, 1, (), 0.0).cells for axis in range(1, 6)},
-        Policy(false_alarm_rate=1e-4),
-    )
-    assert strict[1].least_effect > found[1].least_effect
-    assert np.isnan(known_fleet.judged("six sessions")[1].least_effect)

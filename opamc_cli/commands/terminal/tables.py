@@ -90,7 +90,7 @@ def verdict_lines(verdict: Mapping[str, Any]) -> "list[Text]":
 
     from opamc_cli.stages.report.wording import verdict as verdict_words
     from opamc_cli.stages.report.wording.numbers import number, p_phrase
-    from opamc_cli.stages.verdict.brief import foremost
+    from opamc_cli.stages.verdict.wording.brief import foremost
 
     first = foremost(verdict.get("axes", ()))
     unhealthy = sorted(doubtful(verdict), key=lambda entry: entry is not first)

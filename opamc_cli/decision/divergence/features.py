@@ -28,7 +28,7 @@ def ks_statistic(baseline: ArrayLike, target: ArrayLike) -> float:
 
     Parameters
     ----------
-    baseline, target : array_like
+    baseline, target : array_like, shapes (n,) and (m,)
         Divergences; entries that are not finite are passed over.
 
     Returns
@@ -51,7 +51,7 @@ def compare(baseline: ArrayLike, target: ArrayLike) -> Features:
 
     Parameters
     ----------
-    baseline, target : array_like
+    baseline, target : array_like, shapes (n,) and (m,)
         Divergences of the two groups; entries that are not finite are passed over.
 
     Returns

@@ -294,14 +294,14 @@ def effect_size(excess: ArrayLike, base: float = 2.0) -> FloatArray:
 
     Parameters
     ----------
-    excess : array_like
+    excess : array_like, shape (...)
         Excess Jensen-Shannon divergence; negative values count as none.
     base : float, default 2
         Base of the logarithm of `excess`.
 
     Returns
     -------
-    ndarray
+    ndarray, shape (...)
         w = sqrt(8·JSD in nats), from JSD ≈ w²/8. By convention 0.1 is small, 0.3 medium and 0.5
         large (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988, 7.2).
     """

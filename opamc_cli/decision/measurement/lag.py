@@ -182,7 +182,7 @@ def mean_course(parts: Sequence[Course]) -> Course:
 
 
 def centred(course: Floats, half: int) -> Floats:
-    """Return so many samples on either side of a course's middle."""
+    """Return `half` samples on either side of the middle of a course, (n,), and that one."""
     middle = course.size // 2
     return course[middle - half : middle + half + 1]
 
@@ -232,7 +232,7 @@ def shift(reference: Sequence[Sequence[Course]], late: Sequence[Course]) -> Shif
 
 
 def correlation(one: Floats, other: Floats) -> float:
-    """Pearson's; 0 of what is constant."""
+    """Pearson's, of two courses, (n,) each; 0 of what is constant."""
     x, y = one - one.mean(), other - other.mean()
     size = np.sqrt((x @ x) * (y @ y))
     return float(x @ y / size) if size > 0 else 0.0

@@ -161,7 +161,7 @@ def clearest_of(
 
 
 def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean of the known values of each column, NaN without any, and their number."""
+    """Mean over the first axis of what is known of rows, (n, ...), and its number; NaN without."""
     known = np.isfinite(rows)
     n = known.sum(axis=0).astype(np.float64)
     total = np.where(known, rows, 0.0).sum(axis=0)
@@ -169,7 +169,7 @@ def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def moderated(variance: FloatArray, dof: float) -> FloatArray:
-    """Blend each bin's variance with the mean of all bins'; unknown ones take the mean."""
+    """Blend the variance of each bin, (...), with the mean of all; unknown ones take the mean."""
     known = np.isfinite(variance)
     if not known.any():
         return variance

@@ -136,7 +136,7 @@ def session_distances(
 
 
 def labelled_distances(evidence: Evidence, is_target: NDArray[np.bool_]) -> Distances:
-    """Return the log distances between two groups of sessions under every labelling.
+    """Return the log distances between two groups of sessions under every labelling, (L, S).
 
     They are in units of the scatter of all sessions, which no labelling changes.
     """

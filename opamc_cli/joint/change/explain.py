@@ -142,21 +142,7 @@ def explain_change(
         for found, gain in zip(slow, gains, strict=True)
     ]
     loaded = any(cause.origin == "load" for cause in causes)
-    named = []
-    for one in periodic:
-        carries = one.kind != "unknown" or one.power >= SMALLEST_LINE_SHARE * max(fast, held)
-        if one.effect in library and carries:
-            grown = one.evidence["power_ratio"] >= CLEAR_GROWTH
-            clear, share = one.kind == "mesh" and grown, one.power / whole
-            enough = share >= FAULT_SHARE and (grown or not loaded)
-            serious = clear or enough or (_doubled(one) and not loaded)
-            named.append(_weighed(one, share, library, serious, clear))
-    if named:
-        # Of two readings of one change the first tells what it is, and neither makes it less.
-        share, serious, clear = (
-            max(getattr(one, name) for one in named) for name in ("share", "serious", "clear")
-        )
-        causes.append(replace(named[0], share=share, serious=serious, clear=clear))
+    causes += _of_lines(periodic, whole, max(fast, held), loaded, library)
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -177,6 +163,32 @@ def explain_change(
         sessions=not cycles,
         angle=compared.track.angle_kind,
     )
+
+
+def _of_lines(
+    periodic: list[Reading], whole: float, fast: float, loaded: bool, library: Library
+) -> list[Cause]:
+    """Make one cause of the readings of what grew, if that carries enough of the fast change.
+
+    Of two readings of one change the first tells what it is, and neither makes it less. `whole` and
+    `fast` are mean squares, A^2, that have changed in all and beyond slow effects; where the joint
+    is `loaded` otherwise, more is asked of what may be called a fault.
+    """
+    named = []
+    for one in periodic:
+        carries = one.kind != "unknown" or one.power >= SMALLEST_LINE_SHARE * fast
+        if one.effect in library and carries:
+            grown = one.evidence["power_ratio"] >= CLEAR_GROWTH
+            clear, share = one.kind == "mesh" and grown, one.power / whole
+            enough = share >= FAULT_SHARE and (grown or not loaded)
+            serious = clear or enough or (_doubled(one) and not loaded)
+            named.append(_weighed(one, share, library, serious, clear))
+    if not named:
+        return []
+    share, serious, clear = (
+        max(getattr(one, name) for one in named) for name in ("share", "serious", "clear")
+    )
+    return [replace(named[0], share=share, serious=serious, clear=clear)]
 
 
 def _doubled(ripple: Reading) -> bool:

@@ -252,17 +252,7 @@ def _next(
     grease: Grease,
 ) -> SlowCause | None:
     chosen = before.terms if before is not None else ()
-    guesses = Counter(term.effect.name for term in candidates)
-    best: dict[str, tuple[float, Shift]] = {}
-    declared = dict(zip(population.names, population.mean, strict=True))
-    for shift in shifts(compared, population, chosen, candidates):
-        name = shift.terms[-1].effect.name
-        # What falls by more than there was of it is no friction.
-        if name in best or shift.falls > max(declared.get(name, np.inf), 0.0):
-            continue
-        if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
-            part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
-            best[name] = (min(shift.p_value / part, 1.0), shift)
+    best = _likeliest(compared, population, chosen, candidates)
     if not chosen and "viscous" in best and grease.warmer_c is not None and grease.plausible:
         # What is expected of another temperature needs less proof than what is not.
         shift = best["viscous"][1]
@@ -273,10 +263,11 @@ def _next(
     sure = {name: entry for name, entry in best.items() if entry[0] <= LARGEST_P}
     late = compared.after
     left = float(np.mean(left_by(compared, population, before)[late]))
-    gains = {
-        name: left - float(np.mean(left_by(compared, population, shift)[late]))
-        for name, (_, shift) in sure.items()
-    }
+
+    def gain(shift: Shift) -> float:
+        return left - float(np.mean(left_by(compared, population, shift)[late]))
+
+    gains = {name: gain(shift) for name, (_, shift) in sure.items()}
     # What friction of both kinds, or another payload, explains as well is no scale; nor is what
     # both together, which may happen to one joint at another temperature, explain better.
     scale = gains.pop(SCALE.name, 0.0)
@@ -284,7 +275,7 @@ def _next(
     loads = [term for term in candidates if term.effect.name == "payload_change"]
     if scale > 0 and len(both) == 2 and loads and grease.warmer_c is None:
         alone, beside = (
-            left - float(np.mean(left_by(compared, population, one)[late]))
+            gain(one)
             for first in ((), loads)
             for one in shifts(compared, population, (*chosen, *first, both[0]), both[1:])
         )
@@ -312,21 +303,49 @@ def _next(
         first = "payload_change"
     if first != SCALE.name and scale >= gains[first]:
         ties += (SCALE.name,)
-    p_value, shift = sure[first]
+    return _named((first, *ties), *sure[first], compared, library, grease)
+
+
+def _likeliest(
+    compared: Compared, population: Population, chosen: tuple[Term, ...], candidates: list[Term]
+) -> dict[str, tuple[float, Shift]]:
+    """Return each effect's likeliest shift that is there, with its p over its part of the level."""
+    guesses = Counter(term.effect.name for term in candidates)
+    best: dict[str, tuple[float, Shift]] = {}
+    declared = dict(zip(population.names, population.mean, strict=True))
+    for shift in shifts(compared, population, chosen, candidates):
+        name = shift.terms[-1].effect.name
+        # What falls by more than there was of it is no friction.
+        if name in best or shift.falls > max(declared.get(name, np.inf), 0.0):
+            continue
+        if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
+            part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
+            best[name] = (min(shift.p_value / part, 1.0), shift)
+    return best
+
+
+def _named(
+    names: tuple[str, ...],
+    p_value: float,
+    shift: Shift,
+    compared: Compared,
+    library: Library,
+    grease: Grease,
+) -> SlowCause:
+    """Make a cause of the first of some effects, with which the others tie; or of grease."""
+    first, *ties = names
+    wet = not GREASE.isdisjoint(names) and grease.plausible
+    if "thermal_viscous" in library and (wet or grease.warms(shift)):
+        return grease.cause(shift, p_value, names)
     parameters = dict(shift.terms[-1].parameters)
     meaning = library[first].interpretation(parameters, compared.track)
     if first == "payload_change":
         parameters, meaning = {}, "another payload (check the tool, not the gear)"
-    names = (first, *ties)
-    wet = not GREASE.isdisjoint(names) and grease.plausible
-    if "thermal_viscous" in library and (wet or grease.warms(shift)):
-        return grease.cause(shift, p_value, names)
-    meaning = LESS_FRICTION if shift.falls else meaning
     return SlowCause(
         effect=first,
         parameters=parameters,
-        interpretation=meaning,
+        interpretation=LESS_FRICTION if shift.falls else meaning,
         shift=shift,
         p_value=p_value,
-        ties=ties,
+        ties=tuple(ties),
     )

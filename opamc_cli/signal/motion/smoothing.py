@@ -49,8 +49,8 @@ trapezoid, 73 to 100 % where a ripple shakes a soft joint."""
 def measurement_noise(path: Floats) -> float:
     """Estimate the standard deviation of what is not smooth in a path, from its fourth differences.
 
-    In the path's unit, by the median absolute difference; the sum of squares of the fourth
-    difference's weights 1, -4, 6, -4, 1 is 70. Where a path in steps of an encoder hardly changes
+    Of a path, (n,), in its unit, by the median absolute difference; the sum of squares of the
+    weights 1, -4, 6, -4, 1 is 70. Where a path in steps of an encoder hardly changes
     from sample to sample, most differences are none: they do not count.
     """
     rounding = ROUNDING * float(np.max(np.abs(path)))
@@ -226,7 +226,7 @@ def _by_fft(path: Floats, weights: Floats) -> Floats:
 
 
 def filled(values: Floats) -> Floats:
-    """Values with gaps bridged by straight lines; unchanged if all are finite."""
+    """Values, (n,), with gaps bridged by straight lines; unchanged if all are finite."""
     values = np.asarray(values, dtype=np.float64)
     good = np.isfinite(values)
     if good.all() or not good.any():
@@ -286,7 +286,7 @@ def clear_of_corners(
 
 
 def widened(rows: Bools, reach: int) -> Bools:
-    """Rows that are true, or at most `reach` from one that is."""
+    """Rows, (n,), that are true, or at most `reach` samples from one that is."""
     return np.asarray(maximum_filter1d(rows, 2 * reach + 1, mode="constant"))
 
 
@@ -305,7 +305,10 @@ def block_mean(values: Floats, bounds: tuple[tuple[int, int], ...], factor: int)
 
 
 def averaged(values: Floats, bounds: tuple[tuple[int, int], ...], kernel: Floats) -> Floats:
-    """Put signals through a moving average inside each recording; ends keep their last value."""
+    """Put signals, (n,) or (n, k), through a moving average, (w,), inside each recording.
+
+    Beyond its ends, half-open `bounds`, each keeps its first and last value.
+    """
     smooth = np.empty_like(values)
     for start, stop in bounds:
         smooth[start:stop] = convolve1d(values[start:stop], kernel, axis=0, mode="nearest")

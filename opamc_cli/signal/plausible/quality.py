@@ -97,7 +97,7 @@ def held_for(x: NDArray[np.floating]) -> int | None:
 
 
 def is_constant(x: NDArray[np.floating]) -> bool:
-    """Whether all known samples of a channel are equal (true if there are none)."""
+    """Whether all known samples of a channel, (n,), are equal (true if there are none)."""
     known = x[np.isfinite(x)]
     return not known.size or bool(known.min() == known.max())
 
@@ -236,7 +236,7 @@ def spikes(values: NDArray[np.floating], limit: Limit) -> NDArray[np.intp]:
 
 
 def strided_speed(position_rad: FloatArray, fs_hz: float) -> FloatArray:
-    """Return the mean speeds of a position over `STRIDE_S`, whole turns' jumps left out, rad/s."""
+    """Return mean speeds, rad/s, of a position, (n,), over `STRIDE_S`, turns' jumps left out."""
     steps = np.diff(position_rad)
     turns = np.round(steps / (2 * np.pi))
     wrapped = (np.abs(turns) == 1) & (np.abs(np.abs(steps) - 2 * np.pi) < WRAPPED)

@@ -66,7 +66,10 @@ def parts(position_rad: Floats, fs_hz: float) -> tuple[Floats, Floats, Floats]:
 
 
 def averaged(current: Floats, fs_hz: float) -> Floats:
-    """Return a current at the rate of `parts`, as smooth as the speed: else corners are left."""
+    """Return a current, (n,), at the rate of `parts`, (m,), as smooth as the speed.
+
+    Else corners are left.
+    """
     half = max(LEAST_WINDOW, round(WINDOW_S * fs_hz) | 1) // 2
     weights = 1.0 - (np.arange(-half, half + 1) / (half + 1)) ** 2  # Of a parabola's slope.
     current = np.convolve(np.pad(current, half, mode="edge"), weights / weights.sum(), "valid")
@@ -76,7 +79,10 @@ def averaged(current: Floats, fs_hz: float) -> Floats:
 
 
 def left(x: Floats, *regressors: Floats, constant: bool = True) -> float:
-    """Return what is left of a current's mean square, a constant beside the regressors."""
+    """Return what is left of the mean square of a current, (m,), in its unit squared.
+
+    Beside regressors, (m, k) or (m,), and a constant; NaN where fewer than FEWEST_ROWS are known.
+    """
     design = np.column_stack([np.ones(x.size)] * constant + list(regressors))
     known = np.isfinite(x) & np.isfinite(design).all(axis=1)
     if np.count_nonzero(known) < FEWEST_ROWS:
@@ -128,6 +134,13 @@ def follows(
 
 def lags(current: Floats, position_rad: Floats, fs_hz: float) -> list[float] | None:
     """Tell by how much a current's clock differs from that of the motion, at four times.
+
+    Parameters
+    ----------
+    current, position_rad : array, shape (n,)
+        Signed current of a joint, A or Nm, and its angle.
+    fs_hz : float
+        Sampling rate.
 
     Returns
     -------
@@ -191,6 +204,11 @@ def _certain(
 
 def other_scale(current: Floats, position_rad: Floats, fs_hz: float) -> float | None:
     """Tell how many times as large an angle is by the gravity in a current.
+
+    Parameters
+    ----------
+    current, position_rad, fs_hz
+        As of `lags`.
 
     Returns
     -------

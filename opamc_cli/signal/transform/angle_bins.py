@@ -56,7 +56,7 @@ class AngleBins:
 
 
 def vertex(orders: Floats, power: Floats, best: int) -> float:
-    """Place of a peak by the parabola through it and its neighbours."""
+    """Order of a peak, number `best` of a power over even orders, (k,) each, by a parabola."""
     shift = 0.0
     if 0 < best < power.size - 1:
         left, middle, right = power[best - 1 : best + 2]

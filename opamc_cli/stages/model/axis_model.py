@@ -20,7 +20,7 @@ from opamc_cli.joint.motion.track import Joint, Track
 from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.signal.plausible.commanded import apart
 from opamc_cli.stages.model.declared_terms import declared_term
-from opamc_cli.stages.model.loaded_effects import load_user_effects
+from opamc_cli.stages.model.users_effects import load_user_effects
 from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
 from opamc_cli.stages.recordings.mistaken import mistaken
 from opamc_cli.storage.runs.run import Run

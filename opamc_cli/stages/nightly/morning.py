@@ -139,8 +139,34 @@ def tell(
         for one in news
         if one.kind != "fault" or one.time < under.get((one.robot, one.axis), "9999")
     ]
-    failed_now = {(robot, why) for robot, _, why in outcome.failed}
-    lines = list(outcome.absent)
+    of_robots, standing_lines = _of_robots(summary, news, out, cell)
+    lines = [*outcome.absent, *of_robots]
+    told_now = {(event.robot, event.text) for event in news}
+    standing_lines += [
+        f"{robot.name} {event.text}"
+        for robot in summary.robots
+        for event in robot.lately
+        if (robot.name, event.text) not in told_now
+    ]
+    if len(standing_lines) > MOST_STANDING:
+        more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
+        standing_lines[MOST_STANDING:] = [more]
+    lines += _of_events(news, cell)
+    alarms = any(robot.alarms for robot in summary.robots)
+    unwatched = any(robot.unwatched for robot in summary.robots)
+    # nothing stays of these
+    once = any(event.kind in ("lost", "ended", "stray", "unnamed") for event in news)
+    failed = outcome.failed or outcome.unjudged or outcome.absent or outcome.ended
+    doubtful = failed or unwatched or once
+    code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE
+    return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
+
+
+def _of_robots(
+    summary: Summary, news: Sequence[Event], out: Path, cell: Path
+) -> tuple[list[str], list[str]]:
+    """Say of robots that need a look what is new, and what was said before and still stands."""
+    lines: list[str] = []
     standing_lines: list[str] = []
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
@@ -162,23 +188,18 @@ def tell(
             of = robot.failure
             why = f"{of.night} could not be judged: {of.why}" if of else "no recording"
             standing_lines.append(f"{robot.name} {to_copy(why, [robot.name], cell)}")
-    told_now = {(event.robot, event.text) for event in news}
-    standing_lines += [
-        f"{robot.name} {event.text}"
-        for robot in summary.robots
-        for event in robot.lately
-        if (robot.name, event.text) not in told_now
-    ]
-    if len(standing_lines) > MOST_STANDING:
-        more = f"and {len(standing_lines) - MOST_STANDING} more, see {out / files.PAGE}"
-        standing_lines[MOST_STANDING:] = [more]
+    return lines, standing_lines
+
+
+def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
+    """Say what is a line of its own, of all robots of which it is true at once."""
     said: dict[tuple[int, str], list[str]] = {}
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER:
             robots = said.setdefault((OVER[event.kind], event.text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
-    lines += [f"{some(of)} {to_copy(text, of, cell)}" for (_, text), of in said.items()]
+    lines = [f"{some(of)} {to_copy(text, of, cell)}" for (_, text), of in said.items()]
     strays: dict[str, list[str]] = {}
     unnamed: dict[str, str] = {}
     others: dict[str, list[str]] = {}
@@ -193,14 +214,7 @@ def tell(
         lines.append(f"{name} judged anew: {some(sorted(texts), MOST_OTHERS)}")
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     lines += [said_of_unnamed(unnamed)] if unnamed else []
-    alarms = any(robot.alarms for robot in summary.robots)
-    unwatched = any(robot.unwatched for robot in summary.robots)
-    # nothing stays of these
-    once = any(event.kind in ("lost", "ended", "stray", "unnamed") for event in news)
-    failed = failed_now or outcome.unjudged or outcome.absent or outcome.ended
-    doubtful = failed or unwatched or once
-    code = ExitCode.UNHEALTHY if alarms else ExitCode.PARTIAL if doubtful else ExitCode.DONE
-    return Morning(tuple(lines), tuple(standing_lines), _values(summary, outcome), code)
+    return lines
 
 
 def _alarm_lines(

@@ -1,18 +1,18 @@
 """Foreign recordings become runs: read, convert, resample where uneven, write."""
 
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast
 
 import numpy as np
-import pyarrow as pa
 
 from opamc_cli.config.models import digest
 from opamc_cli.errors import InputError, OpamcError, UsageError
-from opamc_cli.signal.plausible.quality import LIMITS, Size, held_for, strided_speed
+from opamc_cli.signal.plausible.quality import held_for
 from opamc_cli.stages.processes.parallel import Outcome, Watch, map_items, unwatched
+from opamc_cli.stages.recordings.written_run import write_recording
 from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.files.parquet import read_schema
 from opamc_cli.storage.ingest.convert import convert
@@ -26,10 +26,8 @@ from opamc_cli.storage.ingest.map.map_file import (
     rate_hz,
 )
 from opamc_cli.storage.ingest.map.units import (
-    ALIASES,
     ISO8601,
     LATEST_S,
-    ONE_UNIT,
     SAMPLES,
     conversion,
     date_s,
@@ -44,14 +42,16 @@ from opamc_cli.storage.ingest.time.resample import resample
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, Seconds, StampAccount, examine
 from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.runs.metadata import METADATA_KEY, RunInfo
-from opamc_cli.storage.runs.run import LARGEST_SAMPLE, Run
-from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES, write_run
+from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import LEAST_HZ, MOST_HZ, quantity_of, same_clock
 
 _TIME = "time"
 
 MAP_VERSION = 2
 """Part of what a run remembers of its map: raised when the same map makes other runs."""
+
+FIRST_DATE = "1970"
+"""A clock that was never set begins there, or later; an earlier date is none of a log."""
 
 
 @dataclass(frozen=True)
@@ -208,7 +208,7 @@ def _ingest(path: Path, task: _Task) -> Ingested:
             source_sha256=sha256,
             map_sha256=map_digest(task.channels),
         )
-        written = _write(path, task.run, channels, info, blocks)
+        written = write_recording(path, task.run, channels, info, blocks)
         remarks = source.remarks
         listed = source.channels()
         labels = {each.name: each.labels for each in listed if each.labels}
@@ -434,143 +434,3 @@ def _number(value: object) -> float | None:
     except ValueError:
         return None
     return number if np.isfinite(number) else None
-
-
-FIRST_DATE = "1970"
-"""A clock that was never set begins there, or later; an earlier date is none of a log."""
-
-NO_UNITS = (
-    "one of them is of the motor's side, or has another unit, scale or sign, or the time's unit is "
-    "wrong"
-)
-"""Of a speed that is its position's rate of change by a factor that no pair of units makes."""
-
-MOST_EMPTY = 0.5
-"""Share of a channel's rows without a value from which on it is lost, not only holed by the gaps
-that are told; a temperature may be logged once a minute."""
-
-
-@dataclass(frozen=True)
-class _Written:
-    """What was written of a recording; see `Ingested`."""
-
-    n_samples: int
-    missing: dict[str, int]
-    doubts: tuple[str, ...]
-    lost: list[str]
-
-
-def _write(
-    path: Path, run: Path, channels: IngestMap, info: RunInfo, blocks: Iterable[Block]
-) -> _Written:
-    names = list(channels.columns)
-    schema = pa.schema([(name, _width(name)) for name in names])
-    missing = dict.fromkeys(names, 0)
-    sizes = {
-        name: Size(LIMITS[key])
-        for name in names
-        if (key := _limited(name, info.current_unit)) is not None
-    }
-    n_samples = 0
-    apart: list[str] = []
-    groups = _row_groups(blocks, schema)
-    with closing(groups), write_run(run, info, schema) as writer:
-        for table in groups:
-            for name in names:
-                values = table.column(name).to_numpy()
-                missing[name] += int(np.isnan(values).sum())
-                if name in sizes:
-                    of_position = quantity_of(name) == "position"
-                    rate = info.sampling_rate_hz
-                    sizes[name].add(strided_speed(values, rate) if of_position else values)
-            if n_samples == 0:  # a minute and more
-                apart = _units_apart(path, channels, info.sampling_rate_hz, table)
-            n_samples += table.num_rows
-            writer.write_table(table)
-        if n_samples == 0:
-            msg = f"{path}: holds no samples; check the map's skip_rows and sources"
-            raise InputError(msg)
-        for name, count in missing.items():
-            if count == n_samples:
-                msg = (
-                    f"{path}: column {name} (source {channels.columns[name].source!r}) has no "
-                    f"value in {n_samples} rows; name another source in the map"
-                )
-                raise InputError(msg)
-        doubts = apart
-        for name, size in sizes.items():
-            source = channels.columns[name].source
-            speed = "the speed of " if quantity_of(name) == "position" else ""
-            doubt = f"{path}: {speed}column {name} (source {source!r}) {size.doubt()}"
-            if size.is_impossible and quantity_of(name) != "temperature":
-                msg = f"{doubt} Correct its unit or scale in the map"
-                raise InputError(msg)
-            doubts += [doubt] if size.doubt() else []
-    lost = [
-        f"{path}: column {name} (source {channels.columns[name].source!r}) has no value in "
-        f"{count / n_samples:.0%} of the rows; look at the logger, or leave the axis out"
-        for name, count in missing.items()
-        if count > MOST_EMPTY * n_samples and quantity_of(name) != "temperature"
-    ]
-    return _Written(n_samples, {name: n for name, n in missing.items() if n}, tuple(doubts), lost)
-
-
-def _units_apart(path: Path, channels: IngestMap, rate_hz: float, table: pa.Table) -> list[str]:
-    """Say which axes' speeds are not their positions', but would be in another unit."""
-    joints = [name.removesuffix("_velocity") for name in table.column_names if "_vel" in name]
-    joints = [joint for joint in joints if f"{joint}_position" in table.column_names]
-    found: dict[str, list[str]] = {}
-    if joints:  # scipy takes as long to load as all else, and most logs have no speed
-        from opamc_cli.signal.motion.reported import unwrapped
-        from opamc_cli.signal.motion.signs import speed_ratio
-        from opamc_cli.stages.recordings.axis_recording import fitting_units
-    for joint in joints:
-        names = [f"{joint}_position", f"{joint}_velocity"]
-        position, velocity = (table.column(name).to_numpy() for name in names)
-        ratio = speed_ratio(unwrapped(position), velocity, rate_hz)
-        declared = [channels.columns[name].unit for name in names]
-        units = [ALIASES.get(unit, unit) for unit in declared]
-        fit = [" and ".join(each.values()) for each in fitting_units(ratio or 1.0, *units)]
-        # what is nearer to 1 a filter or a coarse encoder makes as well
-        if fit or (ratio is not None and not 1 / ONE_UNIT < ratio < ONE_UNIT):
-            agree = f"{', or '.join(fit)} would agree"
-            said = (
-                f"is {ratio:.2g} times the rate of change of its position, in the map's units "
-                f"({' and '.join(declared)}); {agree if fit else NO_UNITS}: correct the map"
-            )
-            found.setdefault(said, []).append(joint.removeprefix("axis"))
-    return [f"{path}: the speed of axis {', '.join(axes)} {said}" for said, axes in found.items()]
-
-
-def _limited(name: str, current_unit: str) -> str | None:
-    """Return which limit a column is held against."""
-    quantity = quantity_of(name)
-    key = current_unit if quantity == "current" else quantity
-    return key if key in LIMITS else None
-
-
-def _width(name: str) -> pa.DataType:
-    # float32 resolves a current to 1e-7 of itself; turns of a joint add up and need more
-    return pa.float64() if quantity_of(name) == "position" else pa.float32()
-
-
-def _row_groups(blocks: Iterable[Block], schema: pa.Schema) -> Generator[pa.Table, None, None]:
-    held: list[pa.Table] = []
-    n_held = 0
-    for block in blocks:
-        columns = [pa.array(_measured(block[field.name], field.type)) for field in schema]
-        held.append(pa.Table.from_arrays(columns, schema=schema))
-        n_held += held[-1].num_rows
-        while n_held >= ROW_GROUP_SAMPLES:
-            table = pa.concat_tables(held)
-            yield table.slice(0, ROW_GROUP_SAMPLES)
-            held = [table.slice(ROW_GROUP_SAMPLES)]
-            n_held -= ROW_GROUP_SAMPLES
-    if n_held:
-        yield pa.concat_tables(held)
-
-
-def _measured(values: Array, width: pa.DataType) -> Array:
-    # what no reader takes for a measurement, an infinity among it
-    known = np.where(np.abs(values) <= LARGEST_SAMPLE, values, np.nan)
-    return np.asarray(known.astype(width.to_pandas_dtype()))

@@ -14,8 +14,8 @@ from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Side, Sides, read_side
 from opamc_cli.stages.chain.witnesses import WITNESSES
 from opamc_cli.stages.verdict import verdict
+from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.stages.verdict.findings import read_findings
-from opamc_cli.stages.verdict.header import header
 from opamc_cli.storage.runs.hashes import file_sha256
 from opamc_cli.storage.schemas import files
 from opamc_cli.storage.sources import other_robot
@@ -64,12 +64,12 @@ def run(baseline: Path, target: Path, config: Config, folder: Path, out: Path) -
     sides = Sides(_whole(baseline), _whole(target), config.score.day_starts_at)
     found = read_findings(folder, (baseline, target))
     scored = score.compare_sides(sides, config, out)
-    decided = verdict.decide(sides, config)
+    decided = decide(sides, config)
     notes = [*scored.notes, *scored.doubts, *decided.notes(), *decided.blind(config.score)]
     if any(axis not in found.causes for axis in decided.differing(config.score)):
         notes.append("no cause was sought, which needs the recordings: `opamc diagnose` does it")
     sources = (*sides.baseline.sources, *sides.target.sources)
-    head = header(sources, notes, out, score.FILES)
+    head = verdict.header(sources, notes, out, score.FILES)
     head["tables"] |= _beside(folder, (baseline, target))
     written = verdict.write(decided, scored, config, out, found, head)
     stranger = other_robot(sides.baseline.sources, sides.target.sources)

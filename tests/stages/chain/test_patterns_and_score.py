@@ -15,6 +15,7 @@ from opamc_cli.stages.chain.compared import discriminants
 from opamc_cli.stages.chain.compared.pattern_rows import group_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.verdict import verdict
+from opamc_cli.stages.verdict.decision import decide
 from opamc_cli.stages.verdict.findings import Findings
 from opamc_cli.storage.sources import read_sources, sources_record
 from opamc_cli.storage.tables import read_table, write_table
@@ -29,7 +30,7 @@ def diagnose(folder, plan, seed=0, config=CONFIG, causes=None, **info):
     sides = Sides(read_side(baseline), read_side(target))
     scored = score.compare_sides(sides, config, folder)
     found = Findings(causes or {})
-    return verdict.write(verdict.decide(sides, config), scored, config, folder, found)
+    return verdict.write(decide(sides, config), scored, config, folder, found)
 
 
 def strings(value):

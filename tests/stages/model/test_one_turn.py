@@ -2,7 +2,7 @@
 
 import pytest
 
-from opamc_cli.stages.model.model import one_turn
+from opamc_cli.stages.model.doubts import one_turn
 
 
 @pytest.mark.parametrize(

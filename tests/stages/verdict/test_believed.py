@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import pytest
 
 from opamc_cli.config.models import ScoreConfig
-from opamc_cli.stages.verdict.verdict import Decided, among_siblings, believed, with_cause
+from opamc_cli.stages.verdict.decision import Decided
+from opamc_cli.stages.verdict.state import among_siblings, believed, with_cause
 
 GREASE = {"effect": "thermal_viscous", "harmless": True, "origin": "environment"}
 PAYLOAD = {"effect": "payload_change", "harmless": True, "origin": "load"}

@@ -11,7 +11,7 @@ from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
 from opamc_cli.stages.nightly.workers.judge import _axis
 from opamc_cli.stages.report.wording import verdict as verdict_words
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.brief import _inspect, _tie, brief, foremost, shaken_by
+from opamc_cli.stages.verdict.wording.brief import _inspect, _tie, brief, foremost, shaken_by
 from opamc_cli.storage.sources import other_conditions
 
 

@@ -16,6 +16,7 @@ from opamc_cli.joint.change.reading import Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
 from opamc_cli.stages import diagnose
 from opamc_cli.stages.verdict import cause
+from opamc_cli.stages.verdict.wording import causes
 from opamc_cli.storage.runs.finding import find_runs
 from opamc_cli.storage.runs.metadata import RunInfo
 from opamc_cli.storage.runs.run import Run
@@ -69,7 +70,7 @@ def test_of_friction_it_is_said_whether_it_has_grown(change, said):
         effect="coulomb", parameters={}, interpretation="meaning", p_value=0.0, ties=(),
         evidence=evidence,
     )  # fmt: skip
-    told = cause._entry(Change((found,), 1.0, False))
+    told = causes.entry(Change((found,), 1.0, False))
     assert told["interpretation"] == said
 
 
@@ -88,7 +89,7 @@ def test_of_forms_of_friction_that_tie_none_is_claimed(effect, ties, said):
         effect=effect, parameters={}, interpretation="meaning", p_value=0.0, ties=ties,
         evidence={"relative_change": 0.5},
     )  # fmt: skip
-    told = cause._entry(Change((found,), 1.0, False))["interpretation"]
+    told = causes.entry(Change((found,), 1.0, False))["interpretation"]
     assert told.startswith(said)
     assert told.endswith("; the joint's friction has grown by 50%")
 
@@ -98,7 +99,7 @@ def test_friction_that_has_fallen_for_no_warmth_sends_nobody_to_the_grease():
         effect="coulomb", parameters={}, interpretation=LESS_FRICTION, p_value=0.0,
         ties=("hysteresis",), evidence={"relative_change": -0.4},
     )  # fmt: skip
-    told = cause._entry(Change((found,), 1.0, False))["interpretation"]
+    told = causes.entry(Change((found,), 1.0, False))["interpretation"]
     assert told == f"{LESS_FRICTION}; the joint's friction has fallen by 40%"
     assert not any(word in told for word in ("grease", "seals"))
 
@@ -284,7 +285,7 @@ def test_noise_beside_friction_is_told_beside_it(tmp_path):
     before, _ = paused(tmp_path / "before", 0.03)
     after, _ = paused(tmp_path / "after", 0.12, friction=2.0)
     found = cause.explain(1, before, after, JointConfig())
-    assert found["effect"] in cause.FRICTION
+    assert found["effect"] in causes.FRICTION
     assert [other["effect"] for other in found["others"]] == ["sensor_noise"]
     assert "fluctuates 4" in found["why"][-1]
 
@@ -318,8 +319,8 @@ def test_hum_that_is_heard_at_standstill_stays_hum():
     hum = Cause(effect="mains_hum", parameters={"frequency_hz": 50.0}, interpretation="hum",
                 p_value=0.0, ties=(), evidence={}, share=0.9, origin="measurement")  # fmt: skip
     for explained, effect in ((0.9, "mains_hum"), (0.3, "sensor_noise")):
-        found = cause._entry(Change((hum,), explained, True))
-        told = cause._with_sensor(cause._of_noise(Growth(times=3.0, share=0.8)), found)
+        found = causes.entry(Change((hum,), explained, True))
+        told = causes.with_sensor(causes.of_noise(Growth(times=3.0, share=0.8)), found)
         assert (told["effect"], told["evidence"]) == (effect, {"times_at_rest": 3.0})
         assert "fluctuates 3 times" in told["why"][-1]
     assert [other["effect"] for other in told["others"]] == ["mains_hum"]

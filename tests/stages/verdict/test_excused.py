@@ -12,8 +12,8 @@ from opamc_cli.decision.judge import judge
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.chain.compared.pattern_rows import PatternRows
 from opamc_cli.stages.verdict.agreement.unjudged import with_reasons
-from opamc_cli.stages.verdict.reasons import is_excused, reasons
 from opamc_cli.stages.verdict.verdict import _warmer_c, exit_code
+from opamc_cli.stages.verdict.wording.reasons import is_excused, reasons
 from tests.decision import known_fleet
 
 SAID = "It differs from its baseline (p 0.001, 3 times as far as a healthy session), but no more"

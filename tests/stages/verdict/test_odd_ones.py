@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from opamc_cli.stages.recordings.sessions import Sessions
-from opamc_cli.stages.verdict.verdict import Decided, in_time
+from opamc_cli.stages.verdict.decision import Decided, in_time
 
 
 def side(**started_at: str | None) -> SimpleNamespace:

@@ -7,8 +7,8 @@ import pytest
 
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import Bundle, judge
-from opamc_cli.stages.verdict.reasons import reasons
-from opamc_cli.stages.verdict.verdict import Decided
+from opamc_cli.stages.verdict.decision import Decided
+from opamc_cli.stages.verdict.wording.reasons import reasons
 from tests.decision import known_fleet
 from tests.decision.fleet import Fleet, cells
 

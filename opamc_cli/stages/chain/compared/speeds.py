@@ -6,6 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import pyarrow as pa
 
+from opamc_cli.decision.significance.median_deviation import MAD_TO_SIGMA
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Strings = npt.NDArray[np.str_]
@@ -56,7 +58,7 @@ def odd_speeds(motions: pa.Table, baseline: pa.Table, tolerance: float) -> dict[
     """
     usual = _usual(baseline, tolerance)
     known = [middle for middle, _, _ in _middles(baseline, usual).values()]
-    scatter = 1.4826 * float(np.median(np.abs(np.array(known) - 1))) if known else 0.0
+    scatter = MAD_TO_SIGMA * float(np.median(np.abs(np.array(known) - 1))) if known else 0.0
     found = {}
     for run, (middle, sample, open_) in _middles(motions, usual).items():
         if len(known) >= FEWEST_RUNS:

@@ -22,7 +22,7 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramResult,
 )
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside
+from opamc_cli.stages.verdict.wording.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
 from opamc_cli.storage.history.rows import EXCUSED
 from opamc_cli.storage.logs import fetch

@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.stages.report.wording.numbers import effect_phrase
-from opamc_cli.stages.verdict.brief import by_far
-from opamc_cli.stages.verdict.reasons import (
+from opamc_cli.stages.verdict.wording.brief import by_far
+from opamc_cli.stages.verdict.wording.reasons import (
     CHECK_FIRST,
     FOUND,
     INSPECT,

@@ -7,8 +7,8 @@ from typing import Any
 from opamc_cli.config.models import ScoreConfig
 from opamc_cli.decision.judge import FAR
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.stages.verdict.brief import shaken_by
-from opamc_cli.stages.verdict.reasons import excuses_little, lies_outside, logged
+from opamc_cli.stages.verdict.wording.brief import shaken_by
+from opamc_cli.stages.verdict.wording.reasons import excuses_little, lies_outside, logged
 from opamc_cli.storage.schemas.channels import axes_phrase
 
 NEARLY = 3.0

@@ -18,8 +18,8 @@ from opamc_cli.stages.chain.compared.speeds import of_another_speed
 from opamc_cli.stages.chain.cycles.axis import segment_features
 from opamc_cli.stages.verdict.agreement.findings import Finding
 from opamc_cli.stages.verdict.agreement.measured import Measured
-from opamc_cli.stages.verdict.brief import with_shaken
 from opamc_cli.stages.verdict.evidence import session_names
+from opamc_cli.stages.verdict.wording.brief import with_shaken
 
 MUCH_SHORTER = 0.5
 """Of the baseline's shortest recording: what lasts less may hold no whole cycle, and that is said

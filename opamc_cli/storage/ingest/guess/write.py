@@ -3,69 +3,40 @@
 import json
 import re
 from collections.abc import Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from opamc_cli.errors import InputError
-from opamc_cli.signal.plausible.quality import LIMITS, Size
-from opamc_cli.storage.ingest.convert import UNSIGNED, quarters_of
-from opamc_cli.storage.ingest.formats import format_by_ending, known_endings
-from opamc_cli.storage.ingest.guess.channels import Choice, choose, time_channel
-from opamc_cli.storage.ingest.guess.layout import Layout, text_layout
-from opamc_cli.storage.ingest.guess.names import Meant, counts_time, meanings
+from opamc_cli.storage.ingest.formats import format_by_ending
+from opamc_cli.storage.ingest.guess.look import (
+    Look,
+    any_map,
+    key_of,
+    look_at,
+    time_guess,
+    values_of,
+)
+from opamc_cli.storage.ingest.guess.names import Meant
 from opamc_cli.storage.ingest.guess.values import (
     MOST_TURNS,
     Float,
     Guess,
     angle_units,
-    are_phases,
     current_unit,
     rate_from_speed,
-    time_unit,
     turns,
     wraps,
 )
-from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
-from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, date_s, is_torque
+from opamc_cli.storage.ingest.map.units import conversion, date_s, is_torque
 from opamc_cli.storage.ingest.opening import open_source
-from opamc_cli.storage.ingest.source import Array, Name, Rate, Selection, Source
+from opamc_cli.storage.ingest.source import Array, Name
 from opamc_cli.storage.ingest.time.stamps import RATE_WITHIN, Clock, examine
-from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED, Conversion
-
-LOOKED_AT_ROWS = 1 << 16
-"""Rows whose values are looked at: minutes of a robot's log."""
-
-PROGRAMS = ("program", "Program", "program_name", "prog", "Prog", "programm", "Programm")
-"""Names of a column of texts that names the program."""
-
-WARMTH = LIMITS["temperature"]
+from opamc_cli.storage.schemas.channels import CURRENTS, LOGGED
 
 LOOKED_AT_FILES = 20
 """Recordings whose rate is looked at."""
-
-
-@dataclass(frozen=True)
-class _Look:
-    """What was seen in the first recording."""
-
-    path: Path
-    layout: Layout | None
-    choices: dict[str, Choice]
-    time: Meant | None
-    values: dict[Name | tuple[Name, int], Array]
-    unused: list[str]
-    repeated: list[str]
-    """Names that several columns have."""
-    rate: Rate | None
-    """Where the file declares one of all that was chosen."""
-    unsigned: set[Name | tuple[Name, int]]
-    """Keys of `values` that the file has without their sign."""
-    program: str | None = None
-    """Column that names the program."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +61,7 @@ def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     InputError
         If a recording cannot be read, or nothing in it looks like a current.
     """
-    look = _look(paths[0], encoding)
+    look = look_at(paths[0], encoding)
     if not any(kind in look.choices for kind in CURRENTS):
         msg = (
             f"{paths[0]}: no channel looks like a motor current or torque "
@@ -124,84 +95,11 @@ def guess_map(paths: Sequence[Path], encoding: str | None = None) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _look(path: Path, encoding: str | None = None) -> _Look:
-    kind = format_by_ending(path)
-    if kind is None:
-        msg = f"{path}: its ending does not tell the format; known: {known_endings()}"
-        raise InputError(msg)
-    layout = text_layout(path, encoding) if kind == "csv" else None
-    with open_source(path, _any_map(kind, layout)) as source:
-        # a joint's name is safer than its place in a message
-        listed = [c for c in source.channels() if kind != "ros" or c.width is None]
-        meant = meanings(listed, counted=kind != "ros")
-        if layout is not None and not layout.header:
-            meant = _numbered_phases(source, [c.name for c in listed if isinstance(c.name, int)])
-        choices = choose(meant)
-        rows = {each.name: each.rows for each in listed}
-        for kind in (kind for kind in CURRENTS if kind in choices and choices[kind].by_axis):
-            n = rows[next(iter(choices[kind].by_axis.values())).source]
-            # what was logged at another rate is no channel of this run
-            meant = [each for each in meant if rows[each.source] == n]
-            choices = choose(meant)
-            break
-        time = time_channel(meant)
-        program = _program(source)
-        chosen = [channel for choice in choices.values() for channel in choice.by_axis.values()]
-        values = {_key(c): _values(source, c) for c in [*chosen, *([time] if time else [])]}
-    if time and counts_time(time.pattern) and _time_guess(time, values[_key(time)]) is None:
-        time = None
-    logged = choices.get("temperature", Choice("temperature", {}, ()))
-    odd = {n: one for n, one in logged.by_axis.items() if _is_of_no_joint(values[_key(one)], one)}
-    for axis in odd:
-        del logged.by_axis[axis]
-    signed = [
-        _key(channel)
-        for kind, choice in choices.items()
-        if kind in (*CURRENTS, "velocity")
-        for channel in choice.by_axis.values()
-    ]
-    unsigned = {key for key in signed if quarters_of(values[key]) == UNSIGNED}
-    for key in unsigned:
-        values[key] = np.where(values[key] < 1 << 15, values[key], values[key] - (1 << 16))
-    taken = [*chosen, *([time] if time else [])]
-    used, patterns = {each.source for each in taken}, {each.pattern for each in taken}
-    why = f"{WARMTH.beyond}: {WARMTH.looks_like}?"
-    unused = [f"{each.source} ({why})" for each in odd.values()]
-    for name in (each.name for each in listed if each.name not in used):
-        if isinstance(name, int):
-            continue
-        pattern = re.sub(r"[0-9]+(?=[^0-9]*$)", "#", name)
-        # one of a family that is used is named itself
-        unused.append(name if pattern in patterns else pattern)
-    unused = list(dict.fromkeys(unused))
-    # of nested groups the deeper ones are many, and seldom signals
-    rest = [name for name in unused if "/" not in name[1:]] or unused
-    repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
-    rates = [each.rate for each in listed if each.name in used]
-    rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None
-    return _Look(path, layout, choices, time, values, rest, repeated, rate, unsigned, program)
-
-
-def _program(source: Source) -> str | None:
-    for name in PROGRAMS:
-        with suppress(InputError):
-            if isinstance(source.value(name), str):
-                return name
-    return None
-
-
-def _program_line(look: _Look) -> str:
+def _program_line(look: Look) -> str:
     if look.program is None:
         return "  program:  # such as pick; runs of different programs are not compared"
     why = "its first row's; runs of different programs are not compared"
     return f"  program: {{source: {_quoted(look.program)}}}  # {why}"
-
-
-def _is_of_no_joint(values: Array, channel: Meant) -> bool:
-    """Return whether a temperature would be left out."""
-    unit, size = conversion(channel.unit or "degC", "temperature") or Conversion(1.0), Size(WARMTH)
-    size.add(unit.factor * channel.scale * values + unit.offset)
-    return size.is_impossible
 
 
 def _differ_by_axis(paths: Sequence[Path]) -> bool:
@@ -211,44 +109,7 @@ def _differ_by_axis(paths: Sequence[Path]) -> bool:
     return len({path.stem for path in paths}) > 1 and len(kinds) == 1
 
 
-def _any_map(kind: str, layout: Layout | None) -> IngestMap:
-    column = ColumnMap(source=0 if kind == "csv" else "", unit="A")
-    given: dict[str, Any] = {"format": kind, "columns": {"axis1_a": column}}
-    if layout is not None:
-        given |= vars(layout)
-    return IngestMap(**given)
-
-
-def _numbered_phases(source: Source, numbers: Sequence[Name]) -> list[Meant]:
-    """Take three columns without names for the phases of one motor, if they behave so."""
-    if len(numbers) != 3:
-        return []
-    a, b, c = (_values(source, Meant("a", None, "", n, None, True, None)) for n in numbers)
-    if not are_phases(a, b, c):
-        return []
-    return [
-        Meant(phase, 1, f"column {n}", n, None, True, None)
-        for phase, n in zip("abc", numbers, strict=True)
-    ]
-
-
-def _values(source: Source, channel: Meant) -> Array:
-    dates = channel.quantity == "time" and channel.unit is None
-    selection = Selection(channel.source, channel.index)
-    if dates:
-        listed = {each.name: each.dates for each in source.channels()}
-        selection = Selection(channel.source, channel.index, listed.get(channel.source, False))
-    rows: list[Array] = []
-    n = 0
-    for block in source.blocks({"x": selection}):
-        rows.append(block["x"])
-        n += len(block["x"])
-        if n >= LOOKED_AT_ROWS:
-            break
-    return np.concatenate(rows)[:LOOKED_AT_ROWS] if rows else np.empty(0)
-
-
-def _layout_lines(look: _Look) -> list[str]:
+def _layout_lines(look: Look) -> list[str]:
     lines = [f"format: {format_by_ending(look.path)}"]
     layout = look.layout
     if layout is None:
@@ -265,11 +126,11 @@ def _layout_lines(look: _Look) -> list[str]:
     return lines
 
 
-def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list[str]]:
+def _clock_lines(look: Look, paths: Sequence[Path]) -> tuple[Clock | None, list[str]]:
     """Return the first recording's clock, None where its rate is not known, and its lines."""
     time = look.time
     stamps = look.values.get(time.source) if time is not None else None
-    unit = _time_guess(time, stamps)
+    unit = time_guess(time, stamps)
     if time is None and (declared := look.rate) is not None:
         where = f"{{source: {_quoted(declared.source)}, unit: {declared.unit}}}"
         line = f"sampling_rate_hz: {where}  # {declared.hz:.6g} Hz in {look.path.name}"
@@ -311,19 +172,9 @@ def _clock_lines(look: _Look, paths: Sequence[Path]) -> tuple[Clock | None, list
     return first, lines
 
 
-def _counted(look: _Look, source: Name, rate_hz: float) -> Clock:
+def _counted(look: Look, source: Name, rate_hz: float) -> Clock:
     count = max(map(len, look.values.values()))
     return examine(look.path, source, np.arange(count) / rate_hz, rate_hz, 2.5)
-
-
-def _time_guess(time: Meant | None, stamps: Array | None) -> Guess | None:
-    if time is None or stamps is None or len(stamps) < 3:
-        return None
-    if stamps.dtype.kind == "M":
-        return Guess("iso8601", "dates")
-    if time.unit in CONVERSIONS["time"]:
-        return Guess(str(time.unit), "as the file says")
-    return time_unit(stamps)
 
 
 def _examined(path: Path, source: Name, stamps: Array, unit: str) -> Clock:
@@ -335,14 +186,14 @@ def _examined(path: Path, source: Name, stamps: Array, unit: str) -> Clock:
     return examine(path, source, seconds, None, 2.5)
 
 
-def _clock_of(path: Path, look: _Look, time: Meant, unit: str) -> Clock:
-    with open_source(path, _any_map(str(format_by_ending(path)), look.layout)) as source:
-        return _examined(path, time.source, _values(source, time), unit)
+def _clock_of(path: Path, look: Look, time: Meant, unit: str) -> Clock:
+    with open_source(path, any_map(str(format_by_ending(path)), look.layout)) as source:
+        return _examined(path, time.source, values_of(source, time), unit)
 
 
-def _angles(look: _Look) -> tuple[dict[int, Float], dict[int, Float]]:
+def _angles(look: Look) -> tuple[dict[int, Float], dict[int, Float]]:
     positions, speeds = (
-        {axis: look.values[_key(channel)] for axis, channel in look.choices[kind].by_axis.items()}
+        {axis: look.values[key_of(channel)] for axis, channel in look.choices[kind].by_axis.items()}
         if kind in look.choices
         else {}
         for kind in ("position", "velocity")
@@ -350,7 +201,7 @@ def _angles(look: _Look) -> tuple[dict[int, Float], dict[int, Float]]:
     return positions, speeds
 
 
-def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
+def _column_lines(look: Look, rate_hz: float | None) -> list[_Line]:
     positions, speeds = _angles(look)
     position, speed = angle_units(positions, speeds, rate_hz)
     every = {axis for choice in look.choices.values() for axis in choice.by_axis}
@@ -360,7 +211,7 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
         if not channels:
             continue
         largest = max(
-            float(np.nanmax(np.abs(look.values[_key(channel)]), initial=0.0))
+            float(np.nanmax(np.abs(look.values[key_of(channel)]), initial=0.0))
             for channel in channels.values()
         )
         declared, scale = next((one.unit, one.scale) for one in channels.values())
@@ -392,7 +243,7 @@ def _column_lines(look: _Look, rate_hz: float | None) -> list[_Line]:
             why += f"; not {', '.join(choice.passed_over[:3])}"
         scaled = {axis: scale * values for axis, values in positions.items()}
         extra = ", unwrap: true" if kind == "position" and wraps(scaled, guess.unit) else ""
-        if not look.unsigned.isdisjoint(map(_key, channels.values())):
+        if not look.unsigned.isdisjoint(map(key_of, channels.values())):
             extra, why = ", unwrap: 65536", f"{why}; negative numbers are 65536 too large"
         extra += f", scale: {scale:g}" if scale != 1.0 else ""
         # A line for all axes asks for as many of every kind.
@@ -439,10 +290,6 @@ def _lines_of(
     return lines
 
 
-def _key(channel: Meant) -> Name | tuple[Name, int]:
-    return channel.source if channel.index is None else (channel.source, channel.index)
-
-
 def _quoted(name: Name) -> str:
     """Return a name as YAML takes it within braces."""
     text = str(name)
@@ -456,12 +303,12 @@ def _shortened(names: Sequence[str]) -> str:
     return f"{shown} and {len(names) - 10} more" if len(names) > 10 else shown
 
 
-def _started_at(look: _Look) -> list[str]:
+def _started_at(look: Look) -> list[str]:
     kind = format_by_ending(look.path)
     own = {"ros": "@started_at", "mdf": "@start_time"}.get(str(kind))
     stamps = look.values.get(look.time.source) if look.time else None
     if own is None and look.time is not None and stamps is not None and len(stamps):
-        unit = _time_guess(look.time, stamps)
+        unit = time_guess(look.time, stamps)
         is_date = stamps.dtype.kind == "M"
         if is_date or (unit is not None and date_s(float(stamps[0]), unit.unit) is not None):
             own = str(look.time.source)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from opamc_cli.decision.judge import Bundle, Policy, judge, one_of_many
-from opamc_cli.decision.odd_session import _odd_one, judge_without_odd, odd_sessions
+from opamc_cli.decision.sessions.odd_session import _odd_one, judge_without_odd, odd_sessions
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, spectra
 

@@ -9,7 +9,7 @@ from opamc_cli.decision.witnesses.amplitudes import AmplitudeEvidence, clearest_
 from opamc_cli.decision.witnesses.patterns import effect_by_cell
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, clearest_course
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence, clearest_change, typical_ratio
-from opamc_cli.stages.verdict.reasons import (
+from opamc_cli.stages.verdict.wording.reasons import (
     COMMON,
     CURRENT_LAG,
     IN_SPIKES,

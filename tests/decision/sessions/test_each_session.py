@@ -6,8 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from opamc_cli.decision.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.judge import Bundle, judge
+from opamc_cli.decision.sessions.each_session import LoneSession, apart, each_session
 from opamc_cli.decision.witnesses.spectra import SpectrumEvidence
 from tests.decision.fleet import Fleet, cells, spectra
 

@@ -1,0 +1,164 @@
+"""What a cause makes of a joint's state: changed, at fault, or no cause at all."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from opamc_cli.config.models import ScoreConfig
+from opamc_cli.decision.judge import Judgement
+from opamc_cli.joint.change.search import SCALE
+from opamc_cli.joint.effects.library import built_in_library
+from opamc_cli.stages.verdict.wording.causes import meaning
+from opamc_cli.stages.verdict.wording.reasons import OF_SENSORS, is_small, logged
+
+MAIN_SHARE = 0.5
+"""Share of the change from which causes decide between changed and fault."""
+
+MUCH_FRICTION = 0.2
+"""By which a joint's friction has grown that matters however little of its current it is, as that
+of a load that is moved fast. Brakes that dragged by 26 and 21 % were "too small" (25.6 and 20.3 %
+were found); friction or scale of the five other such joints with a cause had grown by 16 % at most,
+and none of a healthy robot was asked."""
+
+AS_SURE = 2.0
+"""Grease is no excuse where the logarithm of the spectrum's p is more than so many times that of
+course and size: 15 degrees that those knew by 1e-10 left an arm's spectra at 0.1 or above, a
+cracked flexspline beside 8 degrees took one to 1e-110 (docs/decision.md, The cause)."""
+
+STILL = 2.0
+"""Health index, in spreads of a healthy session, below which a joint has not moved. Beside weak
+magnets, a stiff hose and worn grease the others had 1.4 at most; a payload moved one by 3.9."""
+
+MOST_STILL = 2 / 3
+"""Of the other joints: grease that has grown stiffer in one alone is no cold hall's though a joint
+at fault shakes a neighbour. Of 35 joints of strangers' pairs read as grease it moves two, both of
+lost lubricant."""
+
+LONE_SENSOR = 0.5
+"""Of a joint's own logged difference: where half of the others' lie below, it is its alone."""
+
+LONE_SENSOR_TOO = "; check its temperature sensor, too, which alone has moved{}"
+
+ALIKE = {
+    "payload_change": (SCALE.name, "spring"),
+    "thermal_viscous": ("viscous", "sublinear_friction", "quadratic_friction"),
+}
+"""What moves other joints, too, and what looks like it in one of them alone, likeliest first."""
+
+UNLIKELY = {
+    "payload_change": "Another payload is unlikely: all other joints, which carry the same tool, "
+    "are healthy.",
+    "thermal_viscous": "Another temperature is unlikely: most other joints have not moved.",
+}
+
+
+def among_siblings(
+    axis: int,
+    cause: Mapping[str, Any] | None,
+    judgements: Mapping[int, Judgement],
+    warmer_c: Mapping[int, float | None],
+) -> Mapping[str, Any] | None:
+    """Put what looks alike in one joint before what would move others, too, where they are still.
+
+    All joints carry the same tool, though the last one, counted from the base, may be all that
+    lifts it: what looks like a spring there is a hose. Grease of another temperature is that of all
+    joints, and seen in more than a third of the others, unless one joint's sensor alone tells of
+    it; but a joint runs in by itself, and less friction is left to be that.
+
+    Parameters
+    ----------
+    axis, cause
+        The joint, and what was found to have changed in it, if anything.
+    judgements
+        Of all joints, by axis.
+    warmer_c
+        By how much each was warmer than ever in its baseline by the log; None where nothing tells.
+    """
+    others = {other: one for other, one in judgements.items() if other != axis}
+    effect = cause["effect"] if cause else ""
+    least = max(2, (MOST_STILL if effect == "thermal_viscous" else 1) * len(others))
+    if cause is None or effect not in ALIKE or sum(map(_still, others.values())) < least:
+        return cause
+    ties, change = cause["ties"], cause["evidence"].get("relative_change")
+    name = next((one for one in ALIKE[effect] if one in ties), None)
+    sensor = ""
+    if effect == "payload_change":
+        unlikely = name == "spring" or max(others) > axis
+    else:
+        unlikely = (change or 0.0) > 0
+        own = cause["parameters"].get("warmer_c")
+        if own is not None:
+            theirs = [warmer for other in others if (warmer := warmer_c.get(other)) is not None]
+            unlikely &= bool(theirs) and float(np.median(theirs)) / own < LONE_SENSOR
+            sensor = LONE_SENSOR_TOO.format(logged(own))
+    if name is None or not unlikely:
+        return cause
+    known = {SCALE.name: SCALE, **built_in_library()}[name]
+    ties = [effect, *(tie for tie in ties if tie != name)]
+    return {
+        **cause,
+        "effect": name,
+        "domain": known.domain,
+        "parameters": {},
+        "origin": known.origin,
+        "harmless": False,
+        "interpretation": meaning(name, known.meaning, ties, change) + sensor,
+        "ties": ties,
+        "why": [*cause["why"], UNLIKELY[effect]],
+    }
+
+
+def _still(judgement: Judgement) -> bool:
+    return judgement.state == "healthy" and judgement.health_index < STILL
+
+
+def believed(
+    judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
+) -> Mapping[str, Any] | None:
+    """Drop a harmless cause, or a sensor's noise, of what it does not move.
+
+    Noise or hum that is there at rest has no course: where that has changed, the spectrum must know
+    noise far better; a line of the mains is told by its frequency. Grease,
+    payload and offsets act slowly: they do not excuse what the spectrum alone has found. Nor does
+    grease, where it did move the course, what the spectrum shows far more clearly.
+    """
+    noise = cause is not None and not OF_SENSORS.isdisjoint(cause.get("evidence", ()))
+    if cause is None or not (noise or cause.get("harmless")):
+        return cause
+    heard = judgement.witnesses
+    course_p, spectrum_p = heard.get("profile", 0.0), heard.get("spectrum", 1.0)
+    if noise:
+        own = course_p > config.false_alarm_rate or spectrum_p < course_p**AS_SURE
+        return cause if own or cause.get("harmless") else None
+    if course_p > config.false_alarm_rate:
+        return None
+    slow_p = min(course_p, heard.get("amplitude", 1.0))
+    sharp = spectrum_p <= config.false_alarm_rate and spectrum_p < slow_p**AS_SURE
+    return None if sharp and cause.get("origin") == "environment" else cause
+
+
+def with_cause(
+    judgement: Judgement, cause: Mapping[str, Any] | None, config: ScoreConfig
+) -> Judgement:
+    """Call a change of known cause a fault only if that cause harms the joint.
+
+    One too small to act on is `changed` by MUCH_FRICTION of the joint itself: such a cause is found
+    at a level below 1 % beside what healthy sessions' friction differs by.
+    """
+    if cause is None:
+        return judgement
+    small = is_small(judgement, config)
+    if not small and judgement.state not in ("changed", "fault"):
+        return judgement
+    if float(cause.get("explained", cause.get("share", 1.0))) < MAIN_SHARE:
+        return judgement
+    # A fault is named first if there is one.
+    at_fault = cause.get("origin", "joint") == "joint"
+    if small:
+        much = (cause["evidence"].get("relative_change") or 0.0) >= MUCH_FRICTION
+        return replace(judgement, state="changed") if at_fault and much else judgement
+    if cause.get("harmless"):
+        return replace(judgement, state="changed")
+    return replace(judgement, state="fault") if at_fault else judgement
