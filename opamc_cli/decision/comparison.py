@@ -56,7 +56,7 @@ MAD_EFFICIENCY = 0.37
 """Share of the values that a median absolute deviation is worth (Huber, 1981)."""
 
 FAR_OUT = Spread(1.0, BETWEEN_SESSIONS.dof)
-"""Of places by all voices together: one voice may carry them above their median."""
+"""Of places by all voices together above their median: one voice may carry them there."""
 
 LEAST_SCALE = 0.01
 """Distances that agree to a percent agree: none weighs infinitely."""
@@ -255,6 +255,15 @@ class Joint:
         """Whether unusual conditions move a voice by more than its own error allows for."""
         return voice[1] == "orthogonal" and self._evidence[voice[0]].depends_on_conditions
 
+    def far_in(self) -> Spread:
+        """Return the spread of places below their median.
+
+        One voice can carry a soft maximum up, but all of them have to be low for it to be low:
+        it is then their mean, and they hardly depend on each other.
+        """
+        weights = np.array(self.weights(self.voices))
+        return Spread(float(np.linalg.norm(weights) / weights.sum()), math.inf)
+
     def unusual(self) -> float:
         """How much further along the target lies than a healthy session does, as a log ratio."""
         if self._conditions is None:
@@ -313,7 +322,7 @@ class Joint:
         places = self.places(scales, taken_off)
         above = int((places[:-1] >= places[-1]).sum())
         gaps, place = places[:-1] - np.median(places), float(places[-1] - np.median(places))
-        by_rank = spliced_p_value(gaps, place, FAR_OUT, above)
+        by_rank = spliced_p_value(gaps, place, FAR_OUT, above, self.far_in())
         # the first of all is in the lowest step; how deep in it, only the tails know
         half_step = 0.5 / len(places)
         return by_rank if above else min(max(by_rank, half_step), max(tail, 1e-300))

@@ -2,9 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.stats import kstest
 
-from opamc_cli.decision.comparison import compare_sessions
+from opamc_cli.decision.comparison import FAR_OUT, Joint, compare_sessions
 from opamc_cli.decision.significance.multiplicity import harmonic_mean
+from opamc_cli.decision.significance.spread import spliced_p_value
+from opamc_cli.decision.witnesses.evidence import soft_maximum
 from opamc_cli.decision.witnesses.patterns import Cell, PatternEvidence
 from opamc_cli.decision.witnesses.profiles import ProfileEvidence, profile_cell
 from opamc_cli.decision.witnesses.spectra import SpectrumCell, SpectrumEvidence
@@ -143,6 +146,20 @@ def test_the_first_of_all_labellings_is_in_the_lowest_step_and_no_deeper_by_its_
             first += one.p_value <= 1 / 10
             assert one.p_value >= min(0.5 / 10, min(one.witnesses.values()))
     assert first
+
+
+def test_how_far_in_a_healthy_session_lies_is_uniform_below_the_last_rank():
+    own = Joint(joint(0), 6, 1)
+    weights, rng = own.weights(own.voices), np.random.default_rng(0)
+    p = []
+    for draw in range(2000):
+        voices = rng.normal(size=(len(weights), 4 + draw % 6))
+        places = soft_maximum(voices - np.median(voices, axis=1, keepdims=True), weights)
+        places -= np.median(places)
+        p.append(spliced_p_value(places[:-1], places[-1], FAR_OUT, below=own.far_in()))
+    inner = np.array([one for one in p if one > 0.5])
+    assert kstest(2 * inner - 1, "uniform").pvalue > 0.01
+    assert np.mean(inner > 0.95) == pytest.approx(0.1, abs=0.025)
 
 
 def test_two_sessions_of_the_same_few_patterns_are_not_certain_of_a_third():

@@ -153,6 +153,7 @@ def spliced_p_value(
     observed: float,
     spread: Spread,
     n_above: int | None = None,
+    below: Spread | None = None,
 ) -> float:
     """P-value that is a rank where ranks reach and a parametric tail beyond.
 
@@ -166,6 +167,8 @@ def spliced_p_value(
         For the parametric tail.
     n_above : int, optional
         How many reference values are at least as large; counted from `distances` by default.
+    below : Spread, optional
+        For the other side of the mean; the same by default.
 
     Returns
     -------
@@ -181,9 +184,13 @@ def spliced_p_value(
     """
     values = np.sort(np.asarray(distances, dtype=np.float64))[::-1]
     above = int((values >= observed).sum()) if n_above is None else n_above
-    tail = upper_tail(observed, spread)
-    upper = upper_tail(float(values[above]), spread) if above < values.size else 1.0
-    lower = upper_tail(float(values[above - 1]), spread) if above else 0.0
+
+    def beyond(value: float) -> float:
+        return upper_tail(value, spread if value > 0 or below is None else below)
+
+    tail = beyond(observed)
+    upper = beyond(float(values[above])) if above < values.size else 1.0
+    lower = beyond(float(values[above - 1])) if above else 0.0
     width = upper - lower
     share = float(np.clip((tail - lower) / width, 0.0, 1.0)) if width > 0 else 0.5
     return float(np.clip((above + share) / (values.size + 1), 1e-300, 1.0))

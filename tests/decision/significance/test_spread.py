@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.special import digamma
+from scipy.stats import norm
 from scipy.stats import t as student_t
 
 from opamc_cli.decision.significance.spread import (
@@ -106,6 +107,20 @@ def test_a_splice_shares_its_step_as_the_tail_does():
     assert spliced_p_value(reference, 0.5, spread, n_above=0) == pytest.approx(
         min(tails[0.5] / tails[1.5], 1) / 5
     )
+
+
+def test_a_splice_shares_steps_below_the_mean_by_their_own_spread():
+    spread, narrow = Spread(1.0, 3.0), Spread(0.5, np.inf)
+    reference = [-0.4, 0.2, 0.9]
+    tails = {value: norm.sf(value / 0.5) for value in (-0.4, -0.1, -0.6)}
+    share = (tails[-0.6] - tails[-0.4]) / (1 - tails[-0.4])
+    assert spliced_p_value(reference, -0.6, spread, below=narrow) == pytest.approx((3 + share) / 4)
+    upper = student_t.sf(0.2, 3.0)
+    share = (tails[-0.1] - upper) / (tails[-0.4] - upper)
+    assert spliced_p_value(reference, -0.1, spread, below=narrow) == pytest.approx((2 + share) / 4)
+    for far in (0.5, 2.0):
+        both = (spliced_p_value(reference, far, spread, below=one) for one in (narrow, None))
+        assert next(both) == next(both)
 
 
 def test_the_tail_of_influences_is_that_of_their_ratio_of_squares():
