@@ -20,7 +20,7 @@ from opamc_cli.joint.name.chain import (
     released,
     without,
 )
-from opamc_cli.joint.name.form import Curve, curve_of, share_of_form
+from opamc_cli.joint.name.form import share_of_form
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, beam, trials
 from opamc_cli.joint.name.settle import Named, lowering, settled, worth_their_price
 from opamc_cli.joint.name.significance import decoy_gain
@@ -48,8 +48,6 @@ class Step:
     rmse_before_a: float
     rmse_after_a: float
     """With `rmse_before_a`: error of the open data when the steps are added in order."""
-    curve: Curve
-    """Partial residual."""
 
     @property
     def term(self) -> Term:
@@ -239,8 +237,7 @@ def _steps(
     by_term = {id(one.term): one for one in named}
     steps: list[Step] = []
     chain, track = start, final.fit.dataset.fine.track
-    first = len(final.fit.terms) - final.added
-    for place, term in enumerate(final.terms):
+    for term in final.terms:
         following = extended(chain, term)
         known = by_term.get(id(term))
         trial = Trial.of(chain, following) if known is None else known.trial
@@ -253,7 +250,6 @@ def _steps(
                 fit_of_name=shares.get(id(term), 1.0) if known is not None else 0.0,
                 rmse_before_a=chain.fit.rmse(sealed=False),
                 rmse_after_a=following.fit.rmse(sealed=False),
-                curve=curve_of(final.fit, first + place),
             )
         )
         chain = following

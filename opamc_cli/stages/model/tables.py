@@ -1,7 +1,8 @@
 """What the model commands write: tables, loop.json's entries, the extended model."""
 
 import json
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,29 @@ ADVICE = (
     ),
 )
 """Effects that are alike, and what tells them apart."""
+
+POINTS = 40
+"""Of a curve: what a plot of some hundred pixels shows."""
+
+WITHIN = "angle within the period"
+
+
+def _turns(angle_rad: Floats | None) -> Floats | None:
+    return None if angle_rad is None else (angle_rad / (2 * np.pi)) % 1
+
+
+COVARIATES: dict[str, tuple[str, str, bool, Callable[[Track, float], Floats | None]]] = {
+    "velocity": ("speed", "rad/s", True, lambda t, _: np.abs(t.velocity)),
+    "acceleration": ("acceleration", "rad/s²", False, lambda t, _: t.acceleration),
+    "joint-angle": ("joint angle", "rad", True, lambda t, _: t.position_rad),
+    "load": ("load", "A", True, lambda t, _: np.abs(t.load_a)),
+    "temperature": ("temperature", "°C", True, lambda t, _: t.temperature_c),
+    "time": ("time", "s", True, lambda t, _: t.time_s),
+    "motor-angle": (WITHIN, "turns", False, lambda t, k: _turns(k * t.machine_angle_rad)),
+    "electrical": ("electrical angle", "turns", False, lambda t, _: _turns(t.electrical_rad)),
+    "frequency": ("time within the period", "periods", False, lambda t, hz: (hz * t.time_s) % 1),
+}
+"""Of each domain: name, unit, whether friction resists there, and its values, (n,) or None."""
 
 MEANINGS = {
     "unnamed_response": "a current that goes with the acceleration, its answer or its cause; no "
@@ -175,14 +199,55 @@ def separating_experiment(name: str, ties: tuple[str, ...]) -> str | None:
     return "move over more of the travel, at more speeds and accelerations, in both directions"
 
 
-def step_entry(step: Step, others: Sequence[Step], track: Track) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Curve:
+    """A partial residual over its own covariate."""
+
+    covariate: str
+    unit: str
+    """With `covariate`: what it is drawn over."""
+    x: Floats
+    residual_a: Floats
+    named_a: Floats
+    """With `x`, `residual_a`: bins of equally many samples: the covariate's mean, the mean of what
+    the effect and the final residual hold together, and of what the effect holds. Where friction
+    resists, both are taken times the direction; s of shape (k,)."""
+
+
+def curve_of(fit: Fit, place: int) -> Curve:
+    """Draw an effect and the residual over the effect's covariate."""
+    dataset = fit.dataset
+    grid = dataset.sharp
+    term, values = fit.terms[place], fit.coefficients[place]
+    rows = np.flatnonzero(grid.fit)
+    named = grid.spread(dataset.columns(term, fine=True) @ values)[rows]
+    both = named + fit.residual_a[rows]
+    name, unit, resists, values_of = COVARIATES[term.effect.domain]
+    track = grid.track
+    known = values_of(track, next(iter(term.parameters.values()), 0.0))
+    over = track.position_rad if known is None else known
+    side = track.direction if resists or known is None else np.ones(track.size)
+    name, over, side = term.effect.drawn_over(track) or (name, over, side)
+    over, side = over[rows], side[rows]
+    order = np.argsort(over, kind="stable")
+    bins = [piece for piece in np.array_split(order, POINTS) if piece.size]
+    return Curve(
+        name,
+        unit,
+        np.array([over[piece].mean() for piece in bins]),
+        np.array([(side * both)[piece].mean() for piece in bins]),
+        np.array([(side * named)[piece].mean() for piece in bins]),
+    )
+
+
+def step_entry(step: Step, loop: Loop, track: Track) -> dict[str, Any]:
     """One entry of `steps`; ripples whose orders the travel cannot tell apart are tied."""
-    curve = step.curve
+    curve = curve_of(loop.after, [term is step.term for term in loop.after.terms].index(True))
     order = step.term.parameters.get("order")
     ties = list(step.ties)
     if order is not None:
         ties += order_ties(order, track)
-        for other in others:
+        for other in loop.steps:
             near = other.term.parameters.get("order")
             if other is not step and near and abs(near - order) < track.order_resolution:
                 ties.append(f"ripple of order {near:.5g}")
@@ -224,7 +289,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
             "r2": loop.r2_before,
             "as_logged_a": _as_logged(loop.before),
         },
-        "steps": [step_entry(step, loop.steps, laid.dataset.fine.track) for step in loop.steps],
+        "steps": [step_entry(step, loop, laid.dataset.fine.track) for step in loop.steps],
         "after": {
             "rmse_a": loop.rmse_after_a,
             "r2": loop.r2_after,
