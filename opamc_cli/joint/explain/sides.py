@@ -32,20 +32,17 @@ def turned_by(fit: Fit, track: Track) -> Floats | None:
     moments = np.add.reduceat(columns * current[:, None], firsts)
     solving, power = inverse(columns.T @ columns), float(current @ current)
     groups = _alike(grid.track.run_time_s[rows[firsts]], grid.track.period_s)
-    signs = np.ones(firsts.size)
-    first = least = power - _explained(signs @ moments, solving)
+    signs, whole = np.ones(firsts.size), moments.sum(axis=0)
+    first = least = power - float(whole @ solving @ whole)
     for _ in range(MOST_TURNS):
         rest = signs[stroke] * current - columns @ (solving @ (signs @ moments))
-        own = np.bincount(stroke, rest**2)
-        ways = [np.where(some, -signs, signs) for some in groups]
-        left = [power - _explained(way @ moments, solving) for way in ways]
-        falls = [
-            one if one < least - CLEARLY * own[way != signs].sum() else np.inf
-            for one, way in zip(left, ways, strict=True)
-        ]
-        if not np.isfinite(min(falls)):
+        turned = np.where(groups, -signs, signs)
+        left = power - np.sum(turned @ moments @ solving * (turned @ moments), axis=1)
+        falls = least - left - CLEARLY * (groups @ np.bincount(stroke, rest**2))
+        best = int(np.argmax(falls))
+        if falls[best] <= 0:
             break
-        signs, least = ways[int(np.argmin(falls))], min(falls)
+        signs, least = turned[best], float(left[best])
     if least > MUCH * first:
         return None
     widths = [block.shape[1] for block in blocks]
@@ -61,15 +58,9 @@ def _strokes(moving: Bools) -> Ints:
     return np.cumsum(np.diff(moving, prepend=False) & moving)
 
 
-def _explained(moment: Floats, solving: Floats) -> float:
-    return float(moment @ solving @ moment)
-
-
-def _alike(begins_s: Floats, period_s: float) -> list[Bools]:
-    """Each stroke by itself, and with those that begin as long after a cycle's beginning."""
-    alone = list(np.eye(begins_s.size, dtype=bool))
-    if not np.isfinite(period_s):
-        return alone
+def _alike(begins_s: Floats, period_s: float) -> Bools:
+    """Each of s strokes by itself, and with those as long after a cycle's beginning; (g, s)."""
     apart = begins_s[:, None] - begins_s
-    near = np.abs(apart - period_s * np.round(apart / period_s)) < ALIKE_S
-    return alone + list(np.unique(near, axis=0))
+    if np.isfinite(period_s):
+        apart = apart - period_s * np.round(apart / period_s)
+    return np.unique(np.concatenate([np.eye(begins_s.size) > 0, np.abs(apart) < ALIKE_S]), axis=0)
