@@ -167,7 +167,7 @@ def _closed(
     if able and "unnamed" not in without_rules and "alone" not in without_rules:
         alone = _without_names(start, named, unnamed)
         final = alone if alone.score < final.score - LEAST_SHARE else final
-    final = _named_as_well(lowering(final), pool, named)
+    final = lowering(final)
     only_named = extended(start, *(term for term in final.terms if not term.effect.unnamed))
     final, only_named = released(final), released(only_named)
     steps = _steps(start, final, named, shares, seed)
@@ -194,24 +194,6 @@ def _without_names(start: Chain, named: list[Named], unnamed: Pool) -> Chain:
         if not (one.fast or (one.as_smoothing and measuring))
     }
     return worth_their_price(beam(start, replace(unnamed, library=library), width=1))
-
-
-def _named_as_well(final: Chain, pool: Pool, named: list[Named]) -> Chain:
-    """Put a name in the place of a function of its domain that leaves no less for more.
-
-    What one stretch alone shows, an inertia on a single stroke, is certain by no parts' error.
-    """
-    for place in reversed([k for k, term in enumerate(final.terms) if term.effect.unnamed]):
-        parent, domain = without(final, place), final.terms[place].effect.domain
-        for trial in trials(parent, pool):
-            chain, own = trial.chain, trial.term.effect
-            as_well = chain.fit.rmse(sealed=False) <= final.fit.rmse(sealed=False)
-            same = own.domain == domain and not (own.changes_in_time or own.as_smoothing)
-            if same and as_well and chain.price < final.price and chain.plausible_beside(parent):
-                named.append(Named(replace(trial, why_not=None), (), ()))
-                final = chain
-                break
-    return final
 
 
 def _with_true_names(
