@@ -168,11 +168,10 @@ def explain_change(
 def _of_lines(
     periodic: list[Reading], whole: float, fast: float, loaded: bool, library: Library
 ) -> list[Cause]:
-    """Make one cause of the readings of what grew, if that carries enough of the fast change.
+    """Make one cause of the readings of what grew; of a joint `loaded` otherwise more is asked.
 
-    Of two readings of one change the first tells what it is, and neither makes it less. `whole` and
-    `fast` are mean squares, A^2, that have changed in all and beyond slow effects; where the joint
-    is `loaded` otherwise, more is asked of what may be called a fault.
+    The first tells what it is, the others make it no less. `whole` and `fast` are mean squares,
+    A^2, that have changed in all and beyond slow effects.
     """
     named = []
     for one in periodic:

@@ -232,16 +232,13 @@ class Regressors(Protocol):
     @property
     def key(self) -> Hashable:
         """What makes two of them the same."""
-        ...
 
     @property
     def is_constant(self) -> bool:
         """Whether the regressors stay the same whatever the fitted model is."""
-        ...
 
     def columns(self, track: Track) -> Floats:
         """Regressors, shape (n, k)."""
-        ...
 
 
 def comes_back(position_rad: Floats) -> bool:
