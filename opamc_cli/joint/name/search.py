@@ -218,14 +218,8 @@ def _best_with(chain: Chain, forms: Sequence[Term], *others: Chain) -> Chain:
 
 
 def _possible(chain: Chain, pool: Pool, known: set[Signature]) -> list[Trial]:
-    """Return the trials that may be added; if none, those beside what is not physical."""
-    while found := trials(chain, pool, known):
-        possible = [trial for trial in found if trial.why_not is None]
-        refused = {one.term.effect.name for one in found if one.gain >= pool.least_share}
-        if possible or not refused:
-            return possible
-        pool = replace(pool, library={n: e for n, e in pool.library.items() if n not in refused})
-    return []
+    """Return the trials that may be added."""
+    return [trial for trial in trials(chain, pool, known) if trial.why_not is None]
 
 
 def _by_load(chain: Chain, pool: Pool) -> list[list[Term]]:
