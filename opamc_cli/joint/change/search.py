@@ -303,7 +303,22 @@ def _next(
         first = "payload_change"
     if first != SCALE.name and scale >= gains[first]:
         ties += (SCALE.name,)
-    return _named((first, *ties), *sure[first], compared, library, grease)
+    p_value, shift = sure[first]
+    wet = not GREASE.isdisjoint((first, *ties)) and grease.plausible
+    if "thermal_viscous" in library and (wet or grease.warms(shift)):
+        return grease.cause(shift, p_value, (first, *ties))
+    parameters = dict(shift.terms[-1].parameters)
+    meaning = library[first].interpretation(parameters, compared.track)
+    if first == "payload_change":
+        parameters, meaning = {}, "another payload (check the tool, not the gear)"
+    return SlowCause(
+        effect=first,
+        parameters=parameters,
+        interpretation=LESS_FRICTION if shift.falls else meaning,
+        shift=shift,
+        p_value=p_value,
+        ties=ties,
+    )
 
 
 def _likeliest(
@@ -322,30 +337,3 @@ def _likeliest(
             part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
             best[name] = (min(shift.p_value / part, 1.0), shift)
     return best
-
-
-def _named(
-    names: tuple[str, ...],
-    p_value: float,
-    shift: Shift,
-    compared: Compared,
-    library: Library,
-    grease: Grease,
-) -> SlowCause:
-    """Make a cause of the first of some effects, with which the others tie; or of grease."""
-    first, *ties = names
-    wet = not GREASE.isdisjoint(names) and grease.plausible
-    if "thermal_viscous" in library and (wet or grease.warms(shift)):
-        return grease.cause(shift, p_value, names)
-    parameters = dict(shift.terms[-1].parameters)
-    meaning = library[first].interpretation(parameters, compared.track)
-    if first == "payload_change":
-        parameters, meaning = {}, "another payload (check the tool, not the gear)"
-    return SlowCause(
-        effect=first,
-        parameters=parameters,
-        interpretation=LESS_FRICTION if shift.falls else meaning,
-        shift=shift,
-        p_value=p_value,
-        ties=tuple(ties),
-    )

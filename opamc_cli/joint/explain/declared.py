@@ -106,8 +106,7 @@ class Ways:
             return None
         recordings, joint = self._laid
         own = (signs[start:stop] for start, stop in track.bounds)
-        turned = [replace(r, turned=r.sides * one) for r, one in zip(recordings, own, strict=True)]
-        self._laid = turned, joint
+        self._laid = [replace(r, turned=one) for r, one in zip(recordings, own, strict=True)], joint
         self.strokes_turned = int(np.count_nonzero(np.diff(signs, prepend=1.0) < 0))
         return self.best_fit()
 

@@ -13,7 +13,6 @@ CLEARLY = 0.5
 """Of a stroke's own squared error, by which that of all has to fall where it is turned."""
 ALIKE_S = 0.05
 """Within which the same stroke of two cycles begins."""
-MOST_TURNS = 50
 
 
 def turned_by(fit: Fit, track: Track) -> Floats | None:
@@ -34,7 +33,7 @@ def turned_by(fit: Fit, track: Track) -> Floats | None:
     groups = _alike(grid.track.run_time_s[rows[firsts]], grid.track.period_s)
     signs, whole = np.ones(firsts.size), moments.sum(axis=0)
     first = least = power - float(whole @ solving @ whole)
-    for _ in range(MOST_TURNS):
+    for _ in groups:  # each way once at most
         rest = signs[stroke] * current - columns @ (solving @ (signs @ moments))
         turned = np.where(groups, -signs, signs)
         left = power - np.sum(turned @ moments @ solving * (turned @ moments), axis=1)

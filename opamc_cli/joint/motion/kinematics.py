@@ -72,11 +72,6 @@ class Recording:
         logged = (self.current_a, self.phases_a, self.position_rad)
         return next((len(values) for values in logged if values is not None), 0)
 
-    @property
-    def sides(self) -> Floats:
-        """Side of the torque axis beside the one that is found; 1 or -1, (n,)."""
-        return np.ones(self.size) if self.turned is None else self.turned
-
     def cut(self, span: slice) -> "Recording":
         """Return a part of its samples."""
         logged = {name: getattr(self, name) for name in LOGGED}
@@ -293,7 +288,7 @@ def _one(
         current = torque_current(phases, electrical, motion.velocity, motion.position_rad)
         if electrical is phase_angle.angle_rad:
             side = side_of_torque(current, phase_angle, rate)
-            side = side * recording.sides
+            side = side if recording.turned is None else side * recording.turned
             current = side * current
             # The other side is half an electrical turn away.
             electrical = electrical + np.where(side < 0, np.pi, 0.0)

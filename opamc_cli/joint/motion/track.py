@@ -4,7 +4,7 @@ from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from itertools import accumulate, pairwise
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,8 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Laid = dict[Hashable, Floats]
-Terms = tuple["Regressors", ...]
+Terms = tuple[Any, ...]
+"""Fitted terms (`fit.model.Term`), which know tracks, and which tracks need not know."""
 
 
 NOT_AVERAGED = ("direction", "moving", "clear", "group", "open_samples", "blur")
@@ -79,7 +80,7 @@ class Track:
     payload_kg: Floats | None = None
     electrical_rad: Floats | None = None
     """With `temperature_c`, `payload_kg`: where known; (n,) or None."""
-    static_terms: "Terms" = ()
+    static_terms: Terms = ()
     """Fitted terms that neither shift nor ripple."""
     open_samples: Bools | None = None
     """Moving samples that a fit may look at: none that are sealed; bool array of shape (n,) or
@@ -205,7 +206,7 @@ class Track:
             self.__dict__.pop(name, None)
 
     def with_model(
-        self, load_a: Floats, model_a: Floats, static_terms: "Terms", laid: Laid | None = None
+        self, load_a: Floats, model_a: Floats, static_terms: Terms, laid: Laid | None = None
     ) -> "Track":
         """Return the same track with the fitted load and model currents, given at its full rate."""
         full = self.full and self.full.with_model(load_a, model_a, ())
@@ -224,21 +225,6 @@ class Reference:
 
     speed: float
     temperature_c: float | None
-
-
-class Regressors(Protocol):
-    """What has regressors on every track: a fitted term."""
-
-    @property
-    def key(self) -> Hashable:
-        """What makes two of them the same."""
-
-    @property
-    def is_constant(self) -> bool:
-        """Whether the regressors stay the same whatever the fitted model is."""
-
-    def columns(self, track: Track) -> Floats:
-        """Regressors, shape (n, k)."""
 
 
 def comes_back(position_rad: Floats) -> bool:
