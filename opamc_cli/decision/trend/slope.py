@@ -164,7 +164,7 @@ def nights_until(
         Level that is awaited.
     lately : Slope or None
         Of the later half of them: wear quickens, and a straight line through all nights is late
-        (of 41 forecasts of 11 virtual joints 10 were too late and none too early; one with this).
+        (of 41 forecasts of 11 virtual joints 10 were too late and none too early; two with this).
 
     Returns
     -------
