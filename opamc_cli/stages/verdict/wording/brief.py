@@ -17,6 +17,7 @@ from opamc_cli.stages.verdict.wording.reasons import (
     OF_SENSORS,
     SENSOR_NOISE,
     SMALLER_PART,
+    called,
     effect_in_words,
     excuses_little,
     explains_little,
@@ -205,8 +206,8 @@ def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> s
     if name == PATTERNS:
         if not effect > 0:
             return None
-        worst = bundle.cells[int(effect_by_cell(bundle.cells).argmax())]
-        return f"The current's patterns changed by {effect:.0%} in motion {worst.motion} ({by})."
+        motion = bundle.cells[int(effect_by_cell(bundle.cells).argmax())].motion
+        return f"The {called(unit)}'s patterns changed by {effect:.0%} in motion {motion} ({by})."
     witness = bundle.witnesses.get(name)
     if isinstance(witness, SpectrumEvidence):
         band = clearest_change(witness.cells, witness.n_baseline)
@@ -221,7 +222,7 @@ def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> s
         if part is None:
             return None
         return (
-            f"The mean {_called(unit)} is {part.change_a:+.2g} {unit} off in motion {part.motion}, "
+            f"The mean {called(unit)} is {part.change_a:+.2g} {unit} off in motion {part.motion}, "
             f"{part.start:.0%} to {part.stop:.0%}; its size {part.scale:.2f} times ({by})."
         )
     if isinstance(witness, AmplitudeEvidence):
@@ -229,14 +230,10 @@ def _of_witness(name: str, judgement: Judgement, bundle: Bundle, unit: str) -> s
         if size is None:
             return None
         return (
-            f"The {_called(unit)}'s {size.size} is {size.ratio:.2f} times the baseline's in motion "
+            f"The {called(unit)}'s {size.size} is {size.ratio:.2f} times the baseline's in motion "
             f"{size.motion} ({by})."
         )
     return None
-
-
-def _called(unit: str) -> str:
-    return "torque" if unit == "Nm" else "current"
 
 
 def _against(judgement: Judgement, cause: Mapping[str, Any] | None, in_vain: bool) -> str:

@@ -302,6 +302,11 @@ def _by(effect: float) -> str:
     return f" by {effect:.0%} (root mean square)," if effect >= LEAST_SAID else ""
 
 
+def called(unit: str) -> str:
+    """Say what a recording in this unit holds."""
+    return "torque" if unit == "Nm" else "current"
+
+
 def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]:
     witness = bundle.witnesses.get("profile")
     if not isinstance(witness, ProfileEvidence):
@@ -310,8 +315,8 @@ def _course_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[str]
     if change is None or not math.isfinite(judgement.effects["profile"]):
         return []
     return [
-        f"The course of the current changed{_by(judgement.effects['profile'])} most clearly in "
-        f"motion {change.motion}, from {change.start:.0%} to "
+        f"The course of the {called(unit)} changed{_by(judgement.effects['profile'])} most "
+        f"clearly in motion {change.motion}, from {change.start:.0%} to "
         f"{change.stop:.0%} of its way, by {change.change_a:+.3g} {unit}; its size over the "
         f"motion is {change.scale:.3g} times the baseline's."
     ]
@@ -324,9 +329,8 @@ def _amplitude_change(judgement: Judgement, bundle: Bundle, unit: str) -> list[s
     change = clearest_amplitude(witness.cells, witness.n_baseline)
     if change is None or not math.isfinite(judgement.effects["amplitude"]):
         return []
-    what = "torque" if unit == "Nm" else "current"
     return [
-        f"The size of the {what} changed most clearly in motion {change.motion}: its "
+        f"The size of the {called(unit)} changed most clearly in motion {change.motion}: its "
         f"{change.size} is {change.ratio:.3g} times the baseline's."
     ]
 
