@@ -8,11 +8,11 @@ from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track
 from opamc_cli.signal.transform.least_squares import inverse
 
 MUCH = 0.9
-"""Of the squared error: what is turned has to leave less, or nothing is."""
-CLEARLY = 0.5
-"""Of a stroke's own squared error, by which that of all has to fall where it is turned."""
+"""Of the squared error: what is turned has to leave less, or nothing is: by any less a row leaves
+0.146 instead of 0.109 A (656000)."""
 ALIKE_S = 0.05
-"""Within which the same stroke of two cycles begins."""
+"""Within which the same stroke of two cycles begins; if each is turned alone, one row of 17 leaves
+0.147 instead of 0.096 A."""
 
 
 def turned_by(fit: Fit, track: Track) -> Floats | None:
@@ -25,21 +25,17 @@ def turned_by(fit: Fit, track: Track) -> Floats | None:
     rows = np.flatnonzero(grid.fit)
     blocks = [grid.spread(fit.dataset.columns(term, fine=True))[rows] for term in fit.terms]
     columns, current = np.concatenate(blocks, axis=1), grid.track.current_a[rows]
-    _, firsts, stroke = np.unique(
-        _strokes(grid.track.moving)[rows], return_index=True, return_inverse=True
-    )
+    _, firsts = np.unique(_strokes(grid.track.moving)[rows], return_index=True)
     moments = np.add.reduceat(columns * current[:, None], firsts)
     solving, power = inverse(columns.T @ columns), float(current @ current)
     groups = _alike(grid.track.run_time_s[rows[firsts]], grid.track.period_s)
     signs, whole = np.ones(firsts.size), moments.sum(axis=0)
     first = least = power - float(whole @ solving @ whole)
     for _ in groups:  # each way once at most
-        rest = signs[stroke] * current - columns @ (solving @ (signs @ moments))
         turned = np.where(groups, -signs, signs)
         left = power - np.sum(turned @ moments @ solving * (turned @ moments), axis=1)
-        falls = least - left - CLEARLY * (groups @ np.bincount(stroke, rest**2))
-        best = int(np.argmax(falls))
-        if falls[best] <= 0:
+        best = int(np.argmin(left))
+        if left[best] >= least:
             break
         signs, least = turned[best], float(left[best])
     if least > MUCH * first:
