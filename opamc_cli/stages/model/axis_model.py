@@ -137,8 +137,11 @@ def lay(
     named = ", ".join(str(run.path) for run in runs[:3]) + (", ..." if len(runs) > 3 else "")
 
     def on(dataset: Dataset) -> Declared:
-        for effect, _ in declared:
+        told = dataset.fine.track.payload_kg
+        for effect, entry in declared:
             why = None if effect.name == "load_friction" else effect.untestable(dataset.fine.track)
+            if "per_kg" in entry.parameters and (told is None or not np.ptp(told)):
+                why = "its runs do not all tell a payload_kg, and different ones, in their metadata"
             if why is not None:
                 msg = (
                     f"Effect {effect.name!r} is declared, but axis {axis} of {named} cannot show "

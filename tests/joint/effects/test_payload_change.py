@@ -73,3 +73,14 @@ def test_a_step_to_another_told_payload_is_told_by_the_kg(tmp_path):
     axis = closed_on(tmp_path, told=True, payloads=(0.0, 0.0, 0.0, 2.0, 2.0, 2.0))
     (step,) = axis["steps"]
     assert step["parameters"] == {"per_kg": 1.0}
+
+
+@pytest.mark.parametrize("told_kg", [(None, None), (1.0, None), (1.0, 1.0)])
+def test_a_declared_payload_that_the_runs_do_not_tell_is_refused(tmp_path, capsys, told_kg):
+    """It was fitted with regressors of nothing, without a word."""
+    runs = [write_run(tmp_path / f"run{k}.parquet", 1.0, kg, k) for k, kg in enumerate(told_kg)]
+    declared = "{effect: payload_change, parameters: {per_kg: 1}}"
+    (tmp_path / "model.yaml").write_text(DECLARED.replace("]", f", {declared}]"))
+    model = ("--model", tmp_path / "model.yaml", "--out", tmp_path / "out")
+    assert opamc("model", "fit", *runs, *model) == 2
+    assert "do not all tell a payload_kg" in capsys.readouterr().err
