@@ -83,7 +83,8 @@ def history(
             values,
         )
     for row in () if events else rows:
-        row["excused"], row["in_part"], row["reason"] = told_by(row["reason"])
+        told = told_by(row["reason"])
+        row |= {"excused": told.excused, "in_part": told.in_part, "reason": told.text}
     if out is not None:
         _export(out, rows, table)
         output.result({"written": str(out), "rows": len(rows)}, f"{out}: {len(rows)} rows")

@@ -67,6 +67,8 @@ class JointSummary:
     """Of its state, in words."""
     cause: str | None = None
     """What the change looks like."""
+    first: int | None = None
+    """Joint to look at first, if it is another one."""
 
     @property
     def shown(self) -> str:
@@ -165,17 +167,12 @@ class RobotSummary:
     def text_of(self, joint: JointSummary) -> str:
         """Return what is said of a joint's alarm: a joint at fault shakes the others."""
         assert joint.alarm is not None
-        more = [
-            one
-            for one in self.joints
-            if one.alarm
-            and (one.program, one.night) == (joint.program, joint.night)
-            and (one.health_index or 0.0) > (joint.health_index or 0.0)
-        ]
-        if not more:
-            return joint.alarm.text
-        worst = max(more, key=lambda one: one.health_index or 0.0)
-        return f"{joint.alarm.text}; axis {worst.axis} changed more that night, look there first"
+        place = (joint.program, joint.night, joint.first)
+        shaken = any(
+            one.alarm and (one.program, one.night, one.axis) == place for one in self.joints
+        )
+        first = f"; see to axis {joint.first} first, which may shake it"
+        return joint.alarm.text + first * shaken
 
     def shown_of(self, joint: JointSummary) -> str:
         """Return a joint's state, or what became of the last night if that is worse."""
@@ -400,7 +397,7 @@ def _lately(
 
 
 def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
-    excused, in_part, reason = told_by(row["reason"])
+    told = told_by(row["reason"])
     return JointSummary(
         row["axis"],
         row["program"],
@@ -409,15 +406,17 @@ def _joint(row: Mapping[str, Any], alarm: AlarmRow | None) -> JointSummary:
         row["report"] or "",
         row["health_index"],
         alarm,
-        excused,
-        in_part,
-        reason,
+        told.excused,
+        told.in_part,
+        told.text,
         row["cause"],
+        told.first,
     )
 
 
-def _worst_first(joint: JointSummary) -> tuple[int, float]:
-    return SEVERITY.index(joint.state), -(joint.health_index or 0.0)
+def _worst_first(joint: JointSummary) -> tuple[int, bool, float]:
+    behind = joint.first is not None
+    return SEVERITY.index(joint.state), behind, -(joint.health_index or 0.0)
 
 
 def _named(robot: RobotSummary) -> str:

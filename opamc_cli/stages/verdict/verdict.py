@@ -15,6 +15,7 @@ import pyarrow as pa
 from opamc_cli import __version__
 from opamc_cli.config import Config
 from opamc_cli.decision.judge import Bundle
+from opamc_cli.decision.witnesses.changed_size import changed_a
 from opamc_cli.errors import ExitCode
 from opamc_cli.joint.change.search import SMALLEST_WARMTH_C
 from opamc_cli.stages.chain.compared.pattern_rows import Key, PatternRows
@@ -192,6 +193,7 @@ def content(
                     "common": _finite(math.exp(final.common_log_ratio)),
                     "allowed": _finite(math.exp(final.allowed_log_ratio)),
                     "effect": _finite(final.effect),
+                    "changed_a": _finite(changed_a(bundle.witnesses)),
                 },
                 "features": pooled.get(axis, {"delta_mu": None, "delta_var": None, "ks": None}),
                 "motions": motions,

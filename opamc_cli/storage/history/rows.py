@@ -1,9 +1,10 @@
 """What the history holds: one class a table, one object a row."""
 
 import json
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import get_args, get_type_hints
+from typing import NamedTuple, get_args, get_type_hints
 
 import pyarrow as pa
 
@@ -35,6 +36,9 @@ may move it; a column of its own would be another layout of the file."""
 IN_PART = "in part: "
 """What the reason begins with, behind `EXCUSED`, of a joint for which not all of its night's
 recordings could be used: of another joint of the same night they may have been."""
+
+BEHIND = "behind axis {}: "
+"""What the reason begins with, behind these, of a joint beside which another comes first."""
 
 DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
 """Kinds of event that follow from the nights; the others were declared by a user."""
@@ -167,17 +171,36 @@ class AlarmSpan:
     """Name of the baseline whose nights raised it."""
 
 
-def told_by(reason: str) -> tuple[bool, bool, str]:
-    """Return whether a joint is excused, whether it was judged in part, and its reason in words.
+class Told(NamedTuple):
+    """What the reason of a measure says."""
+
+    excused: bool
+    in_part: bool
+    """With `excused`: its marks."""
+    first: int | None
+    """Joint to look at first, if it is another one."""
+    text: str
+    """The reason in words."""
+
+    def as_reason(self) -> str:
+        """Return the reason with its marks."""
+        behind = "" if self.first is None else BEHIND.format(self.first)
+        return f"{EXCUSED * self.excused}{IN_PART * self.in_part}{behind}{self.text}"
+
+
+def told_by(reason: str) -> Told:
+    """Return what a reason's marks say, and the rest.
 
     Examples
     --------
     >>> told_by("excused: in part: It differs.")
-    (True, True, 'It differs.')
+    Told(excused=True, in_part=True, first=None, text='It differs.')
     """
     rest = reason.removeprefix(EXCUSED)
     text = rest.removeprefix(IN_PART)
-    return rest != reason, text != rest, text
+    behind = re.match(BEHIND.format(r"(\d+)"), text)
+    first = None if behind is None else int(behind[1])
+    return Told(rest != reason, text != rest, first, text[behind.end() :] if behind else text)
 
 
 def begun_anew(declared: Iterable[Declared]) -> list[tuple[str, str]]:

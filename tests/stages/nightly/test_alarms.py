@@ -199,20 +199,22 @@ def test_an_acknowledged_alarm_is_raised_once_more_by_nights_at_fault_where_none
     assert alarm(18, known)[0].acknowledged is None
 
 
-def test_of_joints_that_shake_each_other_the_one_that_changed_more_is_named():
+def test_of_joints_that_shake_each_other_the_one_to_see_to_first_is_named():
     alarm = AlarmRow("r1", "", 0, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
     joints = [
-        JointSummary(axis, "", state, night, "", index, alarm)
-        for axis, state, night, index in (
-            (1, "fault", "2026-03-02", 3.0),
-            (2, "fault", "2026-03-02", 5.0),
-            (3, "insufficient-data", "2026-03-02", None),
-            (4, "fault", "2026-03-01", 1.0),
+        JointSummary(axis, "", state, night, "", index, alarm, first=first)
+        for axis, state, night, index, first in (
+            (1, "fault", "2026-03-02", 9.0, 2),
+            (2, "fault", "2026-03-02", 5.0, None),
+            (3, "fault", "2026-03-01", 7.0, 2),
+            (4, "fault", "2026-03-02", 1.0, 5),
         )
     ]
     robot = RobotSummary("r1", tuple(joints), None)
-    first = "at fault; axis 2 changed more that night, look there first"
-    assert [robot.text_of(joint) for joint in joints] == [first, "at fault", first, "at fault"]
+    shaken = "at fault; see to axis 2 first, which may shake it"
+    # of another night nothing is said, nor is a joint named without an alarm
+    assert [robot.text_of(joint) for joint in joints] == [shaken, *["at fault"] * 3]
+    assert [joint.axis for joint in robot.alarms] == [2, 1, 3, 4]
 
 
 def test_since_does_not_move_with_the_nights_after_the_alarm():

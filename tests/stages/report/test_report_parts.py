@@ -85,19 +85,17 @@ def test_numbers_in_few_digits(value: object, text: str) -> None:
     assert number(value) == text
 
 
-def test_the_headline_tells_which_joint_shakes_the_others() -> None:
-    for index, said in ((101.0, " (axis 2 by far the most: look there first)"), (100.0, "")):
-        axes = [(1, "fault", 10.0), (2, "fault", index), (3, "healthy", 0.1)]
-        found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
-        said_of = verdict_words.headline({"axes": found})
-        assert said_of == f"Axes 1 and 2 at fault{said}; axis 3 healthy"
-
-
-def test_one_joint_shakes_the_others_whatever_they_are_called() -> None:
-    axes = [(1, "fault", 3e7), (2, "changed", 700.0), (3, "changed", 3600.0)]
-    found = [{"axis": a, "state": s, "health_index": i} for a, s, i in axes]
+def test_the_headline_tells_which_joint_to_look_at_first() -> None:
+    axes = [(1, "fault", 10.0, 0.1), (2, "fault", 20.0, 0.2), (3, "changed", 90.0, 0.01)]
+    found = [
+        {"axis": a, "state": s, "health_index": i, "distance": {"changed_a": c}}
+        for a, s, i, c in axes
+    ]
     said = verdict_words.headline({"axes": found})
-    assert said == "Axis 1 at fault (by far the most: look there first); axes 2 and 3 changed"
+    assert said == "Axes 1 and 2 at fault (axis 2: look there first); axis 3 changed"
+    said = verdict_words.headline({"axes": found[1:]})
+    assert said == "Axis 2 at fault (look there first); axis 3 changed"
+    assert verdict_words.headline({"axes": found[2:]}) == "Axis 3 changed"
 
 
 def test_since_when_is_answered_where_no_segment_tells_it():
@@ -107,10 +105,8 @@ def test_since_when_is_answered_where_no_segment_tells_it():
 def test_the_headline_tells_the_worst_first() -> None:
     states = {1: "healthy", 2: "changed", 3: "fault", 4: "healthy", 5: "fault"}
     verdict = {"axes": [{"axis": axis, "state": state} for axis, state in states.items()]}
-    assert (
-        verdict_words.headline(verdict)
-        == "Axes 3 and 5 at fault; axis 2 changed; the other 2 axes healthy"
-    )
+    said = "Axes 3 and 5 at fault (axis 5: look there first); axis 2 changed; the other 2 axes "
+    assert verdict_words.headline(verdict) == said + "healthy"
     assert verdict_words.headline({"axes": []}) == "No axis was judged"
 
 

@@ -413,13 +413,13 @@ def test_the_joint_to_look_at_first_comes_first() -> None:
     known = {"inspect": "Look.", "evidence": [], "against": "little"}
     pair = [
         axis(number, "fault", p_adjusted=1e-9, distance={"ratio": 4.0}, brief=known, health_index=i)
-        for number, i in ((1, 9.0), (2, 900.0))
+        for number, i in ((1, 9.0), (2, 901.0))
     ]
     titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
     assert [title[:6] for title in titles] == ["Axis 2", "Axis 1"]
-    # not the farthest, if not by far: what shakes it is explained
-    pair[1]["health_index"] = 80.0
-    pair[0]["cause"] = {"effect": "ripple", "origin": "joint", "explained": 0.6}
+    # not the farthest, if not by far: the other's current has changed more
+    pair[1]["health_index"] = 800.0
+    pair[0]["distance"] = {"ratio": 4.0, "changed_a": 0.1}
     titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
     assert [title[:6] for title in titles] == ["Axis 1", "Axis 2"]
 

@@ -84,7 +84,7 @@ def _coming_back(
 
 def do_first(row: Mapping[str, Any]) -> str:
     """Tell what is to be done first about a joint at fault, or changed; nothing of any other."""
-    what = told_by(row["reason"])[2] if row["state"] in ("fault", "changed") else ""
+    what = told_by(row["reason"]).text if row["state"] in ("fault", "changed") else ""
     return f"; do first: {what.rstrip('.')}" if what else ""
 
 
@@ -125,7 +125,7 @@ def outside(rows: Sequence[Mapping[str, Any]], remind_after: int) -> Iterator[Ev
     nights, causes = ([row[of] for row in found] for of in ("night", "cause"))
     again = REBASELINE.replace("DATE", nights[0]) if nights else ""
     for index in said_in(nights, causes, remind_after):
-        said = {row["cause"]: told_by(row["reason"])[2] for row in found}
+        said = {row["cause"]: told_by(row["reason"]).text for row in found}
         text = (
             f"changed in {span(nights)} by what lies outside the joint: {' '.join(said.values())} "
             f"A fault that looks alike would not be told; if it is meant to stay: {again}"

@@ -16,8 +16,6 @@ from opamc_cli.stages.nightly.workers.workers import Broken
 from opamc_cli.storage.files.folders import remove_folder, replace_folder
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import (
-    EXCUSED,
-    IN_PART,
     Event,
     MeasureRow,
     NightRow,
@@ -173,7 +171,6 @@ def _verdict(
 
 def _measure(night: PlannedNight, program: ProgramJob, axis: AxisResult, whole: bool) -> MeasureRow:
     in_part = (whole or axis.in_part) and axis.state != "insufficient-data"
-    excused, _, text = told_by(axis.reason)
     return MeasureRow(
         robot=night.robot,
         program=program.program,
@@ -184,7 +181,7 @@ def _measure(night: PlannedNight, program: ProgramJob, axis: AxisResult, whole: 
         common=axis.log_common,
         effect=axis.effect,
         harmless=int(axis.harmless),
-        reason=EXCUSED * excused + IN_PART * in_part + text,
+        reason=told_by(axis.reason)._replace(in_part=in_part).as_reason(),
     )
 
 

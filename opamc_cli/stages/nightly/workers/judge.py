@@ -22,9 +22,10 @@ from opamc_cli.stages.nightly.workers.night import (
     ProgramResult,
 )
 from opamc_cli.stages.processes.kept import KeptResults
+from opamc_cli.stages.verdict.wording.brief import foremost
 from opamc_cli.stages.verdict.wording.reasons import excuses_little, lies_outside
 from opamc_cli.storage.files.atomic import scratch
-from opamc_cli.storage.history.rows import EXCUSED
+from opamc_cli.storage.history.rows import Told
 from opamc_cli.storage.logs import fetch
 from opamc_cli.storage.runs.hashes import know_sha256
 from opamc_cli.storage.schemas import files
@@ -118,8 +119,9 @@ def _program(job: NightJob, wanted: ProgramJob, folder: Path) -> ProgramResult:
             f"{axes_phrase(lacking)} of program {wanted.program!r} cannot be judged: recorded "
             f"were {axes_phrase(there)} (robots.{job.robot}.axes)"
         )
+    first = (foremost(outcome.verdict["axes"]) or {}).get("axis")
     axes = tuple(
-        _axis(entry, temperatures.get(entry["axis"]), outcome.in_part)
+        _axis(entry, temperatures.get(entry["axis"]), outcome.in_part, first)
         for entry in outcome.verdict["axes"]
         if job.axes is None or entry["axis"] in job.axes
     )
@@ -162,13 +164,17 @@ def _temperatures(patterns: Path) -> dict[int, float]:
 
 
 def _axis(
-    entry: Mapping[str, Any], temperature_c: float | None, in_part: Collection[int] = ()
+    entry: Mapping[str, Any],
+    temperature_c: float | None,
+    in_part: Collection[int] = (),
+    first: int | None = None,
 ) -> AxisResult:
     cause = entry.get("cause") or {}
     if cause and lies_outside(cause) and excuses_little(cause):
         cause = {}  # beside it stands what nobody should look away from
     distance = entry.get("distance") or {}
-    first = (entry.get("brief") or {}).get("inspect") or [*entry.get("reasons", ()), ""][0]
+    text = (entry.get("brief") or {}).get("inspect") or [*entry.get("reasons", ()), ""][0]
+    behind = entry["state"] in ("changed", "fault") and first != entry["axis"]
     return AxisResult(
         axis=int(entry["axis"]),
         state=str(entry["state"]),
@@ -180,7 +186,9 @@ def _axis(
         log_common=_log(distance.get("allowed")),
         effect=distance.get("effect"),
         temperature_c=temperature_c,
-        reason=EXCUSED * bool(entry.get("excused")) + str(first),
+        reason=Told(
+            bool(entry.get("excused")), False, first if behind else None, str(text)
+        ).as_reason(),
         in_part=entry["axis"] in in_part,
     )
 

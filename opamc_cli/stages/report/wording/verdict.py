@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from opamc_cli.stages.report.wording.numbers import effect_phrase
-from opamc_cli.stages.verdict.wording.brief import by_far
+from opamc_cli.stages.verdict.wording.brief import foremost
 from opamc_cli.stages.verdict.wording.reasons import (
     CHECK_FIRST,
     FOUND,
@@ -55,11 +55,12 @@ def headline(verdict: Mapping[str, Any]) -> str:
         "healthy": "healthy",
     }
     parts = [f"{axes_phrase(axes)} {phrases[state]}" for state, axes in states.items()]
-    most = (by_far(verdict.get("axes", ())) or {}).get("axis")
+    first = (foremost(verdict.get("axes", ())) or {}).get("axis")
+    several = len([*states.get("fault", ()), *states.get("changed", ())]) > 1
     for place, axes in enumerate(states.values()):
-        if most in axes:
-            named = f"axis {most} " if len(axes) > 1 else ""
-            parts[place] += f" ({named}by far the most: look there first)"
+        if several and first in axes:
+            named = f"axis {first}: " if len(axes) > 1 else ""
+            parts[place] += f" ({named}look there first)"
     if not parts:
         return "No axis was judged"
     if len(healthy) > 1 and len(parts) > 1:
