@@ -180,8 +180,7 @@ def _of_robots(
             before = [one for one in joints if one not in new]
             lines += [f"{robot.name} axis {first.axis}: alarm{_also(robot, one)}" for one in new]
             standing_lines += [
-                f"{_place(robot, one)}: alarm since {one.since}, {robot.text_of(one)}"
-                for one in before
+                f"{_place(robot, one)}: alarm since {one.since}, {one.text}" for one in before
             ]
         said_now = any(e.robot == robot.name and e.kind in ("failed", "missing") for e in news)
         if robot.broken and not said_now:
@@ -229,7 +228,7 @@ def _alarm_lines(
     alarm = joint.alarm
     assert alarm is not None
     yield f"{_place(robot, joint)}: {how}, not as it was since {alarm.since}"
-    yield f"  {robot.text_of(joint)}"
+    yield f"  {joint.text}"
     yield from (f" {_also(robot, one)}" for one in others)
     where = out / joint.report if joint.report else out / files.PAGE
     silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
@@ -238,7 +237,7 @@ def _alarm_lines(
 
 
 def _also(robot: RobotSummary, joint: JointSummary) -> str:
-    return f" also in program {joint.program}, since {joint.since}: {robot.text_of(joint)}"
+    return f" also in program {joint.program}, since {joint.since}: {joint.text}"
 
 
 def _place(robot: RobotSummary, joint: JointSummary) -> str:
@@ -269,7 +268,7 @@ def _values(summary: Summary, outcome: CellOutcome) -> dict[str, Any]:
                     "axis": joint.axis,
                     "program": joint.program,
                     "since": joint.since,
-                    "text": robot.text_of(joint),
+                    "text": joint.text,
                     "acknowledged": joint.alarm.acknowledged,
                 }
                 for joint in robot.joints

@@ -82,6 +82,11 @@ class JointSummary:
         """Night from which on it is not as it was."""
         return "" if self.alarm is None else self.alarm.since
 
+    @property
+    def text(self) -> str:
+        """What is said of its alarm."""
+        return "" if self.alarm is None else self.alarm.text
+
 
 @dataclass(frozen=True)
 class RobotSummary:
@@ -163,16 +168,6 @@ class RobotSummary:
         for one in self.alarms:
             found.setdefault(one.axis, []).append(one)
         return list(found.values())
-
-    def text_of(self, joint: JointSummary) -> str:
-        """Return what is said of a joint's alarm: a joint at fault shakes the others."""
-        assert joint.alarm is not None
-        place = (joint.program, joint.night, joint.first)
-        shaken = any(
-            one.alarm and (one.program, one.night, one.axis) == place for one in self.joints
-        )
-        first = f"; see to axis {joint.first} first, which may shake it"
-        return joint.alarm.text + first * shaken
 
     def shown_of(self, joint: JointSummary) -> str:
         """Return a joint's state, or what became of the last night if that is worse."""

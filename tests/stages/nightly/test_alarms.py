@@ -8,6 +8,7 @@ import pytest
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.errors import NotEnoughDataError
+from opamc_cli.stages.nightly.alarms.not_judged import do_first
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
 from opamc_cli.stages.nightly.morning import as_told, tell
@@ -199,22 +200,23 @@ def test_an_acknowledged_alarm_is_raised_once_more_by_nights_at_fault_where_none
     assert alarm(18, known)[0].acknowledged is None
 
 
-def test_of_joints_that_shake_each_other_the_one_to_see_to_first_is_named():
+def test_of_joints_that_shake_each_other_the_one_to_see_to_first_comes_first():
     alarm = AlarmRow("r1", "", 0, "2026-03-01", "2026-03-01", None, None, "at fault", "{}")
     joints = [
-        JointSummary(axis, "", state, night, "", index, alarm, first=first)
-        for axis, state, night, index, first in (
-            (1, "fault", "2026-03-02", 9.0, 2),
-            (2, "fault", "2026-03-02", 5.0, None),
-            (3, "fault", "2026-03-01", 7.0, 2),
-            (4, "fault", "2026-03-02", 1.0, 5),
+        JointSummary(axis, "", state, "2026-03-02", "", index, alarm, first=first)
+        for axis, state, index, first in (
+            (1, "fault", 9.0, 2),
+            (2, "fault", 5.0, None),
+            (3, "fault", 11.0, 2),
+            (4, "changed", 20.0, None),
         )
     ]
     robot = RobotSummary("r1", tuple(joints), None)
-    shaken = "at fault; see to axis 2 first, which may shake it"
-    # of another night nothing is said, nor is a joint named without an alarm
-    assert [robot.text_of(joint) for joint in joints] == [shaken, *["at fault"] * 3]
-    assert [joint.axis for joint in robot.alarms] == [2, 1, 3, 4]
+    assert [joint.axis for joint in robot.alarms] == [2, 3, 1, 4]
+    row = {"state": "fault", "reason": "behind axis 2: Inspect the gear."}
+    assert do_first(row) == "; do first: see to axis 2, which may shake it; then: Inspect the gear"
+    assert do_first(row | {"reason": "Inspect the gear."}) == "; do first: Inspect the gear"
+    assert do_first(row | {"state": "healthy"}) == ""
 
 
 def test_since_does_not_move_with_the_nights_after_the_alarm():

@@ -84,8 +84,11 @@ def _coming_back(
 
 def do_first(row: Mapping[str, Any]) -> str:
     """Tell what is to be done first about a joint at fault, or changed; nothing of any other."""
-    what = told_by(row["reason"]).text if row["state"] in ("fault", "changed") else ""
-    return f"; do first: {what.rstrip('.')}" if what else ""
+    told = told_by(row["reason"])
+    if row["state"] not in ("fault", "changed") or not told.text:
+        return ""
+    first = "" if told.first is None else f"see to axis {told.first}, which may shake it; then: "
+    return f"; do first: {first}{told.text.rstrip('.')}"
 
 
 def is_own_fault(row: Mapping[str, Any]) -> bool:
