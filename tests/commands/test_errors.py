@@ -1,5 +1,6 @@
 """What users get wrong: one sentence, the right exit code, nothing half-written."""
 
+import dataclasses
 import json
 import os
 import re
@@ -19,6 +20,7 @@ import pytest
 from opamc_cli.commands.command_line import COMMANDS
 from opamc_cli.errors import ExitCode
 from opamc_cli.storage.files.lock import output_lock
+from opamc_cli.storage.runs.writing import save_run
 from tests.conftest import Ended
 
 ROOT = Path(__file__).parents[2]
@@ -374,6 +376,17 @@ def test_a_doubt_of_many_recordings_is_one_line(opamc, tmp_path):
     (line,) = ended.err.splitlines()
     assert "beyond 200 A" in line
     assert line.startswith("opamc: 3 files: ")
+
+
+def test_one_window_is_told_as_one(opamc, tmp_path):
+    current = 1 + 0.1 * np.random.default_rng(1).normal(size=700)
+    turning = {"axis1_current": current, "axis1_position": 0.3 * np.arange(700) / 200}
+    info = dataclasses.replace(bad_runs.INFO, sampling_rate_hz=200.0)
+    save_run(tmp_path / "on.parquet", info, turning)
+    several = bad_runs.good(tmp_path / "several.parquet")
+    ended = opamc("segment", tmp_path / "on.parquet", several, "--out", tmp_path / "out")
+    assert "on axis 1: 1 window, 3.4 s" in ended.out
+    assert "several axis 1: 12 motions, " in ended.out
 
 
 def test_segment_where_one_run_fails(opamc, tmp_path):

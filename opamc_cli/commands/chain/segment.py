@@ -39,8 +39,8 @@ def segment(
     output.result(
         {"written": str(outcome.path), "axes": found, "notes": list(outcome.notes)},
         *(
-            f"{f['run']} axis {f['axis']}: {f['segments']} {f['kind']}s, "
-            f"{f['in_motion_s']:.1f} s, up to {f['f_max_hz']:.1f} Hz"
+            f"{f['run']} axis {f['axis']}: {f['segments']} {f['kind']}"
+            f"{'s' * (f['segments'] != 1)}, {f['in_motion_s']:.1f} s, up to {f['f_max_hz']:.1f} Hz"
             for f in found
         ),
         str(outcome.path),

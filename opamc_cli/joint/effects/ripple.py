@@ -229,22 +229,6 @@ def meshes(ratio: float) -> tuple[tuple[str, float], ...]:
     return (("2(N+1)/N", ratio + 1), ("2(N-1)/N", ratio - 1)) if ratio >= SMALLEST_RATIO else ()
 
 
-def order_ties(order: float, track: Track) -> list[str]:
-    """Names of the known lines within the order resolution of an order beside the nearest of them.
-
-    None where orders, as found per revolution of the track's machine angle, have no meaning.
-    """
-    ratio = track.joint.gear_ratio
-    if track.angle_kind != "motor" or not ratio or ratio < SMALLEST_RATIO:
-        return []
-    lines = [(float(k), f"kinematic error (order {k})") for k in (2, 4)]
-    for (formula, teeth), k in product(meshes(ratio), (1, 2, 3)):
-        line = 2 * teeth / ratio * k
-        lines.append((line, f"flexspline tooth damage ({formula}, order {line:.4g})"))
-    close = [line for line in lines if abs(line[0] - order) < track.order_resolution]
-    return [name for _, name in sorted(close, key=lambda line: abs(line[0] - order))[1:]]
-
-
 @dataclass(frozen=True)
 class OrderMeaning:
     """What an order of a ripple means."""
@@ -279,10 +263,13 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
                 "growth since an earlier recording tells tooth damage"
             )
             if abs(order - tooth) < width and abs(order - tooth) < abs(order - 2 * harmonic):
-                return OrderMeaning("tooth", damage)
+                if harmonic == 3 or 2 * harmonic / ratio >= width:
+                    return OrderMeaning("tooth", damage)
+                # A short travel cannot tell it from the line that every gear has.
+                order = 2.0 * harmonic
             for sideband in (-2, -1, 1, 2):
                 beside = abs(order - tooth - sideband / ratio) < min(width, 0.35 / ratio)
-                if harmonic == 1 and beside and abs(order - 2.0) >= 0.35 / ratio:
+                if harmonic == 1 and beside and abs(order - 2.0) >= max(width, 0.35 / ratio):
                     return OrderMeaning("tooth", f"sideband of {formula}, {damage}")
     healthy = "many healthy gears have it, compare with an earlier recording"
     rotor = "check rotor and wave generator" if compared else healthy

@@ -3,13 +3,14 @@
 import json
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
 
 from opamc_cli.config.joint_model import JointModelConfig
-from opamc_cli.joint.effects.ripple import order_ties
+from opamc_cli.joint.effects.ripple import meshes, read_order
 from opamc_cli.joint.fit.frozen import may_extrapolate
 from opamc_cli.joint.fit.intervals import Certainty
 from opamc_cli.joint.fit.model import Dataset, Fit, Term, fit_terms
@@ -238,6 +239,24 @@ def curve_of(fit: Fit, place: int) -> Curve:
         np.array([(side * both)[piece].mean() for piece in bins]),
         np.array([(side * named)[piece].mean() for piece in bins]),
     )
+
+
+def order_ties(order: float, track: Track) -> list[str]:
+    """Names of the known lines within the order resolution of an order, but that it is read as.
+
+    None where orders, as found per revolution of the track's machine angle, have no meaning.
+    """
+    ratio = track.joint.gear_ratio
+    if track.angle_kind != "motor" or not ratio or not meshes(ratio):
+        return []
+    lines = [(float(k), f"kinematic error (order {k})") for k in (2, 4)]
+    for (formula, teeth), k in product(meshes(ratio), (1, 2, 3)):
+        line = 2 * teeth / ratio * k
+        lines.append((line, f"flexspline tooth damage ({formula}, order {line:.4g})"))
+    close = [line for line in lines if abs(line[0] - order) < track.order_resolution]
+    generator = read_order(order, track).kind == "generator"
+    close.sort(key=lambda line: (generator and "tooth" in line[1], abs(line[0] - order)))
+    return [name for _, name in close[1:]]
 
 
 def step_entry(step: Step, loop: Loop, track: Track) -> dict[str, Any]:

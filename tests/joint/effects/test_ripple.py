@@ -10,10 +10,11 @@ from simulator import simulate
 from track_of import track_of
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.effects.ripple import Ripple, order_ties, read_order
+from opamc_cli.joint.effects.ripple import Ripple, read_order
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import build_track
-from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.motion.track import Joint, Track
+from opamc_cli.stages.model.tables import order_ties
 
 EVERYTHING = {"order": 2.0, "speed": 1.0, "direction": 1.0, "load": 1.0, "current": 1.0}
 ANSWERED = EVERYTHING | {"answer": 2.0, "top_hz": 60.0}
@@ -70,6 +71,13 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
+def turned(joint: Joint, turns: float) -> Track:
+    """A motor that turns so many times."""
+    _, track = track_of(joint)
+    own = np.ptp(track.machine_angle_rad[track.moving]) / (2 * np.pi)
+    return replace(track, machine_angle_rad=track.machine_angle_rad * turns / own)
+
+
 @pytest.mark.parametrize(
     ("order", "reading"),
     [
@@ -86,8 +94,22 @@ def test_a_ripple_in_proportion_to_the_current_is_one_line(seed):
     ],
 )
 def test_orders_are_read_with_gear_ratio_and_pole_pairs(order, reading):
-    _, track = track_of(Joint(100.0, 5))
-    assert reading in read_order(order, track).text
+    assert reading in read_order(order, turned(Joint(100.0, 5), 50.0)).text
+
+
+@pytest.mark.parametrize("order", [1.94, 1.987, 2.0, 2.02, 2.06, 4.04])
+def test_a_short_travel_shows_the_wave_generators_own_order_and_not_the_meshs(order):
+    track = turned(Joint(100.0, 5), 6.0)
+    assert "per wave generator turn" in read_order(order, track).text
+    tied = order_ties(order, track)
+    assert len(tied) == 2
+    assert all("flexspline tooth damage" in name for name in tied)
+    assert "line of the tooth mesh" in read_order(6.06, track, compared=False).text
+
+
+def test_sidebands_of_the_mesh_are_read_where_the_travel_tells_them_from_order_2():
+    assert "sideband" in read_order(2.01, turned(Joint(100.0, 5), 50.0)).text
+    assert "kinematic error" in read_order(2.01, turned(Joint(100.0, 5), 20.0)).text
 
 
 @pytest.mark.parametrize("order", [2.0, 4.0, 20 / 9, 16 / 9])
@@ -120,10 +142,9 @@ def test_lines_of_healthy_gears_are_called_so_without_a_comparison(order):
 
 
 def test_orders_closer_than_the_resolution_are_tied():
-    _, track = track_of(Joint(100.0, 5))
-    width = track.order_resolution
-    tied = order_ties(2.02, track)
-    assert any("kinematic error (order 2)" in name for name in tied) == (width > 0.02)
+    track = turned(Joint(100.0, 5), 30.0)
+    assert "kinematic error (order 2)" in order_ties(2.02, track)
+    assert order_ties(2.02, turned(Joint(100.0, 5), 60.0)) == []
     assert order_ties(3.3, track) == []
     assert order_ties(2.02, track_of(Joint())[1]) == []
 

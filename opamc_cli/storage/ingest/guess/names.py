@@ -71,6 +71,12 @@ of KUKA's KR C."""
 KUKAS_ANGLE = re.compile(r"\$?AXIS_ACT(_MEAS)?\.A", re.I)
 """Of a KR C's joint angles, `$AXIS_ACT.A1`: degrees by the controller's manual."""
 
+ODRIVES = re.compile(r"odrive|odrv\d|(pos|vel)_estimate", re.I)
+"""Of an ODrive, such as `ODrive 0 Position` and `odrv0.axis0.pos_estimate`."""
+
+IN_TURNS = {"position": "rev", "velocity": "rev/s"}
+"""What it counts in by its manual, unless the file declares a unit."""
+
 AXIS_WORD = re.compile(r"(axis|joint|motor|j)[ _.\-]*(?=[_ .\-]|$)", re.I)
 
 
@@ -128,6 +134,8 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
         if quantity is None or has_placeholder(name):
             continue
         measured = _is_measured(pattern)
+        if unit is None and ODRIVES.search(name):
+            unit = IN_TURNS.get(quantity)
         found.append(Meant(quantity, number, pattern, name, None, measured, unit, scale))
     if {"a", "b", "c"} <= {each.quantity for each in found}:
         return found

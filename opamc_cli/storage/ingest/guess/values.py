@@ -125,7 +125,7 @@ def rate_from_speed(positions: Mapping[int, Float], speeds: Mapping[int, Float])
 
 def wraps(positions: Mapping[int, Float], unit: str) -> bool:
     """Return whether a position jumps by a turn."""
-    turn = 360.0 if unit == "deg" else 2 * math.pi
+    turn = 1 / turns(1.0, unit)
     steps = [np.abs(np.diff(v[np.isfinite(v)])) for v in positions.values()]
     return any(bool(((s > 0.75 * turn) & (s < 1.05 * turn)).any()) for s in steps)
 

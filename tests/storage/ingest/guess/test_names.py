@@ -128,6 +128,14 @@ def test_per_cent_are_of_a_current_or_torque_and_no_motion():
     assert meanings([Listed("speed_percent"), Listed("Override %"), Listed("J1 Pos %")]) == []
 
 
+def test_an_odrive_counts_in_turns_unless_the_file_says_otherwise():
+    names = ("ODrive 0 Position", "ODrive 0 Velocity", "odrv0.axis1.pos_estimate", "vel_estimate")
+    assert [only(name).unit for name in names] == ["rev", "rev/s", "rev", "rev/s"]
+    assert only("ODrive 0 Current").unit is None
+    assert only("ODrive 0 Position [rad]").unit == "rad"
+    assert only("Drive 0 Position").unit is None
+
+
 def test_kukas_angles_are_degrees_and_its_currents_per_cent():
     found = only("$AXIS_ACT.A1")
     assert (found.quantity, found.number, found.unit) == ("position", 1, "deg")

@@ -44,6 +44,8 @@ def test_a_turn_of_the_encoder_is_no_step_and_no_turn_is_missed():
     for step, turn in ((0.74, False), (0.76, True), (1.04, True), (1.06, False)):
         assert wraps({1: np.array([0.0, 0.0, step * 360.0])}, "deg") is turn
     assert not wraps({1: np.degrees(wrapped)}, "rad")
+    assert wraps({1: wrapped / (2 * np.pi)}, "rev")
+    assert not wraps({1: np.array([0.0, 1.9, 8.2, 2.0])}, "rev")
 
 
 @pytest.mark.parametrize(("factor", "unit"), [(1.0, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")])
