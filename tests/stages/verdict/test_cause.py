@@ -124,9 +124,7 @@ def test_without_the_joint_s_constants_the_baseline_tells_the_pole_pairs():
     ],
 )
 def test_what_the_baseline_had_to_tell_is_said_beside_an_order(told, says):
-    evidence = dict.fromkeys(
-        ("measured_order", "order_error", "power_ratio", "order_resolution"), 1.0
-    )
+    seen = ("measured_order", "order_error", "power_ratio", "order_resolution")
     found = Cause(
         effect="ripple", parameters={}, interpretation="x", p_value=0.0, ties=(),
         evidence=dict.fromkeys(seen, 1.0),
