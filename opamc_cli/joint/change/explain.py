@@ -4,17 +4,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from opamc_cli.decision.measurement.gear import told
 from opamc_cli.joint.change.energy import energy_of, rest_growth
-from opamc_cli.joint.change.lines import fast_residuals
-from opamc_cli.joint.change.periodic import find_periodic
+from opamc_cli.joint.change.lines import fast_residuals, order_spectra
+from opamc_cli.joint.change.periodic import OF_THE_GEAR, find_periodic
 from opamc_cli.joint.change.reading import Cause, Reading
 from opamc_cli.joint.change.search import SCALE, find_slow_causes
 from opamc_cli.joint.change.slow import learn, shift_power, with_model
-from opamc_cli.joint.change.units import Follow, follow, followed, read_side, side_by_side
+from opamc_cli.joint.change.units import Compared, Follow, follow, followed, read_side, side_by_side
 from opamc_cli.joint.effects.library import Library, built_in_library, effect_named
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording
-from opamc_cli.joint.motion.track import Joint
+from opamc_cli.joint.motion.track import Joint, Track, by_motor
 
 DECLARED = ("inertia", "gravity", "coulomb", "viscous", "offset")
 """The joint's model; what the recordings cannot show of it is left out."""
@@ -66,6 +67,8 @@ class Change:
     """What orders are counted by: a revolution of the "motor", of the "joint", or "electrical"."""
     why_not: str | None = None
     """Why nothing could be said, where nothing could."""
+    told: Joint | None = None
+    """Gear or motor, as far as the baseline's own lines had to tell it."""
 
 
 def explain_change(
@@ -86,12 +89,15 @@ def explain_change(
     """
     library = {SCALE.name: SCALE} | (library or built_in_library())
     cycles = len(baseline) < FEWEST_SESSIONS
-    before = read_side(baseline, joint, cycles, follow)
-    after = read_side(target, joint, cycles)
-    if not before or not after:
-        side = "target" if before else "baseline"
+    sides = [read_side(baseline, joint, cycles, follow), read_side(target, joint, cycles)]
+    if not all(sides):
+        side = "target" if sides[0] else "baseline"
         return Change((), 0.0, False, why_not=f"too little motion in the {side}")
-    compared = side_by_side(before, after)
+    return _explained(sides, cycles, library)
+
+
+def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Change:
+    compared = side_by_side(*sides)
     declared = [effect_named(library, name) for name in DECLARED]
     terms = tuple(Term(one, {}) for one in declared if one.untestable(compared.track) is None)
     compared = followed(compared, terms)
@@ -108,6 +114,11 @@ def explain_change(
         late = compared.after
         population = learn(compared, terms)
         compared = with_model(compared, population)
+
+    joint = _told(compared, terms)
+    if joint is not None:
+        sides = [[by_motor(track, joint) for track in side] for side in sides]
+        return replace(_explained(sides, cycles, library), told=joint)
 
     slow = find_slow_causes(compared, population, library)
     residual = fast_residuals(compared, terms, slow[-1].shift if slow else None)
@@ -165,6 +176,16 @@ def explain_change(
     )
 
 
+def _told(compared: Compared, terms: tuple[Term, ...]) -> Joint | None:
+    """Tell by the baseline's own lines what turns the angle that is known into the motor's."""
+    kind = compared.track.angle_kind
+    if kind == "motor":
+        return None
+    seen = order_spectra(compared, fast_residuals(compared, terms, None), tapered=True)
+    found = Joint(*told(kind, seen.orders, seen.before, seen.resolution))
+    return None if found == Joint() else found
+
+
 def _of_lines(
     periodic: list[Reading], whole: float, fast: float, loaded: bool, library: Library
 ) -> list[Cause]:
@@ -191,7 +212,7 @@ def _of_lines(
 
 
 def _doubled(ripple: Reading) -> bool:
-    return ripple.kind == "mesh" and ripple.evidence["power_ratio"] >= GROWTH
+    return ripple.kind in OF_THE_GEAR and ripple.evidence["power_ratio"] >= GROWTH
 
 
 def _weighed(

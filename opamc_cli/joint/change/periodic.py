@@ -16,6 +16,7 @@ from opamc_cli.joint.change.units import Compared
 from opamc_cli.joint.motion.track import Floats
 from opamc_cli.joint.spectra import standing_views
 
+OF_THE_GEAR = ("mesh", "bearing")
 STANDING = 0.7
 """A ripple that is turned back to the phases' frame keeps half of its line there at most; what one
 phase picks up has as much in that frame as in either of its two lines over the motor angle."""
@@ -32,7 +33,7 @@ def find_periodic(compared: Compared, residual: Floats, between: float = 0.0) ->
     if plain is not None and plain.effect != "ripple":
         return [plain]
     faint = _read(compared, residual, between, whole, order_spectra(compared, residual, True))
-    if faint is not None and faint.kind == "mesh":
+    if faint is not None and faint.kind in OF_THE_GEAR:
         return [faint] if plain is None else [faint, plain]
     if plain is not None and plain.kind == "mesh" and compared.track.angle_kind == "electrical":
         # One line is at the mesh's order for some number of pole pairs: of lost stiffness, too.

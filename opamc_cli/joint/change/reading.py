@@ -1,11 +1,12 @@
 """What lines over the motor angle mean that the target has and the baseline has not."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import product
 
 import numpy as np
 
+from opamc_cli.decision.measurement.gear import passing_rollers
 from opamc_cli.joint.change.lines import Line
 from opamc_cli.joint.effects.base import Parameters
 from opamc_cli.joint.effects.mains_hum import MAINS_HZ, MainsHum
@@ -30,6 +31,10 @@ SIDE_RESOLUTIONS = 4.0
 """A damaged mesh has play that the load closes: as the load changes along a stroke, the line of
 its passage is spread over its neighbourhood."""
 
+BEARING = (
+    "a bearing of the wave generator, {:.4g} rolling elements a turn under a load that its lobes "
+    "bring twice: inspect the wave generator and its bearing"
+)
 FLEXSPLINE = "flexspline tooth damage (2(N+1)/N): inspect the flexspline"
 EITHER = (
     "kinematic error, twice per wave generator turn, that has grown, or flexspline tooth damage "
@@ -95,6 +100,9 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     other = read_line(lines[0], track, resolution)
     if other.kind in OF_A_SENSOR or 0 < (track.joint.gear_ratio or 0.0) < SMALLEST_RATIO:
         return other
+    rolling = _rolling(lines, track, resolution)
+    if rolling is not None:
+        return rolling
     poles, comb = _comb(lines, track, resolution)
     if comb and track.angle_kind == "electrical":
         return _wave_generator(comb, track, resolution, poles)
@@ -105,6 +113,16 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
         if lines[0] in passages or (passages and len(wave) >= SHORTEST_COMB):
             return _wave_generator(wave, track, resolution, poles)
     return other
+
+
+def _rolling(lines: list[Line], track: Track, resolution: float) -> Reading | None:
+    """Read the strongest line of the motor's angle that is new as a bearing's, if it may be."""
+    new = [line for line in lines if line.reference is None and track.angle_kind == "motor"]
+    pair = passing_rollers([line.order for line in new], resolution)
+    if pair is None or 0 not in pair:
+        return None
+    read = read_line(new[0], track, resolution)
+    return replace(read, interpretation=BEARING.format(read.fundamental), kind="bearing")
 
 
 def read_frequency(line: Line, resolution_hz: float) -> Reading | None:
@@ -195,14 +213,14 @@ def _family(line: Line, poles: float, track: Track, resolution: float) -> bool:
 def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:
     """Whether a line can only be the mesh's: not so one at 6, say, that may be the motor's."""
     k = _near(line, poles, track, min(SIDE_RESOLUTIONS * resolution * poles, 0.25))
+    of_sensors = (track.joint.pole_pairs or 0) * ("phases" in track.channels)
     if k in PASSAGES:
-        return True
+        return k == 2 or k not in (of_sensors, 2 * of_sensors)
     if k is None or k % 2 or track.joint.gear_ratio is None:
         return False
     sharp = 0.75 * resolution * poles
-    order = _corrected(line, poles)
-    in_flexspline = k * (1 + 1 / track.joint.gear_ratio)
-    return abs(order - in_flexspline) < sharp < abs(order - k)
+    order, turned = _corrected(line, poles), k / track.joint.gear_ratio
+    return abs(order - k - turned) < sharp < abs(order - k)
 
 
 def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:

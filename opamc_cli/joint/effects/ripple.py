@@ -274,7 +274,7 @@ def read_order(order: float, track: Track, compared: bool = True) -> OrderMeanin
     healthy = "many healthy gears have it, compare with an earlier recording"
     rotor = "check rotor and wave generator" if compared else healthy
     generator = "check the wave generator" if compared else healthy
-    known = [(1, "rotor", f"eccentricity, once per motor revolution: {rotor}")]
+    known = [(1, "rotor", f"eccentricity or magnets, once per motor revolution: {rotor}")]
     for k, often in ((2, "twice"), (4, "four times")) if not ratio or meshes(ratio) else ():
         text = f"kinematic error, {often} per wave generator turn: {generator}"
         known.append((k, "generator", text))

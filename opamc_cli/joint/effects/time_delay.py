@@ -1,11 +1,11 @@
 """A current that comes later, or earlier, than the motion it belongs to."""
 
 import numpy as np
-from numba import njit
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
-from opamc_cli.joint.motion.track import Floats, Ints, Track
+from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.signal.transform.least_squares import solve
+from opamc_cli.signal.transform.second_order import lagging, late_means
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3
@@ -81,47 +81,3 @@ class TimeDelay(Effect):
             return self.meaning
         corner_hz = 1 / (2 * np.pi * parameters["delay_s"])
         return f"a current that is reported through a filter of {corner_hz:.0f} Hz: no fault"
-
-
-def late_means(
-    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
-) -> Floats:
-    """Means of blocks of columns that come later, the first and the last values held.
-
-    Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
-    no more than there are blocks; between samples it is what a straight line between them gives.
-    """
-    means = np.empty((sum((stop - start) // factor for start, stop in bounds), sums.shape[1]))
-    _late_means(sums, np.array(bounds), samples, factor, means)
-    return means
-
-
-@njit(cache=True)
-def _late_means(sums: Floats, bounds: Ints, samples: float, factor: int, means: Floats) -> None:
-    place = 0
-    for number in range(len(bounds)):
-        start, stop = bounds[number]
-        own = sums[start + number : stop + number + 1]
-        blocks = (stop - start) // factor
-        for block in range(blocks + 1):
-            edge = factor * block - samples
-            # Beyond the ends the nearest step goes on.
-            whole = min(max(int(edge), 0), stop - start - 1)
-            for k in range(sums.shape[1]):
-                step = own[whole + 1, k] - own[whole, k]
-                at = (own[whole, k] + (edge - whole) * step) / factor
-                if block:
-                    means[place + block - 1, k] += at
-                if block < blocks:
-                    means[place + block, k] = -at
-        place += blocks
-
-
-@njit(cache=True)
-def lagging(columns: Floats, pole: float) -> Floats:
-    """Put columns, (n, k), through a filter of first order, from rest at their first values."""
-    late = columns.copy()
-    for n in range(1, len(late)):
-        for k in range(late.shape[1]):
-            late[n, k] += pole * (late[n - 1, k] - late[n, k])
-    return late

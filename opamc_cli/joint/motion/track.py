@@ -254,6 +254,14 @@ def excerpt(track: Track, inside: Bools, spans: tuple[tuple[int, int], ...]) -> 
     return replace(track, bounds=ranges(stop - start for start, stop in spans), **taken)
 
 
+def by_motor(track: Track, told: Joint) -> Track:
+    """Count a track's orders by the motor's turns, once its gear ratio or pole pairs are told."""
+    turns, known = told.gear_ratio or 1 / (told.pole_pairs or 1), track.joint
+    joint = Joint(told.gear_ratio or known.gear_ratio, told.pole_pairs or known.pole_pairs)
+    angle = turns * track.machine_angle_rad
+    return replace(track, machine_angle_rad=angle, angle_kind="motor", joint=joint)
+
+
 def joined(pieces: Sequence[Track]) -> Track:
     """Lay tracks of one joint at one rate one after another; what one of them lacks, none has."""
     parts = [sampled(piece) for piece in pieces]

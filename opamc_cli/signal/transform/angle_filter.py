@@ -3,6 +3,7 @@
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter1d
 from scipy.special import beta
 
 Bools = NDArray[np.bool_]
@@ -19,6 +20,14 @@ FREE_RAD2 = 1e6
 
 ROUGH_NOISE_RAD = 1.0
 """Error of the rough speed, as an angle over its own window of 15 samples."""
+
+STRONG = 5.0
+"""A current vector counts where it is longer than this many times its noise."""
+
+AVERAGE_S = 0.008
+UNLIKELY = 4.0
+"""A weaker current counts where the mean of its square, turned back by the angle followed so far,
+over 8 ms is this many times what noise makes of it."""
 
 
 def widest_bandwidth(rate_hz: float) -> float:
@@ -172,3 +181,22 @@ def _smooth(  # type: ignore[no-untyped-def]
         l1 -= g[i, 0, 3] + g[i, 0, 0] * l0 + g[i, 0, 1] * l1 + g[i, 0, 2] * l2
         l1, l2 = l1 + step * l0, l2 + step * l1 + h * l0
     return x[:, 0].copy(), x[:, 1].copy(), x[:, 2].copy()
+
+
+def averaged_angle(
+    vector: NDArray[np.complex128], angle_rad: Floats, noise: float, floor: float, rate_hz: float
+) -> tuple[Bools, Floats]:
+    """Measure the angle of weak currents over several samples, along the followed angle, modulo pi.
+
+    Returns which samples tell an angle, alone or averaged, and that angle modulo pi, both (n,). The
+    noise is that of each of the vector's components; below the floor no vector counts.
+    """
+    alone = np.abs(vector) > max(STRONG * noise, floor)
+    width = max(int(AVERAGE_S * rate_hz), 1) | 1
+    turned_back = vector * np.exp(-1j * angle_rad)
+    square = uniform_filter1d(turned_back**2, width, mode="constant")
+    # Of noise alone the mean square is of this size.
+    chance = noise**2 * np.sqrt(8 / width)
+    together = np.abs(square) > max(UNLIKELY * chance, floor**2)
+    measured = np.where(alone, np.angle(vector), angle_rad + 0.5 * np.angle(square))
+    return alone | together, measured

@@ -1,4 +1,4 @@
-"""Filters of second order: what a sprung mass, or a velocity loop, makes of a signal."""
+"""Delays and filters: what a logger, a sprung mass or a velocity loop makes of a signal."""
 
 from collections.abc import Sequence
 
@@ -67,3 +67,47 @@ def _put_through(
                 low[place] = poled + 2.0 * a + b
                 band[place] = steeper * (poled - b)
             a, b = poled, a
+
+
+def late_means(
+    sums: Floats, bounds: tuple[tuple[int, int], ...], samples: float, factor: int
+) -> Floats:
+    """Means of blocks of columns that come later, the first and the last values held.
+
+    Running sums of the columns, (n + recordings, k) from zero in each recording, make a delay cost
+    no more than there are blocks; between samples it is what a straight line between them gives.
+    """
+    means = np.empty((sum((stop - start) // factor for start, stop in bounds), sums.shape[1]))
+    _late_means(sums, np.array(bounds), samples, factor, means)
+    return means
+
+
+@njit(cache=True)
+def _late_means(sums: Floats, bounds: Ints, samples: float, factor: int, means: Floats) -> None:
+    place = 0
+    for number in range(len(bounds)):
+        start, stop = bounds[number]
+        own = sums[start + number : stop + number + 1]
+        blocks = (stop - start) // factor
+        for block in range(blocks + 1):
+            edge = factor * block - samples
+            # Beyond the ends the nearest step goes on.
+            whole = min(max(int(edge), 0), stop - start - 1)
+            for k in range(sums.shape[1]):
+                step = own[whole + 1, k] - own[whole, k]
+                at = (own[whole, k] + (edge - whole) * step) / factor
+                if block:
+                    means[place + block - 1, k] += at
+                if block < blocks:
+                    means[place + block, k] = -at
+        place += blocks
+
+
+@njit(cache=True)
+def lagging(columns: Floats, pole: float) -> Floats:
+    """Put columns, (n, k), through a filter of first order, from rest at their first values."""
+    late = columns.copy()
+    for n in range(1, len(late)):
+        for k in range(late.shape[1]):
+            late[n, k] += pole * (late[n - 1, k] - late[n, k])
+    return late

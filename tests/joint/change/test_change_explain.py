@@ -28,10 +28,11 @@ def knocking(a, time):
     return after
 
 
-def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
+def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0, own=0.0):
     """Sessions of two cycles each, whose friction differs by 5 %; the target's has an effect.
 
-    What the declared effects do not hold may `wander` from session to session, too.
+    What the declared effects do not hold may `wander` from session to session, too; `own` is the
+    size of the healthy gear's kinematic error, in units of the noise.
     """
     count = BASELINE + TARGET
     made = simulate(seed, (), 0.0, cycles=2 * count, rate=250.0)
@@ -61,6 +62,7 @@ def change_of(kind, seed=1, colder=0.0, sessions=True, known=True, wander=0.0):
         current += 0.05 * (rng.normal() * np.sign(v[rows]) + rng.normal() * v[rows] / top)
         if kind.startswith("calmer") and not new:
             current += 3 * noise * np.cos(7 * made.gear_ratio * q[rows])
+        current += own * noise * np.cos(2 * made.gear_ratio * q[rows])
         if wander:
             current += wander * rng.normal() * np.sin(5 * q[rows])
         recordings.append(
@@ -275,3 +277,15 @@ def test_a_recording_whose_strokes_no_other_has_hides_no_cause(moved):
     change = explain_change(before, after, Joint())
     assert change.causes[0].effect == "coulomb"
     assert change.units == ((4, 4) if moved == "baseline" else (5, 3))
+
+
+@pytest.mark.parametrize("own", [0.0, 0.6])
+def test_the_baselines_own_line_tells_the_gear_that_nobody_has(own):
+    change = change_of("tooth", known=False, own=own)
+    first = change.causes[0]
+    assert first.effect == "ripple"
+    assert ("flexspline tooth damage" in first.interpretation) == bool(own)
+    assert change.angle == ("motor" if own else "joint")
+    assert (change.told is not None) == bool(own)
+    if own:
+        assert change.told.gear_ratio == pytest.approx(101.0, abs=1.0)

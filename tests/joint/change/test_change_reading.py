@@ -208,3 +208,21 @@ def test_a_joint_s_or_an_electrical_order_is_told_as_it_is():
     assert "order 2.02 per joint" in text
     text = read_lines([line(0.13)], track_of("electrical", poles=None), 0.02).interpretation
     assert "order 0.13 per electrical" in text
+
+
+def test_a_bearing_of_the_wave_generator_has_odd_lines_two_apart():
+    found = [line(4.0, 4.01), line(9.62), line(11.61), line(7.6)]
+    reading = read_lines(found, MOTOR, 0.1)
+    assert reading.kind == "bearing"
+    assert "9.62 rolling elements" in reading.interpretation
+    assert reading.parameters["order"] == 9.62
+    # Not where the baseline has the stronger one, nor by another angle than the motor's.
+    assert read_lines([line(9.62, 9.62), line(11.61)], MOTOR, 0.1).kind == "unknown"
+    assert read_lines([line(9.62), line(11.61)], track_of("joint"), 0.1).kind == "unknown"
+
+
+def test_what_the_phases_sensors_have_is_no_passage_of_the_mesh():
+    found = [line(1.0), line(4.0)]
+    assert read_lines(found[1:], track_of("motor", None, 4, "phases"), 0.1).kind != "mesh"
+    assert read_lines(found[1:], track_of("motor", None, 5, "phases"), 0.1).kind == "mesh"
+    assert read_lines([line(2.0)], track_of("motor", None, 2, "phases"), 0.1).kind == "mesh"

@@ -15,13 +15,13 @@ from track_of import track_of
 from opamc_cli.joint.effects.elasticity import Elasticity
 from opamc_cli.joint.effects.hysteresis import dahl_state
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.effects.time_delay import TimeDelay, lagging, late_means
+from opamc_cli.joint.effects.time_delay import TimeDelay
 from opamc_cli.joint.explain.saturated import unnamed_library
 from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, coarsen
 from opamc_cli.signal.motion.smoothing import averaged, block_mean
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.second_order import answers, lagging, late_means
 
 VOCABULARY = list(built_in_library())
 

@@ -12,8 +12,9 @@ from opamc_cli.config.models import JointConfig
 from opamc_cli.decision.measurement.at_rest import Growth
 from opamc_cli.errors import ConfigError, InputError
 from opamc_cli.joint.change.explain import Change
-from opamc_cli.joint.change.reading import Cause
+from opamc_cli.joint.change.reading import FLEXSPLINE, Cause
 from opamc_cli.joint.change.search import LESS_FRICTION
+from opamc_cli.joint.motion.track import Joint
 from opamc_cli.stages import diagnose
 from opamc_cli.stages.verdict import cause
 from opamc_cli.stages.verdict.wording import causes
@@ -105,11 +106,32 @@ def test_friction_that_has_fallen_for_no_warmth_sends_nobody_to_the_grease():
 
 
 @pytest.mark.long
-def test_without_the_joint_s_constants_the_order_is_electrical_and_read_with_a_condition():
+def test_without_the_joint_s_constants_the_baseline_tells_the_pole_pairs():
     found = cause.explain(3, sources("normal"), sources("fault"), JointConfig())
     assert found["effect"] == "ripple"
-    assert found["parameters"]["order"] == pytest.approx(0.404, abs=0.002)
-    assert "if it has 5 pole pairs" in found["interpretation"]
+    assert found["parameters"]["order"] == pytest.approx(2.02, abs=0.01)
+    assert found["interpretation"] == FLEXSPLINE
+    told = "That the motor has 5 pole pairs is told by the baseline's own line at"
+    assert any(why.startswith(told) for why in found["why"])
+
+
+@pytest.mark.parametrize(
+    ("told", "says"),
+    [
+        (None, None),
+        (Joint(101.2), "That the gear ratio is 101.2 is told by the baseline's own line"),
+        (Joint(None, 4), "That the motor has 4 pole pairs is told by the baseline's own line"),
+    ],
+)
+def test_what_the_baseline_had_to_tell_is_said_beside_an_order(told, says):
+    seen = ("measured_order", "order_error", "power_ratio", "order_resolution")
+    found = Cause(
+        effect="ripple", parameters={}, interpretation="x", p_value=0.0, ties=(),
+        evidence=dict.fromkeys(seen, 1.0),
+    )  # fmt: skip
+    why = " ".join(causes.entry(Change((found,), 1.0, False, told=told))["why"])
+    assert (says or "of the motor has") in why
+    assert ("is told by" in why) == (told is not None)
 
 
 @pytest.mark.long

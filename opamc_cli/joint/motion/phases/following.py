@@ -21,23 +21,17 @@ from opamc_cli.signal.plausible.sensor_errors import (
     without_sensor_errors,
 )
 from opamc_cli.signal.transform.angle_filter import (
+    STRONG,
     acceleration_noise,
+    averaged_angle,
     clean_bandwidth,
     smoothed_angle,
     smoothing_kernel,
     widest_bandwidth,
 )
 
-STRONG = 5.0
-"""A current vector counts where it is longer than this many times its noise."""
-
 WEAKEST_SHARE = 0.02
 """Nor does one count that is shorter than this share of the longest."""
-
-AVERAGE_S = 0.008
-UNLIKELY = 4.0
-"""A weaker current counts where the mean of its square, turned back by the angle followed so far,
-over 8 ms is this many times what noise makes of it."""
 
 MUCH_SMOOTHER = 0.5
 """Errors that hide the angle make its speed at least three times as rough; where they do not, the
@@ -158,22 +152,3 @@ def _turning(vector: NDArray[np.complex128], rate_hz: float) -> tuple[Floats, Fl
     weight = uniform_filter1d(np.abs(turns), 15, mode="constant")
     coherence = np.abs(smooth) / np.maximum(weight, 1e-300)
     return np.concatenate([[0.0], np.angle(smooth)]) * rate_hz, np.concatenate([[0.0], coherence])
-
-
-def averaged_angle(
-    vector: NDArray[np.complex128], angle_rad: Floats, noise: float, floor: float, rate_hz: float
-) -> tuple[Bools, Floats]:
-    """Measure the angle of weak currents over several samples, along the followed angle, modulo pi.
-
-    Returns which samples tell an angle, alone or averaged, and that angle modulo pi, both (n,). The
-    noise is that of each of the vector's components; below the floor no vector counts.
-    """
-    alone = np.abs(vector) > max(STRONG * noise, floor)
-    width = max(int(AVERAGE_S * rate_hz), 1) | 1
-    turned_back = vector * np.exp(-1j * angle_rad)
-    square = uniform_filter1d(turned_back**2, width, mode="constant")
-    # Of noise alone the mean square is of this size.
-    chance = noise**2 * np.sqrt(8 / width)
-    together = np.abs(square) > max(UNLIKELY * chance, floor**2)
-    measured = np.where(alone, np.angle(vector), angle_rad + 0.5 * np.angle(square))
-    return alone | together, measured

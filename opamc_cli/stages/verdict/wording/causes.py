@@ -231,6 +231,7 @@ def _why(cause: Cause, change: Change) -> list[str]:
             f"two orders must differ by {seen['order_resolution']:.2g} to be told apart within a "
             "stroke."
         )
+        sentences += _told(change)
     if "measured_frequency_hz" in seen:
         sentences.append(
             f"A line at {seen['measured_frequency_hz']:.4g} Hz, whatever the speed, has "
@@ -259,6 +260,16 @@ def _why(cause: Cause, change: Change) -> list[str]:
             "sessions differ."
         )
     return sentences
+
+
+def _told(change: Change) -> list[str]:
+    """Say how turns of the motor could be counted that nobody had told how to."""
+    if change.told is None:
+        return []
+    what = f"That the motor has {change.told.pole_pairs} pole pairs"
+    if change.told.gear_ratio is not None:
+        what = f"That the gear ratio is {change.told.gear_ratio:.4g}"
+    return [f"{what} is told by the baseline's own line at twice a wave generator's turn."]
 
 
 def _effect_name(cause: Cause) -> str:

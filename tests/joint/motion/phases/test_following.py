@@ -5,8 +5,9 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from simulator import simulate
 
-from opamc_cli.joint.motion.phases.following import _followed, averaged_angle, follow_phases
+from opamc_cli.joint.motion.phases.following import _followed, follow_phases
 from opamc_cli.signal.plausible.sensor_errors import FEWEST_FAST_SAMPLES
+from opamc_cli.signal.transform.angle_filter import averaged_angle
 
 
 def test_speed_is_the_electrical_one():
