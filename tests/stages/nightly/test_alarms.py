@@ -32,7 +32,6 @@ def nights_of(states, distances=None):
             "common": 0.0,
             "effect": 0.0,
             "p_value": 0.5,
-            "temperature_c": None,
             "cause": None,
             "reason": "no motion" if state == "insufficient-data" else "",
         }
