@@ -13,9 +13,6 @@ OF_ROBOT = (
 )
 """Kinds of event that follow from the nights of one robot."""
 
-OF_NIGHT = ("judged-anew", "lacking")
-"""Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
-
 OF_START = ("thinned", "stray", "unnamed", "silent", "gathering")
 """Kinds of event that each start finds anew."""
 
@@ -35,9 +32,6 @@ may move it; a column of its own would be another layout of the file."""
 IN_PART = "in part: "
 """What the reason begins with, behind `EXCUSED`, of a joint for which not all of its night's
 recordings could be used: of another joint of the same night they may have been."""
-
-DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
-"""Kinds of event that follow from the nights; the others were declared by a user."""
 
 
 @dataclass(frozen=True)
