@@ -33,8 +33,9 @@ import cell_logs
 from opamc_cli.__main__ import main
 from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.storage.history.history import History
-from opamc_cli.storage.history.rows import DERIVED
+from opamc_cli.storage.history.rows import OF_ROBOT
 
+DERIVED = (*OF_ROBOT, "judged-anew", "lacking", "missing")  # by the nights, not by a user
 STAND_IN = "night_stand_in:stand_in"
 OURS = (".opamc-work", ".kept", ".copies", ".opamc.lock", ".opamc.cell")
 SECONDS = 300.0

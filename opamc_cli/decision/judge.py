@@ -12,7 +12,7 @@ from opamc_cli.decision.comparison import Compared, Shift, compare_sessions
 from opamc_cli.decision.one_session import compare_one_session, least_effect, one_session_log_ratio
 from opamc_cli.decision.significance.multiplicity import holm
 from opamc_cli.decision.significance.spread import BETWEEN_SESSIONS
-from opamc_cli.decision.witnesses.evidence import Evidence
+from opamc_cli.decision.witnesses.evidence import Evidence, WitnessEvidence
 from opamc_cli.decision.witnesses.patterns import Cell, PatternEvidence
 
 FloatArray = NDArray[np.float64]
@@ -47,7 +47,7 @@ class Bundle:
 
     cells: Sequence[Cell]
     """Its pattern counts, which also say what sessions and cycles there are."""
-    witnesses: Mapping[str, Evidence] = field(default_factory=dict)
+    witnesses: Mapping[str, WitnessEvidence] = field(default_factory=dict)
     """What else tells its sessions apart, by name."""
     target_sessions: Sequence[str] = ()
     """Names of the target's sessions, in the order of the cells' rows."""

@@ -50,18 +50,16 @@ class LinearDiscriminant:
         centred = np.asarray(rows, dtype=np.float64) - np.asarray(self.centre)
         return np.asarray(centred @ np.asarray(self.weights))
 
-    def outside_training(
-        self, conditions: Mapping[str, float], tolerance: float = 0.05
-    ) -> list[str]:
+    def outside_training(self, conditions: Mapping[str, float]) -> list[str]:
         """Conditions that lie outside those of the training rows.
+
+        By more than a twentieth of the larger bound's magnitude.
 
         Parameters
         ----------
         conditions : mapping of str to float
             Operating conditions of the rows to be judged; names the model does not know count
             as outside, names it knows but that are missing do not.
-        tolerance : float, default 0.05
-            Share of the larger bound's magnitude by which a range may be exceeded.
 
         Returns
         -------
@@ -74,7 +72,7 @@ class LinearDiscriminant:
                 clauses.append(f"{name} = {value:g} is unknown to the model")
                 continue
             low, high = self.conditions[name]
-            slack = tolerance * max(abs(low), abs(high))
+            slack = 0.05 * max(abs(low), abs(high))
             if not low - slack <= value <= high + slack:
                 clauses.append(f"{name} = {value:g} lies outside {low:g}..{high:g}")
         return clauses

@@ -11,6 +11,9 @@ from scipy.special import gammaln, xlogy
 
 FloatArray = NDArray[np.float64]
 
+MOST_SIZES = 32
+"""Pairs of sizes that stand in for more."""
+
 
 def normalise(counts: ArrayLike) -> FloatArray:
     """Turn counts into probabilities along the last axis.
@@ -191,11 +194,7 @@ def divergences_from_pool(
 
 
 def chance_inflation(
-    divergences: ArrayLike,
-    pool: ArrayLike,
-    n_segment: ArrayLike,
-    n_pool: ArrayLike,
-    base: float = 2.0,
+    divergences: ArrayLike, pool: ArrayLike, n_segment: ArrayLike, n_pool: ArrayLike
 ) -> float:
     """How many times more a baseline scatters than independent patterns would.
 
@@ -206,13 +205,11 @@ def chance_inflation(
     Parameters
     ----------
     divergences : array_like, shape (S,)
-        Leave-cycle-out divergences of the baseline; NaN entries are passed over.
+        Leave-cycle-out divergences of the baseline, bit; NaN entries are passed over.
     pool : array_like, shape (K,)
         The baseline's pooled counts.
     n_segment, n_pool : array_like, shape (S,)
         Pattern counts of each segment and of the pool it was compared with.
-    base : float, default 2
-        Base of the logarithm of `divergences`.
 
     Returns
     -------
@@ -241,7 +238,7 @@ def chance_inflation(
 
     def above(log_inflation: float) -> float:
         inflation = math.exp(log_inflation)
-        by_size = chance_divergence(pool, sizes[0] / inflation, sizes[1] / inflation, base)
+        by_size = chance_divergence(pool, sizes[0] / inflation, sizes[1] / inflation)
         return math.log(float(weights @ by_size) / float(weights.sum()) / observed)
 
     low, high = 1e-3, float(segment[usable].max())
@@ -277,27 +274,23 @@ def _zero(function: Callable[[float], float], low: float, high: float) -> float:
                 high, at_high = place, value
 
 
-def _few_sizes(
-    segment: FloatArray, rest: FloatArray, most: int = 32
-) -> tuple[FloatArray, FloatArray]:
+def _few_sizes(segment: FloatArray, rest: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Stand a few pairs of sizes in for many: chance hardly differs between close ones."""
-    if len(segment) <= most:
+    if len(segment) <= MOST_SIZES:
         return np.array([segment, rest]), np.ones(len(segment))
     order = np.argsort(1 / segment + 1 / rest, kind="stable")
-    groups = np.array_split(order, most)
+    groups = np.array_split(order, MOST_SIZES)
     sizes = np.array([[segment[g].mean(), rest[g].mean()] for g in groups]).T
     return sizes, np.array([len(g) for g in groups], dtype=np.float64)
 
 
-def effect_size(excess: ArrayLike, base: float = 2.0) -> FloatArray:
+def effect_size(excess: ArrayLike) -> FloatArray:
     """Root-mean-square relative change of the pattern probabilities (Cohen's w).
 
     Parameters
     ----------
     excess : array_like, shape (...)
-        Excess Jensen-Shannon divergence; negative values count as none.
-    base : float, default 2
-        Base of the logarithm of `excess`.
+        Excess Jensen-Shannon divergence, bit; negative values count as none.
 
     Returns
     -------
@@ -305,5 +298,5 @@ def effect_size(excess: ArrayLike, base: float = 2.0) -> FloatArray:
         w = sqrt(8·JSD in nats), from JSD ≈ w²/8. By convention 0.1 is small, 0.3 medium and 0.5
         large (J. Cohen, Statistical Power Analysis for the Behavioral Sciences, 1988, 7.2).
     """
-    nats = np.maximum(np.asarray(excess, dtype=np.float64), 0.0) * math.log(base)
+    nats = np.maximum(np.asarray(excess, dtype=np.float64), 0.0) * math.log(2.0)
     return np.asarray(np.sqrt(8.0 * nats))

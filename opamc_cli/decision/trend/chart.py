@@ -36,9 +36,6 @@ USUAL_SPREAD, USUAL_NIGHTS = 0.13, 4.0
 """Standard deviation of healthy nights' log distances on the virtual testbed (0.09 to 0.16), and
 the nights that it counts for: with few nights, their own spread is chance."""
 
-LEAST_SPREAD = 0.065
-"""Half the usual: nights that agree better have not yet seen what nights differ by."""
-
 
 def control_chart(values: FloatArray, healthy: BoolArray, n_baseline: int) -> FloatArray:
     """Chart a series of nights, each judged by nothing that came after it.
@@ -102,4 +99,4 @@ def usual_nights(reference: FloatArray, n_baseline: int) -> tuple[float, float]:
     middle = median(reference)
     own = (MAD_TO_SIGMA * median(np.abs(reference - middle))) ** 2
     variance = (USUAL_NIGHTS * USUAL_SPREAD**2 + n * own) / (USUAL_NIGHTS + n)
-    return n * middle / (n_baseline + n), max(float(np.sqrt(variance)), LEAST_SPREAD)
+    return n * middle / (n_baseline + n), float(np.sqrt(variance))

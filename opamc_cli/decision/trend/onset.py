@@ -7,9 +7,6 @@ from opamc_cli.decision.trend.median import median
 
 FloatArray = NDArray[np.float64]
 
-LEAST_AFTER = 2
-"""Nights that a change must have lasted to have a beginning."""
-
 LEAST_ERROR = 1e-9
 """Of exact series all errors below this are none."""
 
@@ -20,7 +17,7 @@ the damage or more. At the alarms of twelve virtual joints that wear (benchmarks
 power is worse for plain rises."""
 
 
-def onset(nights: FloatArray, values: FloatArray, least: int = LEAST_AFTER) -> int:
+def onset(nights: FloatArray, values: FloatArray) -> int:
     """Return the index of the first night of a change.
 
     Parameters
@@ -30,14 +27,12 @@ def onset(nights: FloatArray, values: FloatArray, least: int = LEAST_AFTER) -> i
     values : ndarray, shape (T,)
         Finite; a level, and from some night on a rise or another level. Nights long after the
         beginning say how it went on, not when it began: leave them out.
-    least : int
-        Nights that the change must have lasted: one, if one night alone tells it for sure.
 
     Returns
     -------
     int
         The night before which a step, a rise at constant speed, or one whose speed grows evenly
-        has as likely begun as after it; 0 for fewer than four nights.
+        has as likely begun as after it; 0 for fewer than two nights.
 
     Notes
     -----
@@ -49,10 +44,10 @@ def onset(nights: FloatArray, values: FloatArray, least: int = LEAST_AFTER) -> i
     52000) the middle is right within five nights for 6, the best for 4.
     """
     n = len(values)
-    if n < 2 * least:
+    if n < 2:
         return 0
     starts, errors = [], []
-    for start in range(1, n - least + 1):
+    for start in range(1, n):
         before, after = values[:start], values[start:]
         level = median(before)
         below = float(np.abs(before - level).sum())

@@ -215,7 +215,7 @@ def _variances(
     show what is least.
     """
     n = healthy.sum(axis=1)[:, np.newaxis]
-    noise = moderated(block.within, 1.0)
+    noise = moderated(block.within)
     dof = n - 1
     squares = np.maximum(healthy @ x**2 - (healthy @ x) ** 2 / np.maximum(n, 1), 0.0)
     typical = squares.mean(axis=1, keepdims=True) / np.maximum(dof, 1)

@@ -168,10 +168,10 @@ def mean_of_known(rows: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.divide(total, n, out=np.full(n.shape, np.nan), where=n > 0), n
 
 
-def moderated(variance: FloatArray, dof: float) -> FloatArray:
+def moderated(variance: FloatArray) -> FloatArray:
     """Blend the variance of each bin, (...), with the mean of all; unknown ones take the mean."""
     known = np.isfinite(variance)
     if not known.any():
         return variance
     typical = float(variance[known].mean())
-    return (PRIOR_DOF * typical + dof * np.where(known, variance, typical)) / (PRIOR_DOF + dof)
+    return (PRIOR_DOF * typical + np.where(known, variance, typical)) / (PRIOR_DOF + 1.0)

@@ -47,10 +47,14 @@ class Evidence(Protocol):
     def effect(self) -> float:
         """Return the relative change beyond the baseline's own; NaN if unknown."""
 
+
+class WitnessEvidence(Evidence, Protocol):
+    """That of a witness beside the patterns."""
+
     def change(self) -> float:
         """Return the relative change beyond the noise of cycles; NaN if it tells no such."""
 
-    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "Evidence":
+    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "WitnessEvidence":
         """Return the same with some of its sessions as the baseline and some as the target."""
 
 

@@ -1,6 +1,5 @@
 """Distance between recording sessions by the ordinal patterns of their envelopes."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -133,14 +132,6 @@ class PatternEvidence:
         """Return the relative change of the pattern probabilities where it is largest."""
         effects = effect_by_cell(self.cells)
         return float(np.nanmax(effects)) if np.isfinite(effects).any() else float("nan")
-
-    def change(self) -> float:
-        """Return NaN: what it knows differs between any two sessions."""
-        return math.nan
-
-    def of_sessions(self, baseline: Sequence[int], target: Sequence[int]) -> "PatternEvidence":
-        """Return the evidence with some of its sessions as the baseline and some as the target."""
-        return PatternEvidence([cell.of_sessions(baseline, target) for cell in self.cells])
 
 
 def effect_by_cell(cells: Sequence[Cell]) -> FloatArray:

@@ -14,9 +14,6 @@ OF_ROBOT = (
 )
 """Kinds of event that follow from the nights of one robot."""
 
-OF_NIGHT = ("judged-anew", "lacking")
-"""Kinds of event that are recorded with a night, of its verdicts and of its baseline."""
-
 OF_START = ("thinned", "stray", "unnamed", "silent", "gathering")
 """Kinds of event that each start finds anew."""
 
@@ -39,9 +36,6 @@ recordings could be used: of another joint of the same night they may have been.
 
 BEHIND = "behind axis {}: "
 """What the reason begins with, behind these, of a joint beside which another comes first."""
-
-DERIVED = (*OF_ROBOT, *OF_NIGHT, "missing")
-"""Kinds of event that follow from the nights; the others were declared by a user."""
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from opamc_cli.decision.trend.chart import (
-    LEAST_SPREAD,
     LIMIT,
     MAD_TO_SIGMA,
     MOST,
@@ -31,7 +30,7 @@ def slow_chart(values, healthy, n_baseline):
             mad = MAD_TO_SIGMA * np.median(np.abs(np.array(usual) - median))
             centre = n * median / (n + n_baseline)
             variance = (USUAL_NIGHTS * USUAL_SPREAD**2 + n * mad**2) / (USUAL_NIGHTS + n)
-            spread = max(np.sqrt(variance), LEAST_SPREAD)
+            spread = np.sqrt(variance)
         shifts.append(np.clip((values[t] - centre) / spread, -MOST, MOST))
         weights = WEIGHT * (1 - WEIGHT) ** np.arange(len(shifts))[::-1]
         scale = np.sqrt(np.sum(weights**2) + 1 / (n_baseline + n + 1))

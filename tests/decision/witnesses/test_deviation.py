@@ -25,8 +25,8 @@ def test_means_and_variances_of_what_is_known_by_hand():
     found = variance_within_sessions(cycles, np.array([0, 0, 1, 1, 2]))
     np.testing.assert_array_equal(found, [5, NAN])
     # four degrees of freedom of the mean of 1 and 3, one of its own
-    np.testing.assert_allclose(moderated(np.array([1.0, NAN, 3.0]), 1.0), [1.8, 2.0, 2.2])
-    assert np.isnan(moderated(np.array([NAN]), 1.0)).all()
+    np.testing.assert_allclose(moderated(np.array([1.0, NAN, 3.0])), [1.8, 2.0, 2.2])
+    assert np.isnan(moderated(np.array([NAN]))).all()
 
 
 def test_the_clearest_part_by_hand():

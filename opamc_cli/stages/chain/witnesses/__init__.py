@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pyarrow as pa
 
 from opamc_cli.config.models import PatternsConfig
-from opamc_cli.decision.witnesses.evidence import Evidence
+from opamc_cli.decision.witnesses.evidence import WitnessEvidence
 from opamc_cli.stages.chain.witnesses import amplitude, profile, spectrum
 from opamc_cli.stages.chain.witnesses.kept_rows import Names
 
@@ -37,7 +37,9 @@ class Witness(Protocol):
     ) -> list[dict[str, Any]]:
         """Return what is kept of a segment, from its current: signed, or an envelope."""
 
-    def evidence(self, baseline: pa.Table, target: pa.Table, axis: int, names: Names) -> Evidence:
+    def evidence(
+        self, baseline: pa.Table, target: pa.Table, axis: int, names: Names
+    ) -> WitnessEvidence:
         """Return the evidence that its tables hold about an axis."""
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.decision.trend.alarm import LATELY, Episode, Night, episodes, nights_to_go
-from opamc_cli.decision.trend.onset import LEAST_AFTER, onset
+from opamc_cli.decision.trend.onset import onset
 from opamc_cli.stages.nightly.alarms.course import JUDGED, days, distances, measured
 from opamc_cli.stages.nightly.alarms.not_judged import do_first, is_own_fault, said_in
 from opamc_cli.stages.nightly.alarms.trend import FALLEN, trend_of, trend_phrase
@@ -177,10 +177,8 @@ def _since(until_raised: Sequence[Mapping[str, Any]], signal: str) -> str:
     seen = measured(until_raised)
     if not seen:
         return signal
-    # one night that raises an alarm by itself is a change, however short
-    least = 1 if signal == str(seen[-1]["night"]) else LEAST_AFTER
-    begun = onset(days(seen), distances(seen), least)
-    # what was there from the first night on has no before; of too few nights no curve tells
+    begun = onset(days(seen), distances(seen))
+    # what was there from the first night on has no before
     return min(str(seen[begun]["night"]), signal) if begun else signal
 
 

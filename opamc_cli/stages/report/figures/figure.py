@@ -119,14 +119,14 @@ def to_svg(drawing: Canvas, name: str) -> str:
     return re.sub(r"\n\s*", "\n", text).strip()
 
 
-def to_png(drawing: Canvas, dots_per_inch: int = 120) -> bytes:
+def to_png(drawing: Canvas) -> bytes:
     """Return a drawing as PNG on the light page's ground, for places that take no SVG."""
     buffer = io.BytesIO()
     FigureCanvasAgg(drawing)
     drawing.savefig(
         buffer,
         format="png",
-        dpi=dots_per_inch,
+        dpi=120,
         facecolor=colour("paper"),
         metadata={"Software": None},
     )
@@ -138,9 +138,9 @@ def short(name: str) -> str:
     return name if len(name) <= MAX_NAME else "…" + name[1 - MAX_NAME :]
 
 
-def grid_shape(n_panels: int, columns: int = 3) -> tuple[int, int]:
+def grid_shape(n_panels: int) -> tuple[int, int]:
     """Return rows and columns for a number of equal panels."""
-    columns = min(columns, max(n_panels, 1))
+    columns = min(3, max(n_panels, 1))
     return -(-max(n_panels, 1) // columns), columns
 
 
