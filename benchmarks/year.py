@@ -274,7 +274,7 @@ def history_of(life: Life, rows: list[Measured], *, chart: bool) -> list[dict[st
             "state": "fault" if one.state == "changed" and not chart else one.state,
             **{"distance": one.distance if chart else None, "common": one.common},
             "p_value": one.p_value if chart else None,
-            **{"harmless": 0, "cause": None, "reason": ""},
+            **{"harmless": 0, "cause": None, "reason": "", "temperature_c": one.temperature_c},
             "baseline": f"{one.payload_kg} {one.night >= life.exchanged_at}"
             if life.exchanged_axis
             else str(one.payload_kg),

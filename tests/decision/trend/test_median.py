@@ -21,10 +21,11 @@ def test_it_is_numpys_to_the_last_digit(n):
 def test_a_chart_and_a_trend_load_no_arrays_with_masks():
     code = (
         "import sys, numpy as np\n"
-        "from opamc_cli.decision.trend import chart, onset, slope\n"
+        "from opamc_cli.decision.trend import chart, onset, slope, temperature\n"
         "nights, values = np.arange(12.0), np.arange(12.0) % 5\n"
         "chart.control_chart(values / 100, values < 9, 6)\n"
         "onset.onset(nights, values)\n"
+        "temperature.without_temperature(nights, values, 20 + values, 20.0)\n"
         "slope.robust_slope(nights, values)\n"
         "sys.exit('numpy.ma' in sys.modules)"
     )

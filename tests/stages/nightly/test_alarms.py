@@ -33,6 +33,7 @@ def nights_of(states, distances=None):
             "common": 0.0,
             "effect": 0.0,
             "p_value": 0.5,
+            "temperature_c": None,
             "cause": None,
             "reason": "no motion" if state == "insufficient-data" else "",
         }
@@ -456,6 +457,23 @@ def test_a_sensors_step_is_forecast_no_more_than_nights_that_stay():
         alarm.text
         == "at fault, changed by 2%; was beyond the fault level of 40% before, not in this night"
     )
+
+
+def test_temperature_is_taken_off_the_trend_where_it_is_logged():
+    rng = np.random.default_rng(4)
+    distances = 0.1 * np.clip(np.arange(30) - 10, 0, None)
+    warmth = 20 + 8 * rng.normal(size=30)
+    series = nights_of(["healthy"] * 12 + ["fault"] * 18, distances.tolist())
+    for row, degrees in zip(series, warmth, strict=True):
+        row["effect"] = 0.1 + row["distance"] / 10 + 0.01 * (degrees - np.median(warmth))
+    alone = json.loads(settled(series).alarms[0].trend)
+    for row, degrees in zip(series, warmth, strict=True):
+        row["temperature_c"] = degrees
+    told = json.loads(settled(series).alarms[0].trend)
+    assert alone["low"] <= 0  # as it was
+    assert (told["per_night"], told["level"]) == pytest.approx((0.01, 0.29), abs=3e-3)
+    # 0.4 is reached 11 nights after the last one
+    assert told["reach"][0] <= 11 <= told["reach"][1] <= 13
 
 
 def nights_excused(*excused, of=12):

@@ -28,6 +28,7 @@ def joint(axis, *nights, program=""):
             "common": 0.0,
             "effect": 0.2,
             "p_value": None if state == LOST else 1e-9 * axis,
+            "temperature_c": None,
             "cause": "payload_change" if state == "changed" else None,
             "reason": reason,
         }

@@ -18,6 +18,7 @@ from opamc_cli.decision.trend.slope import (
     robust_slope,
     slope_of_spread,
 )
+from opamc_cli.decision.trend.temperature import without_temperature
 from opamc_cli.stages.nightly.alarms.course import days, distances
 
 LEAP = math.log(2.0)
@@ -41,22 +42,28 @@ def trend_of(
     """
     changed = np.array([row["night"] >= since for row in rows], dtype=np.bool_)
     healthy = np.array([row["state"] == "healthy" for row in rows], dtype=np.bool_)
-    log_distances = distances(rows)
+    warmth = np.array([row["temperature_c"] for row in rows], dtype=np.float64)
+    logged = warmth[np.isfinite(warmth)]
+    usual = median(logged) if logged.size else math.nan
+    effects, log_distances = np.array([row["effect"] or 0.0 for row in rows]), distances(rows)
+    nights = days(rows)[changed]
+    own = [
+        without_temperature(nights, course[changed], warmth[changed], usual)
+        for course in (effects, log_distances)
+    ]
     centre, spread = usual_nights(log_distances[healthy & ~changed], baseline_nights)
-    nights, since_then = days(rows)[changed], log_distances[changed]
-    effects = np.array([row["effect"] or 0.0 for row in rows])[changed]
-    rough = robust_slope(nights, since_then) or slope_of_spread(nights, since_then, spread)
+    rough = robust_slope(nights, own[1]) or slope_of_spread(nights, own[1], spread)
     step = rough is not None and is_step(rough, centre, spread, float(nights[-1] - nights[0]))
     # nights that follow a step grow by chance as others do, and nobody awaits it of them
     sure = NORMAL_999 if step else NORMAL_90
-    effect, distance = (robust_slope(nights, course, sure) for course in (effects, since_then))
+    effect, distance = (robust_slope(nights, course, sure) for course in own)
     if effect is None or distance is None or not math.isfinite(effect.low + distance.low):
-        few = slope_of_spread(nights, since_then, spread, sure)
+        few = slope_of_spread(nights, log_distances[changed], spread, sure)
         if few is None or not (few.clear or (step and distance is not None)):
             return {}
-        reached = median(effects[-3:]) >= fault_effect
+        reached = median(effects[changed][-3:]) >= fault_effect
         return {"distance": _rounded(few), "reach": [0, 0] if reached else None, "step": step}
-    lately = robust_slope(later_half(nights), later_half(effects), sure)
+    lately = robust_slope(later_half(nights), later_half(own[0]), sure)
     reach = nights_until(effect, fault_effect, lately)
     return {
         "per_night": round(effect.per_night, 6),
