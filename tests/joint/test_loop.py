@@ -379,6 +379,22 @@ def test_a_function_beside_the_names_is_not_closed():
     assert (loop.verdict, loop.remaining_domain) == ("partial", "joint-angle")
 
 
+def test_hum_of_runs_is_found_whatever_their_clocks_say():
+    """Stated starts are no phases of the mains."""
+    runs = [
+        replace(
+            joint_of("cyclic", lambda q, v, a, t, k=k: np.cos(2 * np.pi * 50 * t + 2.2 * k)),
+            name=f"run {k}",
+            started_s=3600.0 * k,
+        )
+        for k in range(3)
+    ]
+    library = {"mains_hum": built_in_library()["mains_hum"]}
+    (step,) = close_loop(fit_declared(runs), library).steps
+    assert step.term.effect.name == "mains_hum"
+    assert step.term.parameters["frequency_hz"] == pytest.approx(50.0, abs=0.01)
+
+
 def test_names_stay_beside_the_functions_that_explain_most(monkeypatch):
     def both(q, v, a, t):
         shapes = [SHAPES[name](q, v, a, t) for name in ("position_drag", "mains_hum")]

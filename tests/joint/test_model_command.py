@@ -706,6 +706,23 @@ def test_the_opposite_sign_of_a_heavy_joint_shows_beside_what_the_others_ask(tmp
     assert closed["opposite_sign"] is True
 
 
+def test_of_a_negative_that_is_driven_as_well_the_sign_is_not_turned(tmp_path, monkeypatch, capsys):
+    """One arm's friction resisted by 109 errors beside an inertia below 0, and drove by 44."""
+    t = np.arange(3000) / 125.0
+    q, beside = 0.8 * np.sin(1.3 * t) + 0.4 * np.sin(2.9 * t + 1), 0.7 * np.sin(1.9 * t + 2)
+    current = 0.5 * np.sin(q) + 0.2 * np.sign(np.gradient(q)) + 4 * np.cos(q + beside)
+    current += 0.02 * np.random.default_rng(1).normal(size=t.size)
+    columns = {"axis1_current": current, "axis1_position": q, "axis3_position": beside}
+    write_run(tmp_path / "run.parquet", 125.0, **columns)
+    for driven, said in (((True, True), False), ((True, False), True)):
+        answers = iter(driven)
+        monkeypatch.setattr(stage, "_drives", lambda fit, answers=answers: next(answers))
+        assert close(tmp_path, "--axis", "1", model=MODEL) == 0
+        assert ("the opposite sign of its motion" in capsys.readouterr().err) == said
+        closed = yaml.safe_load((tmp_path / "out" / "model.yaml").read_text())["closed"]
+        assert bool(closed.get("opposite_sign")) == said
+
+
 @pytest.mark.long
 def test_workers_do_not_change_the_bytes(folder, capsys):
     made = {

@@ -32,7 +32,10 @@ class Elasticity(Effect):
     per = ("rad/s²",)
     searches = ("resonance_hz", "damping")
     forms = ("link",)
-    meaning = "winding up and ringing of the joint: check flexspline stiffness, bolts and the belt"
+    meaning = (
+        "winding up and ringing of the joint or of its load: check flexspline stiffness, bolts and "
+        "belt, and what the load holds loosely"
+    )
     as_smoothing = True
     needs = ("position", "logged")
     from_motion = True

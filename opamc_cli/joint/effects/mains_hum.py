@@ -37,7 +37,8 @@ class MainsHum(Effect):
 
     In a phase's reading the line stands still, so in the torque current it turns against the
     field (`turning`); what all three phases pick up alike does not reach the torque current.
-    Recordings without a common clock have phases of their own.
+    Each recording has phases of its own: the mains run fast and slow, and nobody's clock tells when
+    one began to a thousandth of a second.
     """
 
     name = "mains_hum"
@@ -70,25 +71,25 @@ class MainsHum(Effect):
         return [{"frequency_hz": frequency, "turning": turning} for _, frequency, turning in found]
 
     def first_steps(self, track: Track, parameters: Parameters) -> dict[str, float]:
-        """Half of what two frequencies have to differ by."""
-        return {"frequency_hz": 0.5 / max(float(np.ptp(track.time_s)), 1e-9)}
+        """Half of what two frequencies have to differ by in the longest recording."""
+        return {"frequency_hz": 0.5 / max(float(np.max(track.run_time_s)), 1e-9)}
 
     def limits(self, track: Track) -> dict[str, tuple[float, float]]:
         """Up to the highest frequency that the rate can show."""
         return {"frequency_hz": (4.0, 0.49 * track.rate_hz)}
 
     def columns(self, track: Track, parameters: Parameters) -> Floats:
-        """Sine and cosine of time, against the field or not, for each clock."""
+        """Sine and cosine of time, against the field or not, of each recording."""
         angle = 2 * np.pi * parameters["frequency_hz"] * track.time_s
         waves = [np.cos(angle), np.sin(angle)]
         if parameters.get("turning"):
             assert track.electrical_rad is not None
             field = (np.cos(track.electrical_rad), np.sin(track.electrical_rad))
             waves = [wave * part for wave in waves for part in field]
-        if not track.own_clocks_s:
+        if len(track.starts_s) == 1:
             return stack(*waves)
         started_s = track.time_s - track.run_time_s
-        own = [np.abs(started_s - start_s) < SAME_START_S for start_s in track.own_clocks_s]
+        own = [np.abs(started_s - start_s) < SAME_START_S for start_s in track.starts_s]
         return stack(*(np.where(inside, wave, 0.0) for inside in own for wave in waves))
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:

@@ -227,12 +227,7 @@ def build_track(
             clock = max(recording.started_s - first, clock)
         times.append(clock + piece.time_s)
         clock += piece.size / rate
-    own = len(recordings) > 1 and any(recording.started_s is None for recording in recordings)
-    return replace(
-        joined(pieces),
-        time_s=np.concatenate(times),
-        own_clocks_s=tuple(float(values[0]) for values in times) if own else (),
-    )
+    return replace(joined(pieces), time_s=np.concatenate(times))
 
 
 def moving_beside(recordings: Sequence[Recording]) -> tuple[int, ...]:

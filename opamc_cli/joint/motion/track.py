@@ -101,8 +101,6 @@ class Track:
     current, position, speed and direction as smooth as the acceleration."""
     period_s: float = np.inf
     """Time after which each recording's motion repeats itself, if it does."""
-    own_clocks_s: tuple[float, ...] = ()
-    """`time_s` at which each recording begins, where recordings have no common clock."""
     reference: "Reference | None" = None
     """What regressors are measured by, where it is not to be that of these recordings."""
     guessed_s: tuple[float, ...] = ()

@@ -68,8 +68,8 @@ def judged(term: Term, gain: float, width: int, track: Track) -> Candidate:
     return Candidate(term, gain, float(np.log(left)) + price_of(term, width, track))
 
 
-def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
-    """Choose among the smaller forms of an effect the one that is worth its price."""
+def best_forms(dataset: Dataset, beside: "Beside", full: Term) -> list[Candidate]:
+    """Choose the form that is worth its price; if it follows the model, one that does not, too."""
     effect = full.effect
     (batch,) = batches_of(dataset, [full], fine=True)
     forms = [(full, tuple(range(batch.own.shape[-1])))]
@@ -78,7 +78,9 @@ def best_form(dataset: Dataset, beside: "Beside", full: Term) -> Candidate:
     gains = beside.gains_of_forms(batch, [(term, np.asarray(keep)) for term, keep in forms])
     pairs = zip(forms, gains, strict=True)
     found = [judged(term, gain, len(keep), dataset.fine.track) for (term, keep), gain in pairs]
-    return min(found, key=lambda one: one.score)
+    steady = [one for one in found if one.term.is_constant]
+    best = [min(some, key=lambda one: one.score) for some in (found, steady) if some]
+    return best[: 1 + (best[0] is not best[-1])]
 
 
 class Beside:

@@ -15,7 +15,7 @@ from opamc_cli.joint.name.candidates import (
     Beside,
     Candidate,
     batches_of,
-    best_form,
+    best_forms,
 )
 from opamc_cli.joint.name.chain import (
     HALF,
@@ -159,13 +159,13 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     for effect in free:
         if effect.fast and not effect.untestable(dataset.fine.track):
             for parameters in effect.guesses(dataset.fine.track, residual):
-                found.append(best_form(dataset, fast, Term(effect, parameters)))
-    # Two lines of one kind are two candidates.
+                found += best_forms(dataset, fast, Term(effect, parameters))
+    # Two lines of one kind are two candidates; so is a line that follows the model without it.
     track = dataset.fine.track
-    ordered = _best_of_each(found, lambda term: (term.effect.name, term.form, line_of(term, track)))
+    best = _best_of_each(found, lambda t: (t.effect.name, t.form, line_of(t, track), t.is_constant))
     least = np.inf if every else 0.0
     better = []
-    for candidate in [one for one in ordered if one.score < least][:TRIED]:
+    for candidate in [one for one in best if one.score < least][:TRIED]:
         beside = fast if candidate.term.effect.fast else slow
         trial = beside.candidate(refined(candidate.term, beside))
         if among_fast and beside is slow:

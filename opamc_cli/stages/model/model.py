@@ -225,9 +225,10 @@ def _closed(seed: int, model: JointModelConfig, runs: Sequence[Run], axis: int) 
     if others and not laid.read.opposite and _drives(loop.after):
         negative = lay(model, runs, axis, opposite=True)
         if negative.read.opposite:  # Of phase currents there is none.
-            laid = negative
-            loop = close_loop(laid.fit, laid.library, seed, ways=laid.ways)
-            laid.notes.append(OPPOSITE.format(axis))
+            again = close_loop(negative.fit, negative.library, seed, ways=negative.ways)
+            if not _drives(again.after):  # Or something else than the sign is wrong.
+                laid, loop = negative, again
+                laid.notes.append(OPPOSITE.format(axis))
     if laid.ways.strokes_turned:
         laid.notes.append(TURNED.format(axis, laid.ways.strokes_turned))
     sure = certainty(loop.after)

@@ -83,7 +83,7 @@ def test_a_line_over_time_is_sought_from_one_hertz_to_nearly_half_of_the_rate(
 
 
 def test_a_tone_is_cosine_and_sine_of_time():
-    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]), own_clocks_s=())
+    small = SimpleNamespace(time_s=np.array([0.0, 0.125, 0.25]), starts_s=np.zeros(1))
     columns = Tone().columns(small, {"frequency_hz": 2.0})
     np.testing.assert_allclose(columns, [[1, 0], [0, 1], [-1, 0]], atol=1e-12)
 
@@ -97,7 +97,7 @@ def test_limits_and_first_steps_are_half_of_what_can_be_told_apart(track):
     assert Tone().limits(track) == {"frequency_hz": (0.5, 0.49 * RATE)}
     seconds = np.ptp(track.time_s)
     assert Tone().first_steps(track, {}) == {"frequency_hz": pytest.approx(0.5 / seconds)}
-    still = SimpleNamespace(time_s=np.zeros(1))
+    still = SimpleNamespace(run_time_s=np.zeros(1))
     assert np.isfinite(Tone().first_steps(still, {})["frequency_hz"])
 
 

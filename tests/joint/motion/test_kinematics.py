@@ -126,13 +126,11 @@ def test_recordings_lie_one_after_the_other_on_a_common_clock_if_they_have_one()
     assert track.bounds == ((0, 2000), (2000, 4000))
     assert track.time_s[2000] == 3600.0
     assert track.run_time_s[2000] == 0.0
-    assert track.own_clocks_s == ()
     # one that begins before the other has ended comes after it all the same
     early = Recording("run", RATE, current_a=np.cos(TIME), position_rad=PLACE, started_s=101.0)
     assert build_track([first, early], Joint()).time_s[2000] == 10.0
     unknown = [recorded(position_rad=PLACE)] * 2
-    track = build_track(unknown, Joint())
-    assert track.own_clocks_s == (0.0, 10.0)
+    assert build_track(unknown, Joint()).starts_s.tolist() == [0.0, 10.0]
 
 
 def test_only_what_all_recordings_hold_is_known_of_them():

@@ -6,7 +6,7 @@ from closing import joint_of, plain_fit
 
 from opamc_cli.joint.effects.library import built_in_library
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.name.candidates import Beside, batches_of, best_form
+from opamc_cli.joint.name.candidates import Beside, batches_of, best_forms
 from opamc_cli.joint.name.chain import PRICE, chain_of, extended, price_of
 from opamc_cli.joint.name.search import guessed
 from opamc_cli.signal.motion.smoothing import averaged, block_mean
@@ -104,7 +104,7 @@ def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
     beside = Beside(slow_chain, True)
     full = Term(LIBRARY["asymmetric_friction"], LIBRARY["asymmetric_friction"].guesses(
         dataset.fine.track, np.zeros(dataset.fine.track.size))[0])  # fmt: skip
-    found = best_form(dataset, beside, full)
+    (found,) = best_forms(dataset, beside, full)
     forms = [full] + [
         Term(full.effect, parameters, keep)
         for parameters, keep in full.effect.variants(full.parameters)
@@ -122,6 +122,24 @@ def test_the_best_form_is_the_one_with_the_best_score(slow_chain):
     assert scores[found.term.key] == min(scores.values())
 
 
+@pytest.mark.parametrize("follows", [True, False])
+def test_beside_a_form_that_follows_the_model_the_best_that_does_not_is_tried(follows):
+    """Where the model's current passes zero changes as soon as the line is part of it."""
+
+    def line(q, v, a, t):
+        model = np.stack([a, np.sin(q), np.cos(q), np.sign(v), v], axis=1) @ [0.2, 1, 0.4, 0.5, 0.3]
+        return np.sign(model if follows else v) * np.cos(33 * q)
+
+    chain = chain_of(plain_fit(joint_of("cyclic", line), averaged=False), 0)
+    switches = dict.fromkeys(("speed", "direction", "load", "current"), 1.0)
+    full = Term(LIBRARY["ripple"], {"order": 33.0, **switches})
+    found = best_forms(chain.fit.dataset, Beside(chain, True), full)
+    forms = [one.term.parameters for one in found]
+    assert [bool(form.get("load")) for form in forms] == [True, False][not follows :]
+    assert forms[-1].get("direction")
+    assert found[-1].term.is_constant
+
+
 def test_a_smaller_form_of_the_same_parameters_keeps_its_columns(slow_chain):
     class Padded(type(LIBRARY["stribeck"])):
         """A regressor, and one of noise that a smaller form leaves out."""
@@ -134,5 +152,5 @@ def test_a_smaller_form_of_the_same_parameters_keeps_its_columns(slow_chain):
             return [(parameters, (0,))]
 
     full = Term(Padded(), {"stribeck_speed": 0.15, "exponent": 2.0})
-    found = best_form(slow_chain.fit.dataset, Beside(slow_chain, True), full)
+    (found,) = best_forms(slow_chain.fit.dataset, Beside(slow_chain, True), full)
     assert found.term.keep == (0,)
