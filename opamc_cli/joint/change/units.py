@@ -25,8 +25,8 @@ COURSE_TURNS = {"motor": 1.0, "joint": 0.05}
 that matters is one a turn of the motor, next to nothing is in it (2.5: a third more was left)."""
 
 CORNER_SAMPLES = 2.0
-"""From corner to corner at the median speed: of a log at 50 Hz corners at each turn of the motor hid
-the friction of three of five joints."""
+"""From corner to corner at the median speed: of logs at 50 Hz corners at each turn of the motor hid
+the friction of three joints in five."""
 
 LOST = 2.0
 """Phases whose torque axis was followed wrongly leave this many times the usual residual."""
