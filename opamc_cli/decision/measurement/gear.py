@@ -90,7 +90,9 @@ def _standing_out(
     return line if there and height > LEAST and not doubtful else None
 
 
-def passing_rollers(orders: Sequence[float], resolution: float) -> tuple[int, int] | None:
+def passing_rollers(
+    orders: Sequence[float], resolution: float, ratio: float | None
+) -> tuple[int, int] | None:
     """Find two lines, strongest first, that a damaged bearing of the wave generator has.
 
     Its rolling elements pass a damage some times a turn that are no whole number, as nothing of the
@@ -103,6 +105,8 @@ def passing_rollers(orders: Sequence[float], resolution: float) -> tuple[int, in
         Cycles per revolution of the motor.
     resolution
         As of `told`, by the motor's revolution.
+    ratio
+        Of the gear: a whole number of cycles as the flexspline turns is one, too.
 
     Returns
     -------
@@ -110,6 +114,10 @@ def passing_rollers(orders: Sequence[float], resolution: float) -> tuple[int, in
         Their numbers.
     """
     near = NEAR * resolution
-    odd = [2 * near < one % 1 < 1 - 2 * near and one < HIGHEST_PASSING for one in orders]
+    turning = 1 / (ratio or USUAL_RATIOS[0])
+    odd = [
+        2 * near + turning * int(one) < one % 1 < 1 - 2 * near and one < HIGHEST_PASSING
+        for one in orders
+    ]
     pairs = permutations([k for k, is_odd in enumerate(odd) if is_odd], 2)
     return next((p for p in pairs if abs(abs(orders[p[0]] - orders[p[1]]) - TWICE) < near), None)

@@ -118,7 +118,8 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
 def _rolling(lines: list[Line], track: Track, resolution: float) -> Reading | None:
     """Read the strongest line of the motor's angle that is new as a bearing's, if it may be."""
     new = [line for line in lines if line.reference is None and track.angle_kind == "motor"]
-    pair = passing_rollers([line.order for line in new], resolution)
+    ratio = track.joint.gear_ratio
+    pair = passing_rollers([line.order for line in new], resolution, ratio)
     if pair is None or 0 not in pair:
         return None
     read = read_line(new[0], track, resolution)

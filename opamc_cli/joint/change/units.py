@@ -24,6 +24,10 @@ COURSE_TURNS = {"motor": 1.0, "joint": 0.05}
 """Turns of the machine angle between corners of that load's course: of a ripple, whose lowest order
 that matters is one a turn of the motor, next to nothing is in it (2.5: a third more was left)."""
 
+CORNER_SAMPLES = 2.0
+"""From corner to corner at the median speed: of logs at 50 Hz corners at each turn of the motor hid
+the friction of three joints in five."""
+
 LOST = 2.0
 """Phases whose torque axis was followed wrongly leave this many times the usual residual."""
 
@@ -96,7 +100,9 @@ class Compared:
             own = own_fit(self, terms, fine)[0][:, : columns.shape[1]]
             left = track.current_a - np.einsum("nk,nk->n", columns, own[unit])
             left = np.where(grid.fit, left, np.nan)
-            course = repeated_course(track.machine_angle_rad, left, ways, unit, ~late, spacing)
+            step = float(np.median(np.abs(np.gradient(track.machine_angle_rad))[grid.fit]))
+            apart = max(spacing, CORNER_SAMPLES * step)
+            course = repeated_course(track.machine_angle_rad, left, ways, unit, ~late, apart)
             known = np.isfinite(course)
             if min(np.mean(known[grid.fit & side]) for side in (late, ~late)) < MOSTLY:
                 return self

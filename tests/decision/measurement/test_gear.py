@@ -60,10 +60,12 @@ def test_pole_pairs_are_told_likewise(poles):
         ([2.02, 4.04, 6.06, 8.08], None),  # the mesh's
         ([7.0, 5.0], None),  # whole ones
         ([9.37, 11.9], None),
+        ([6.06, 4.04, 8.1], None),  # the mesh's, as the flexspline turns
         ([29.37, 27.37], None),  # a structure's that rings
         ([9.37], None),
         ([], None),
     ],
 )
 def test_a_bearings_lines_are_odd_and_two_apart(orders, pair):
-    assert passing_rollers(orders, 0.12) == pair
+    assert passing_rollers(orders, 0.05, 100.0) == pair
+    assert passing_rollers(orders, 0.05, None) == pair

@@ -213,3 +213,12 @@ def test_nothing_is_taken_where_strokes_do_not_repeat_or_nobody_knows_the_place(
     shifted = track.machine_angle_rad + np.where(late[track.group], 40.0, 0.0)
     elsewhere = with_track(units, machine_angle_rad=shifted)
     assert elsewhere.less_repeated(TERMS) is elsewhere
+
+
+@pytest.mark.parametrize("ratio", [400.0, 3000.0])
+def test_a_course_has_no_more_corners_than_a_slow_log_tells(ratio):
+    def left(joint):
+        return float(np.mean(own_fit(units_of(joint=joint).less_repeated(TERMS), TERMS)[1]))
+
+    # one turn of the motor and seven a sample: corners on each turn would leave ten times as much
+    assert left(Joint(ratio, 4)) < 2 * left(JOINT)
