@@ -127,8 +127,14 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
     def smoothed() -> tuple[Floats, Floats, Floats]:
         return smoothed_angle(measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0)
 
+    def agreeing() -> Bools:
+        return strong & (
+            _agreement(measured - angle, strong, int(rate_hz / bandwidth) | 1) > AGREED
+        )
+
     angle, velocity, acceleration = smoothed()
-    strong &= _agreement(measured - angle, strong, int(rate_hz / bandwidth) | 1) > AGREED
+    strong = agreeing()
+    angle, velocity, acceleration = smoothed()
     angle_noise = noise / np.maximum(length, 1e-300)
     typical = float(np.median(angle_noise[strong])) if strong.any() else 0.0
     for _ in range(BANDWIDTH_ROUNDS):
@@ -140,7 +146,7 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
         bandwidth = narrower
         angle, velocity, acceleration = smoothed()
     limit = NOISIEST_SHARE * float(np.std(acceleration[strong])) if strong.any() else 0.0
-    clear = strong & (acceleration_noise(1.0, rate_hz, bandwidth) * angle_noise <= limit)
+    clear = agreeing() & (acceleration_noise(1.0, rate_hz, bandwidth) * angle_noise <= limit)
     window = int(rate_hz / bandwidth) | 1
     path = np.where(strong, measured, angle)
     sizes = [int(times * rate_hz / bandwidth) | 1 for times in (0.5, 2)]
