@@ -128,9 +128,8 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
         return smoothed_angle(measured, strong, rough, sure, rate_hz, bandwidth, turn_rad=0.0)
 
     def agreeing() -> Bools:
-        return strong & (
-            _agreement(measured - angle, strong, int(rate_hz / bandwidth) | 1) > AGREED
-        )
+        window = int(rate_hz / bandwidth) | 1
+        return strong & (_agreement(measured - angle, strong, window) > AGREED)
 
     angle, velocity, acceleration = smoothed()
     strong = agreeing()
@@ -159,8 +158,9 @@ def follow_phases(phases_a: Floats, rate_hz: float) -> PhaseAngle:
 def _agreement(apart: Floats, strong: Bools, window: int) -> Floats:
     """How far measured angles agree with the followed one, modulo pi, over a window; 0 to 1."""
     phasors = np.where(strong, np.exp(2j * apart), 0.0)
+    known = uniform_filter1d(1.0 * strong, window, mode="constant")
     mean = np.abs(uniform_filter1d(phasors, window, mode="constant"))
-    return mean / np.maximum(uniform_filter1d(1.0 * strong, window, mode="constant"), 1e-9)
+    return np.asarray(mean / np.maximum(known, 1e-9))
 
 
 def _turning(vector: NDArray[np.complex128], rate_hz: float) -> tuple[Floats, Floats]:
