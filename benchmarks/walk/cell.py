@@ -81,7 +81,8 @@ class Heard:
     """Night in which it was raised, and why it was acknowledged, by robot, program and axis."""
     failed: dict[str, set[str]] = field(default_factory=dict)
     """Why a robot is not judged, without numbers and paths."""
-    unjudged: set[tuple[str, str, int]] = field(default_factory=set)
+    unjudged: set[tuple[str, str, int, str]] = field(default_factory=set)
+    """Joints that were not judged: robot, program, axis and night."""
     rebased: set[str] = field(default_factory=set)
 
 

@@ -112,14 +112,20 @@ def check_robots(
         )
         known = said_before or (before is not None and why <= before)
         demand(known or said.names(robot), f"{robot} is newly not judged: {sorted(why)}")
+    # Of the last night of which any joint is known: one that failed ends no row of nights, and what
+    # was said of a night is known, though a later one has been lost since.
     query = (
-        "SELECT robot, program, axis FROM verdict v WHERE state = 'insufficient-data' AND "
-        "night = (SELECT max(night) FROM night n WHERE n.robot = v.robot)"
+        "SELECT robot, program, axis, night, (SELECT max(night) FROM verdict b WHERE "
+        "b.robot = v.robot AND b.night < v.night) AS before FROM verdict v "
+        "WHERE state = 'insufficient-data' AND "
+        "night = (SELECT max(night) FROM verdict n WHERE n.robot = v.robot)"
     )
-    unjudged = {row for row in world.rows(query) if row[0] in asked_for}
-    for one in unjudged - heard.unjudged:
-        demand(said.names(one[0]), f"{one} is newly not judged")
-    heard.unjudged = {one for one in heard.unjudged if one[0] not in asked_for} | unjudged
+    for *place, last, before in world.rows(query):
+        if place[0] not in asked_for:
+            continue
+        known = {(*place, last), (*place, before)} & heard.unjudged
+        demand(known or said.names(place[0]), f"{place} is newly not judged")
+        heard.unjudged.add((*place, last))
 
 
 def last_of(robot: str, nights: dict[tuple[str, str], tuple[str, str]]) -> str:
