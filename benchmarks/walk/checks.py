@@ -116,14 +116,15 @@ def check_robots(
     # was said of a night is known, though a later one has been lost since.
     query = (
         "SELECT robot, program, axis, night, (SELECT max(night) FROM verdict b WHERE "
-        "b.robot = v.robot AND b.night < v.night) AS before FROM verdict v "
+        "(b.robot, b.program, b.axis) = (v.robot, v.program, v.axis) AND b.night < v.night AND "
+        "b.state <> 'insufficient-data') FROM verdict v "
         "WHERE state = 'insufficient-data' AND "
         "night = (SELECT max(night) FROM verdict n WHERE n.robot = v.robot)"
     )
-    for *place, last, before in world.rows(query):
+    for *place, last, judged in world.rows(query):
         if place[0] not in asked_for:
             continue
-        known = {(*place, last), (*place, before)} & heard.unjudged
+        known = any([*of] == place and (judged or "") < night for *of, night in heard.unjudged)
         demand(known or said.names(place[0]), f"{place} is newly not judged")
         heard.unjudged.add((*place, last))
 
