@@ -5,7 +5,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.motion.track import Floats, Track
 from opamc_cli.signal.motion.smoothing import derivatives
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.filters import answers
 
 LINK_HZ = 20.0
 """Of a motor on the spring alone whose inertia would be the coefficient: a unit, no more."""

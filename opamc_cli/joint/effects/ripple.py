@@ -9,7 +9,7 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.motion.track import Floats, Ints, Track
 from opamc_cli.joint.spectra import highest_order, order_lines
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.filters import answers
 
 SWITCHES = ("speed", "direction", "load", "current")
 DAMPING = 0.4

@@ -4,8 +4,8 @@ import numpy as np
 
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.motion.track import Floats, Track
+from opamc_cli.signal.transform.filters import lagging, late_means
 from opamc_cli.signal.transform.least_squares import solve
-from opamc_cli.signal.transform.second_order import lagging, late_means
 
 SHORTEST_GUESS_S, LONGEST_GUESS_S = 5e-4, 64e-3
 LONGEST_FILTER_S = 8e-3

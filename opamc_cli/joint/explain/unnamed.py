@@ -7,8 +7,8 @@ import numpy as np
 from opamc_cli.joint.effects.base import Effect, Parameters, geometric, stack
 from opamc_cli.joint.effects.hysteresis import Hysteresis
 from opamc_cli.joint.motion.track import Bools, Floats, Ints, Track
+from opamc_cli.signal.transform.filters import answers
 from opamc_cli.signal.transform.least_squares import solve
-from opamc_cli.signal.transform.second_order import answers
 
 DEGREES = (2.0, 4.0, 8.0, 16.0)
 """Cosines over a covariate's range: from a bend to sixteen half waves."""

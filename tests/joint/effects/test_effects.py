@@ -21,7 +21,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.motion.kinematics import Recording, build_track
 from opamc_cli.joint.motion.track import Joint, coarsen
 from opamc_cli.signal.motion.smoothing import averaged, block_mean
-from opamc_cli.signal.transform.second_order import answers, lagging, late_means
+from opamc_cli.signal.transform.filters import answers, lagging, late_means
 
 VOCABULARY = list(built_in_library())
 

@@ -21,7 +21,7 @@ from opamc_cli.joint.explain.unnamed import (
 from opamc_cli.joint.fit.model import Term, fit_terms
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.track import coarsen
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.filters import answers
 
 
 @settings(max_examples=60, deadline=None)

@@ -9,7 +9,7 @@ from opamc_cli.joint.fit.model import Term
 from opamc_cli.joint.name.candidates import Beside
 from opamc_cli.joint.name.chain import chain_of
 from opamc_cli.joint.name.refine import refined
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.filters import answers
 
 LIBRARY = built_in_library()
 

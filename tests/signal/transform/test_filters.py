@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
-from opamc_cli.signal.transform.second_order import answers
+from opamc_cli.signal.transform.filters import answers
 
 RATE_HZ = 250.0
 W, DAMPING = 2 * np.pi * 12.0, 0.1
