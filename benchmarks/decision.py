@@ -13,6 +13,7 @@ knows them to be, so that the decision is measured without the segmentation.
 import argparse
 import hashlib
 import json
+import math
 import multiprocessing
 import pickle
 import tempfile
@@ -394,7 +395,10 @@ def rival_scores(stored, axis: int, baseline: list[str], target: str, seed: int)
 
 
 def add_thesis_scores(results: list[dict]) -> None:
-    """Score by the thesis's LDA, trained on the other half of the robots, normal and severity 1."""
+    """Score by the thesis's LDA, trained on the other half of the robots, normal and severity 1.
+
+    A joint of which no motion fits tells nothing, of no method: it counts as not found.
+    """
     for order in ORDERS:
         name = f"thesis, order {order}"
         for half in (0, 1):
@@ -402,17 +406,21 @@ def add_thesis_scores(results: list[dict]) -> None:
                 r
                 for r in results
                 if r["seed"] // 100 % 2 != half
+                and np.isfinite(r[f"thesis{order}"]).all()
                 and (r["severity"] == 1.0 if r["bad"] else r["severity"] == 0)
             ]
             rows = np.array([r[f"thesis{order}"] for r in train])
             labels = np.array([r["bad"] for r in train])
             if not labels.any() or labels.all():
-                rows = np.array([r[f"thesis{order}"] for r in results])
-                labels = np.array([r["bad"] for r in results])
+                train = [r for r in results if np.isfinite(r[f"thesis{order}"]).all()]
+                rows = np.array([r[f"thesis{order}"] for r in train])
+                labels = np.array([r["bad"] for r in train])
             model = fit(rows, labels)
             for r in results:
                 if r["seed"] // 100 % 2 == half:
                     r["scores"][name] = float(model.project(r[f"thesis{order}"]))
+    for r in results:
+        r["scores"] = {k: v if math.isfinite(v) else -math.inf for k, v in r["scores"].items()}
 
 
 def auc(healthy: NDArray[np.float64], faulty: NDArray[np.float64]) -> float:
