@@ -17,8 +17,8 @@ USUAL = 2.0
 """Standard deviations of the baseline's sessions that are no change."""
 
 MEAN_SQUARE = 1 / 3
-"""Of the summed power of a tapered tone: half of its amplitude's square is 1, of which a Hann
-window puts a quarter each into the bins beside it."""
+"""Of a tone's power, summed over bins: of amplitude 1 it is 1 in its own bin and a quarter in
+either one beside it (Hann), and its mean square is 1/2."""
 
 
 def changed_a(witnesses: Mapping[str, Evidence]) -> float:
@@ -36,13 +36,18 @@ def changed_a(witnesses: Mapping[str, Evidence]) -> float:
     """
     squares = []
     for witness in witnesses.values():
-        n = getattr(witness, "n_baseline", 0)
         if isinstance(witness, ProfileEvidence):
-            courses = [_changed(cell.course * cell.rms_a, n) for cell in witness.cells]
-            of_motions = [float(np.mean(one**2)) for one in courses if one.size]
+            of_motions = [
+                float(np.mean(changed**2))
+                for cell in witness.cells
+                if (changed := _changed(cell.course * cell.rms_a, witness.n_baseline)).size
+            ]
         elif isinstance(witness, SpectrumEvidence):
-            powers = [(_changed(np.exp(cell.sessions), n), cell.frames) for cell in witness.cells]
-            of_motions = [MEAN_SQUARE * float(one.sum()) / k for one, k in powers if one.size]
+            of_motions = [
+                MEAN_SQUARE * float(changed.sum()) / cell.frames
+                for cell in witness.cells
+                if (changed := _changed(np.exp(cell.sessions), witness.n_baseline)).size
+            ]
         else:
             continue
         squares += [np.mean(of_motions)] if of_motions else []

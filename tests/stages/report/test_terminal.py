@@ -419,7 +419,8 @@ def test_the_joint_to_look_at_first_comes_first() -> None:
     assert [title[:6] for title in titles] == ["Axis 2", "Axis 1"]
     # not the farthest, if not by far: the other's current has changed more
     pair[1]["health_index"] = 800.0
-    pair[0]["distance"] = {"ratio": 4.0, "changed_a": 0.1}
+    for entry, changed in zip(pair, (0.1, 0.05), strict=True):
+        entry["distance"] = {"ratio": 4.0, "changed_a": changed}
     titles = [line.plain for line in verdict_lines({"axes": pair}) if "as far" in line.plain]
     assert [title[:6] for title in titles] == ["Axis 1", "Axis 2"]
 

@@ -175,7 +175,9 @@ GAIN = {"effect": "sensor_gain", "origin": "measurement", "explained": 1.0}
         ([("changed", 90.0, 0.2, LOAD), ("fault", 60.0, 0.1, None)], 2),
         ([("changed", 90.0, 0.2, GAIN), ("fault", 60.0, 0.1, None)], 1),
         ([("fault", 60.0, 0.1, None), ("healthy", 900.0, 0.3, None)], 1),
+        # where that is not known of all, the farthest
         ([("fault", 60.0, None, None), ("fault", 90.0, None, None)], 2),
+        ([("fault", 60.0, 0.1, None), ("fault", 90.0, None, None)], 2),
         ([("healthy", 0.1, 0.1, None)], None),
     ],
 )

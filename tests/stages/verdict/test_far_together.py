@@ -82,7 +82,7 @@ def robot(**states):
     names = {"h": "healthy", "c": "changed", "f": "fault"}
     axes = [
         {"axis": axis, "state": names[text[0]], "health_index": float(index)}
-        | {"p_adjusted": 1e-9, "distance": {"effect": 0.9}, "cause": None}
+        | {"p_adjusted": 1e-9, "distance": {"effect": 0.9, "changed_a": 0.01}, "cause": None}
         for axis, (text, index) in enumerate(states.values(), 1)
     ]
     return {"axes": axes}

@@ -96,7 +96,9 @@ def foremost(axes: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """
     found = sorted(filter(_unhealthy, axes), key=_index)
     if len(found) > 1 and _index(found[-1]) <= BY_FAR * max(_index(found[-2]), 0.0):
-        found.sort(key=lambda one: (not _from_outside(one), _changed_a(one), _index(one)))
+        # of joints judged without course and spectrum nobody knows
+        known = None not in map(_changed_a, found)
+        found.sort(key=lambda one: (not _from_outside(one), (_changed_a(one) or 0.0) * known))
     return found[-1] if found else None
 
 
@@ -115,8 +117,8 @@ def _index(entry: Mapping[str, Any]) -> float:
     return float(entry.get("health_index") or 0.0)
 
 
-def _changed_a(entry: Mapping[str, Any]) -> float:
-    return float((entry.get("distance") or {}).get("changed_a") or 0.0)
+def _changed_a(entry: Mapping[str, Any]) -> float | None:
+    return (entry.get("distance") or {}).get("changed_a")
 
 
 def _from_outside(entry: Mapping[str, Any]) -> bool:
