@@ -1,6 +1,6 @@
 """Health of robot-arm joints with strain wave gearing, told from motor current.
 
-For notebooks: ``from opamc_cli import diagnose, close_loop, read_run, …``; see docs/python.md.
+For notebooks: ``from opamc_cli import diagnose, close_loop, read_run, …``; see docs/method.md.
 """
 
 from typing import TYPE_CHECKING, Any

@@ -1,4 +1,4 @@
-"""The stages from Python: what docs/python.md shows, and what a caller gets wrong."""
+"""The stages from Python: what docs/method.md shows, and what a caller gets wrong."""
 
 import re
 import subprocess
@@ -14,7 +14,7 @@ from opamc_cli.storage.files.lock import output_lock
 from opamc_cli.storage.schemas.tables import MOTIONS, PATTERNS, SEGMENTS
 
 ROOT = Path(__file__).parents[1]
-GUIDE = (ROOT / "docs" / "python.md").read_text(encoding="utf-8")
+GUIDE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
 ONE = ROOT / "data" / "samples" / "normal" / "session-000.parquet"
 
 
@@ -34,9 +34,12 @@ def test_the_guides_example_runs(tmp_path, monkeypatch):
     pytest.importorskip("pandas", reason="the guide shows data frames")
     (tmp_path / "data").symlink_to(ROOT / "data")
     monkeypatch.chdir(tmp_path)
-    (example,) = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
+    on_arrays, example = re.findall(r"```python\n(.*?)```", GUIDE, re.DOTALL)
     names: dict[str, object] = {}
-    exec(compile(example, "docs/python.md", "exec"), names)
+    exec(compile(on_arrays, "docs/method.md", "exec"), names)
+    assert [len(cycles) for cycles in names["normal"]] == [2, 3, 3, 3, 3, 3, 3, 3]
+    assert all(one.delta_mu > 0.03 and one.ks > 0.7 for one in names["separation"])
+    exec(compile(example, "docs/method.md", "exec"), names)
     assert names["verdict"]["state"].to_dict() == {1: "healthy", 2: "healthy", 3: "fault"}
     assert names["verdict"].loc[3, "cause"] == "ripple"
     assert names["features"].groupby("axis")["delta_mu"].max().idxmax() == 3
