@@ -103,7 +103,7 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     rolling = _rolling(lines, track, resolution)
     if rolling is not None:
         return rolling
-    poles, comb = _comb(lines, track, resolution)
+    poles, comb = _comb(lines, resolution)
     if comb and track.angle_kind == "electrical":
         return _wave_generator(comb, track, resolution, poles)
     for poles in _turns(track, lines[0]):
@@ -159,7 +159,7 @@ def _turns(track: Track, line: Line) -> list[float]:
     return []
 
 
-def _comb(lines: list[Line], track: Track, resolution: float) -> tuple[float, list[Line]]:
+def _comb(lines: list[Line], resolution: float) -> tuple[float, list[Line]]:
     """Pole pairs and comb, of the strongest and two more, whose line at 2 need not show."""
     best: tuple[float, list[Line]] = (1.0, [])
     slack = 0.25 * resolution
