@@ -17,6 +17,7 @@ from simulator import simulate
 from threadpoolctl import threadpool_limits
 
 from opamc_cli.__main__ import main
+from opamc_cli.errors import ExitCode
 from opamc_cli.joint.motion import kinematics
 from opamc_cli.joint.motion.kinematics import Recording
 from opamc_cli.joint.motion.recordings import grouped_track
@@ -372,10 +373,37 @@ def with_gaps(folder, share):
 
 def test_gaps_are_said(folder, capsys):
     missing = with_gaps(folder, 0.02)
-    assert close(folder, "--axis", "1") == 0
+    assert close(folder, "--axis", "1", "--quiet") == ExitCode.PARTIAL
     said = f"{missing} of 10972 samples lack a number and are left out"
-    assert said in capsys.readouterr().err
-    assert said in json.loads((folder / "out" / "loop.json").read_text())["axes"][0]["notes"][0]
+    assert capsys.readouterr().err.strip().endswith(said)
+    (entry,) = json.loads((folder / "out" / "loop.json").read_text())["axes"]
+    assert said in entry["in_part"][0]
+    assert entry["in_part"][0] in entry["notes"]
+
+
+def test_a_joint_that_not_all_runs_have_is_said(folder, capsys):
+    """It was left out without a word."""
+    table = pq.read_table(folder / "run.parquet")
+    of_second = [name for name in table.column_names if name.startswith("axis2_")]
+    pq.write_table(table.drop_columns(of_second), folder / "lacking.parquet")
+    moved = table.slice(0, table.num_rows - 1000)
+    pq.write_table(moved, folder / "run.parquet")
+    runs = [folder / "run.parquet", folder / "lacking.parquet"]
+    given = ("--out", folder / "out", "--quiet")
+    assert opamc("model", "fit", *runs, *given) == ExitCode.PARTIAL
+    error = capsys.readouterr().err
+    assert "lacking.parquet: has no axis 2, which another run has" in error
+    assert opamc("model", "fit", *runs, *given, "--axis", "1") == ExitCode.DONE
+    assert not capsys.readouterr().err
+
+
+def test_a_neighbour_whose_position_is_lost_is_said(folder, capsys):
+    table = pq.read_table(folder / "run.parquet")
+    lost = pa.array(np.full(table.num_rows, np.nan))
+    pq.write_table(table.append_column("axis3_position", lost), folder / "run.parquet")
+    given = ("--out", folder / "out", "--axis", "1", "--quiet")
+    assert opamc("model", "fit", folder / "run.parquet", *given) == ExitCode.PARTIAL
+    assert "what axis 3 asks of axis 1 is not looked for" in capsys.readouterr().err
 
 
 @pytest.mark.long

@@ -227,12 +227,14 @@ def _on_axes(
 
 def _end(outcome: "Outcome", output: Output, code: ExitCode = ExitCode.DONE) -> None:
     """Say what the recordings lack and what failed, and end, with a code unless something did."""
-    output.notes(list(dict.fromkeys(note for one in outcome.results for note in one["notes"])))
+    in_part = list(dict.fromkeys(text for one in outcome.results for text in one["in_part"]))
+    notes = dict.fromkeys(note for one in outcome.results for note in one["notes"])
+    output.notes([note for note in notes if note not in in_part])
     doubts = dict.fromkeys(doubt for one in outcome.results for doubt in one["doubts"])
     for doubt in doubts if output.quiet else ():
         output.failure(doubt)
-    failed = output.failures([str(error) for error in outcome.errors], len(outcome.results))
-    raise typer.Exit(failed or code)
+    failures = [*(str(error) for error in outcome.errors), *in_part]
+    raise typer.Exit(output.failures(failures, len(outcome.results)) or code)
 
 
 @contextmanager

@@ -192,7 +192,6 @@ def fit(
     *,
     shrinkage: float | None = 0.0,
     conditions: Mapping[str, tuple[float, float]] | None = None,
-    feature_names: Sequence[str] = FEATURE_NAMES,
 ) -> LinearDiscriminant:
     """Train the discriminant on labelled rows.
 
@@ -207,8 +206,6 @@ def fit(
         rows (`correlation_shrinkage`), which is what few rows need.
     conditions : mapping of str to (low, high), optional
         Ranges of the operating conditions of the rows.
-    feature_names : sequence of str
-        Names in the order of the columns.
 
     Returns
     -------
@@ -270,5 +267,4 @@ def fit(
         mean_fault=float(projected[fault].mean()),
         shrinkage=share,
         conditions=dict(conditions or {}),
-        feature_names=tuple(feature_names),
     )

@@ -16,9 +16,6 @@ LEAST_RIDGE = 0.01
 """Of the healthy sessions' mean variance: what they differ by is known to no better than a tenth
 of it, however little their cycles scatter."""
 
-USUAL_RIDGE = 0.1
-"""The same where no session has two cycles to tell the noise by: between that and all of it."""
-
 USUAL_NOISE = 0.7
 """Share of noise in the variance of sessions of one cycle: by nights of four and sixteen cycles, in
 which it is 0.37 and 0.13, it is 0.70 and 0.71."""
@@ -140,7 +137,7 @@ def _of_alike(
         scaled = x[:, np.newaxis] / np.sqrt(variance * x.shape[2])[:, :, np.newaxis]
         expected = np.fmax(variance + noise * (of_own - of_unit), noise * of_own)
     relative = np.where(told, (expected / variance).mean(axis=2), 1.0)
-    ridge = np.where(told, _ridge(noise * of_unit, variance), USUAL_RIDGE)
+    ridge = np.where(told, _ridge(noise * of_unit, variance), USUAL_NOISE / (1 - USUAL_NOISE))
     usable = np.isfinite(variance).all(axis=(1, 2))
     shape = len(blocks), len(own)
     beyond, along = np.full(shape, np.nan), np.full(shape, np.nan)

@@ -27,9 +27,6 @@ SESSIONS_DIFFER = 0.02**2
 LINES_DIFFER = 0.3**2
 """What is then allowed for: 2 % of the slow current, 0.3 in the logarithm of a line's power."""
 
-SMALLEST_LINE_SHARE = 0.15
-"""A line of unknown meaning that carries less of the fast change is a part of something else."""
-
 SMALLEST_POWER = 1e-12
 SMALLEST_SHARE = 0.03
 """What explains less of the change is not worth a maintainer's time."""
@@ -153,7 +150,7 @@ def _explained(sides: list[list[Track]], cycles: bool, library: Library) -> Chan
         for found, gain in zip(slow, gains, strict=True)
     ]
     loaded = any(cause.origin == "load" for cause in causes)
-    causes += _of_lines(periodic, whole, max(fast, held), loaded, library)
+    causes += _of_lines(periodic, whole, loaded, library)
     # A fault is named before what happened to the joint besides, however much that explains.
     causes = sorted(
         (cause for cause in causes if cause.serious or cause.share >= SMALLEST_SHARE),
@@ -186,18 +183,15 @@ def _told(compared: Compared, terms: tuple[Term, ...]) -> Joint | None:
     return None if found == Joint() else found
 
 
-def _of_lines(
-    periodic: list[Reading], whole: float, fast: float, loaded: bool, library: Library
-) -> list[Cause]:
+def _of_lines(periodic: list[Reading], whole: float, loaded: bool, library: Library) -> list[Cause]:
     """Make one cause of the readings of what grew; of a joint `loaded` otherwise more is asked.
 
-    The first tells what it is, the others make it no less. `whole` and `fast` are mean squares,
-    A^2, that have changed in all and beyond slow effects.
+    The first tells what it is, the others make it no less. `whole` is the mean square, A^2, that
+    has changed in all.
     """
     named = []
     for one in periodic:
-        carries = one.kind != "unknown" or one.power >= SMALLEST_LINE_SHARE * fast
-        if one.effect in library and carries:
+        if one.effect in library:
             grown = one.evidence["power_ratio"] >= CLEAR_GROWTH
             clear, share = one.kind == "mesh" and grown, one.power / whole
             enough = share >= FAULT_SHARE and (grown or not loaded)

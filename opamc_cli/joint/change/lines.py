@@ -52,9 +52,8 @@ class Line:
     order: float
     error: float
     """With `order`: with its standard error over units."""
-    reference: float | None
-    """Where the baseline's own line lies, if it has one within two resolutions."""
-    reference_error: float
+    new: bool
+    """Whether the baseline has none there."""
     growth: float
     """Ratio of the powers."""
     excess: float
@@ -191,16 +190,13 @@ def _line(
         np.array([vertex(orders, row[near], int(np.argmax(row[near]))) for row in rows])
         for rows in (spectra.after, spectra.before)
     )
-    # The baseline has a line here if its units agree where it is.
-    scatter = float(np.std(before, ddof=1)) if before.size > 1 else np.inf
-    has_line = scatter < 0.25 * spectra.resolution
     error = float(np.std(after, ddof=1)) if after.size > 1 else 0.1 * spectra.resolution
     error = max(error, 0.05 * spectra.resolution) / np.sqrt(after.size)
     return Line(
         order=float(after.mean()),
         error=error,
-        reference=float(np.median(before)) if has_line else None,
-        reference_error=scatter / np.sqrt(before.size),
+        # The baseline has a line here if its units, two at least, agree where it is.
+        new=float(np.std(before, ddof=1)) >= 0.25 * spectra.resolution,
         growth=float(np.exp(growth)),
         excess=float(excess),
         p_value=float(p_value),

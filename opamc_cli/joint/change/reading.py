@@ -103,7 +103,7 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
     rolling = _rolling(lines, track, resolution)
     if rolling is not None:
         return rolling
-    poles, comb = _comb(lines, track, resolution)
+    poles, comb = _comb(lines, resolution)
     if comb and track.angle_kind == "electrical":
         return _wave_generator(comb, track, resolution, poles)
     for poles in _turns(track, lines[0]):
@@ -117,7 +117,7 @@ def read_lines(lines: list[Line], track: Track, resolution: float) -> Reading:
 
 def _rolling(lines: list[Line], track: Track, resolution: float) -> Reading | None:
     """Read the strongest line of the motor's angle that is new as a bearing's, if it may be."""
-    new = [line for line in lines if line.reference is None and track.angle_kind == "motor"]
+    new = [line for line in lines if line.new and track.angle_kind == "motor"]
     ratio = track.joint.gear_ratio
     pair = passing_rollers([line.order for line in new], resolution, ratio)
     if pair is None or 0 not in pair:
@@ -159,7 +159,7 @@ def _turns(track: Track, line: Line) -> list[float]:
     return []
 
 
-def _comb(lines: list[Line], track: Track, resolution: float) -> tuple[float, list[Line]]:
+def _comb(lines: list[Line], resolution: float) -> tuple[float, list[Line]]:
     """Pole pairs and comb, of the strongest and two more, whose line at 2 need not show."""
     best: tuple[float, list[Line]] = (1.0, [])
     slack = 0.25 * resolution
@@ -175,28 +175,14 @@ def _comb(lines: list[Line], track: Track, resolution: float) -> tuple[float, li
     return best
 
 
-def _corrected(line: Line, poles: float) -> float:
-    """Order per motor turn; where the baseline's own line is known to lie, relative to that.
-
-    The velocity loop's lag grows with the speed, which moves all lines of a stroke a little.
-    """
-    order = line.order * poles
-    if line.reference is None:
-        return order
-    own = line.reference * poles
-    nearest = max(round(own), 1)
-    return order + nearest - own if abs(own - nearest) < 0.01 * nearest else order
-
-
 def _error(line: Line, poles: float, resolution: float) -> float:
     """Give an order's standard error; a changing load moves it a quarter of the resolution."""
-    reference = line.reference_error if line.reference is not None else 0.0
-    return poles * math.hypot(line.error, reference, 0.25 * resolution)
+    return poles * math.hypot(line.error, 0.25 * resolution)
 
 
 def _near(line: Line, poles: float, track: Track, slack: float) -> int | None:
     """Whole number of cycles per turn of the wave generator, in either frame, if there is one."""
-    order = _corrected(line, poles)
+    order = line.order * poles
     ratio = track.joint.gear_ratio or SMALLEST_RATIO
     for k in range(1, HARMONICS + 1):
         if k - slack < order < k * (1 + 1 / ratio) + slack:
@@ -220,16 +206,16 @@ def _passage(line: Line, poles: float, track: Track, resolution: float) -> bool:
     if k is None or k % 2 or track.joint.gear_ratio is None:
         return False
     sharp = 0.75 * resolution * poles
-    order, turned = _corrected(line, poles), k / track.joint.gear_ratio
+    order, turned = line.order * poles, k / track.joint.gear_ratio
     return abs(order - k - turned) < sharp < abs(order - k)
 
 
 def _wave_generator(lines: list[Line], track: Track, resolution: float, poles: float) -> Reading:
     ratio = track.joint.gear_ratio
     place, doubt = _frame(lines, track, resolution, poles)
-    first = ([line for line in lines if abs(_corrected(line, poles) - 2.0) < 0.25] or lines)[0]
+    first = ([line for line in lines if abs(line.order * poles - 2.0) < 0.25] or lines)[0]
     cycles = _near(first, poles, track, 0.25) or 2
-    measured = 2 * _corrected(first, poles) / cycles
+    measured = 2 * first.order * poles / cycles
     # What grows between two recordings is rather damage: in doubt the flexspline is named first.
     if place + doubt > CIRCULAR_BELOW:
         interpretation = FLEXSPLINE
@@ -275,7 +261,7 @@ def _frame(lines: list[Line], track: Track, resolution: float, poles: float) -> 
         k = _near(line, poles, track, min(0.75 * resolution * poles, 0.25))
         if k is not None:
             apart = k / ratio
-            places.append((_corrected(line, poles) - k) / apart)
+            places.append((line.order * poles - k) / apart)
             # the lag that moves a line grows with its frequency
             error = _error(line, poles, resolution) * max(k / 2, 1.0)
             weights.append((apart / error) ** 2)

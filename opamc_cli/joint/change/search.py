@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from opamc_cli.joint.change.reading import Cause
-from opamc_cli.joint.change.slow import Population, Shift, left_by, shift_power, shifts
+from opamc_cli.joint.change.slow import Population, Shift, left_by, shifts
 from opamc_cli.joint.change.units import Compared, own_fit
 from opamc_cli.joint.effects.base import Effect, Parameters
 from opamc_cli.joint.effects.library import Library
@@ -52,8 +52,6 @@ LEAST_HELD = 0.25
 """Of what the model holds of the baseline: 0.08 of noise in a current's place, 0.99 of cracks."""
 
 AS_GOOD, NEARLY_AS_GOOD = 0.95, 0.85
-SMALLEST_SHIFT = 0.01
-"""A shift below this share of the slow current's root mean square is of no interest."""
 
 MOST_CAUSES = 3
 STEEPEST_PER_C = 0.06
@@ -324,7 +322,7 @@ def _next(
 def _likeliest(
     compared: Compared, population: Population, chosen: tuple[Term, ...], candidates: list[Term]
 ) -> dict[str, tuple[float, Shift]]:
-    """Return each effect's likeliest shift that is there, with its p over its part of the level."""
+    """Return each effect's likeliest shift, with its p over its part of the level."""
     guesses = Counter(term.effect.name for term in candidates)
     best: dict[str, tuple[float, Shift]] = {}
     declared = dict(zip(population.names, population.mean, strict=True))
@@ -333,7 +331,6 @@ def _likeliest(
         # What falls by more than there was of it is no friction.
         if name in best or shift.falls > max(declared.get(name, np.inf), 0.0):
             continue
-        if shift_power(compared, shift.last) >= SMALLEST_SHIFT**2 * population.power:
-            part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
-            best[name] = (min(shift.p_value / part, 1.0), shift)
+        part = EXPECTED.get(name, UNEXPECTED / (guesses[name] * len(guesses)))
+        best[name] = (min(shift.p_value / part, 1.0), shift)
     return best

@@ -158,9 +158,9 @@ def deviation_of(error: Floats, counts: Floats) -> Floats:
     return np.asarray(np.sqrt(np.maximum(error, 0.0) * counts))
 
 
-def extended(chain: Chain, *terms: Term, rounds: int = MOST_ROUNDS) -> Chain:
-    """Add terms to a chain and fit all of it anew, in so many rounds at most."""
-    fit = fit_terms(chain.fit.dataset, (*chain.fit.terms, *terms), rounds)
+def extended(chain: Chain, *terms: Term) -> Chain:
+    """Add terms to a chain and fit all of it anew."""
+    fit = fit_terms(chain.fit.dataset, (*chain.fit.terms, *terms))
     return chain_of(fit, chain.added + len(terms))
 
 

@@ -49,7 +49,7 @@ def settled(best: Chain, pool: Pool, unnamed: Pool) -> tuple[Chain, list[Named]]
             alike = term.effect.ties(term.parameters, best.fit.dataset.fine.track)
             ties = tuple(dict.fromkeys((*ties_of(best, term.effect.name, others), *alike)))
             told = tuple(one.told for one in others)
-            named.append(Named(_trial(parent, best, term, pool), told, ties))
+            named.append(Named(_trial(parent, term, pool), told, ties))
     return best, named
 
 
@@ -98,7 +98,7 @@ def _asked_again(best: Chain, place: int, pool: Pool, unnamed: Pool) -> Chain | 
         return parent
     if term.effect.unnamed:
         return None
-    if _trial(parent, best, term, pool).why_not is not None:
+    if _trial(parent, term, pool).why_not is not None:
         passing = [other.chain for other in trials(parent, pool) if other.why_not is None]
         return min(passing, key=lambda chain: chain.score, default=parent)
     if "unnamed" not in pool.without:
@@ -142,7 +142,7 @@ def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> boo
     return share > LEAST_SHARE and t_value > LEAST_T
 
 
-def _trial(parent: Chain, best: Chain, term: Term, pool: Pool) -> Trial:
+def _trial(parent: Chain, term: Term, pool: Pool) -> Trial:
     """Judge an effect as if it were added last: the same chain in another order."""
     chain = extended(parent, term)
     return Trial.of(parent, chain, objection(chain, parent, pool))

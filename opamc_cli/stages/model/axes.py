@@ -17,6 +17,7 @@ from opamc_cli.stages.processes.freed_memory import keep_freed_memory
 from opamc_cli.stages.processes.parallel import Watch, map_items
 from opamc_cli.stages.recordings.axis_recording import axes_of
 from opamc_cli.storage.runs.run import Run
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 Result = TypeVar("Result")
 Runs = Sequence[tuple[str, Path]]
@@ -79,6 +80,16 @@ def on_each_axis(
         if not wanted:
             msg = f"{runs[0].path}: the runs have no axis in common; name one with --axis"
             raise InputError(msg)
+        if not axes and own is None:
+            everywhere = {axis for run in runs for axis in run.axes}
+            errors += [
+                InputError(
+                    f"{run.path}: has no {axes_phrase(sorted(lacking))}, which another run has: "
+                    "left out; name axes with --axis, or give runs that have them"
+                )
+                for run in runs
+                if (lacking := everywhere - set(run.axes))
+            ]
     done = map_items(partial(_on_axis, work, model, usable), wanted, jobs, watch)
     for failed in done.errors:
         if isinstance(failed, ConfigError):

@@ -63,6 +63,12 @@ class AxisRecordings:
     """What the runs lack."""
     doubts: list[str]
     """Of the notes those that say that a run is wrong."""
+    in_part: list[str]
+    """Those that say that a part of a run is left out."""
+
+    def said(self) -> dict[str, list[str]]:
+        """Return all of these by name."""
+        return {"notes": self.notes, "doubts": self.doubts, "in_part": self.in_part}
 
 
 @dataclass(frozen=True)
@@ -232,13 +238,15 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         if recording.size < 64:
             msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
             raise NotEnoughDataError(msg)
-    notes = [note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, one)]
+    in_part = [
+        note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, axis, one)
+    ]
     doubts = [
         note for run, one in zip(runs, recordings, strict=True) for note in mistaken(run, axis, one)
     ]
     recordings, commanded = _without_commands(runs, axis, recordings)
     doubts += commanded
-    notes += doubts
+    notes = [*in_part, *doubts]
     logged = [(one.current_a, one.position_rad) for one in recordings if one.phases_a is None]
     pairs = [(x, q) for x, q in logged if x is not None and q is not None]
     signed = len(pairs) == len(recordings)
@@ -253,7 +261,8 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
         ]
     if all(recording.started_s is not None for recording in recordings):
         recordings.sort(key=lambda recording: recording.started_s or 0.0)
-    return AxisRecordings(recordings, units.pop(), signed and bool(opposite), notes, doubts)
+    signs = signed and bool(opposite)
+    return AxisRecordings(recordings, units.pop(), signs, notes, doubts, in_part)
 
 
 def _without_commands(

@@ -125,11 +125,8 @@ def _on_axis(model: JointModelConfig, runs: Sequence[Run], axis: int) -> dict[st
             if _is_opposed(applied, _within(applied, place))
         ],
         "not_applied": left_out,
-        "notes": [
-            *read.notes,
-            *([UNTOLD.format(axis)] if known is None else []),
-        ],
-        "doubts": read.doubts,
+        **read.said(),
+        "notes": [*read.notes, *([UNTOLD.format(axis)] if known is None else [])],
     }
 
 

@@ -147,8 +147,7 @@ def _traced(model: JointModelConfig, runs: Sequence[Run], axis: int) -> tuple[En
             }
             for trial in tried
         ],
-        "notes": laid.notes,
-        "doubts": laid.read.doubts,
+        **laid.read.said(),
         "untestable": [
             {"effect": name, "why": why} for name, why in untestable(base, laid.library).items()
         ],

@@ -119,8 +119,7 @@ def fit_summary(laid: AxisModel, result: Fit, known: Certainty) -> dict[str, Any
         "unit": laid.unit,
         "groups": _groups_entry(laid.dataset),
         "condition_number": known.condition_number,
-        "notes": laid.notes,
-        "doubts": laid.read.doubts,
+        **laid.read.said(),
         "inseparable": [list(names) for names in known.inseparable],
         "rmse_a": result.rmse(sealed=False),
         "terms": [
@@ -349,8 +348,7 @@ def loop_entry(laid: AxisModel, loop: Loop) -> dict[str, Any]:
         "groups": grouping.kind,
         "orders": _orders(loop.after.dataset.fine.track),
         "fails": _failure(loop),
-        "notes": laid.notes,
-        "doubts": laid.read.doubts,
+        **laid.read.said(),
     }
 
 

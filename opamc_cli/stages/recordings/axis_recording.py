@@ -122,8 +122,8 @@ def positions_beside(run: Run, axis: int) -> dict[int, Array]:
     }
 
 
-def gaps(run: Run, recording: Recording) -> list[str]:
-    """Say how much of a recording is left out because a channel that is needed lacks a number."""
+def gaps(run: Run, axis: int, recording: Recording) -> list[str]:
+    """Say how much of a recording is left out because a channel lacks a number."""
     channels = (
         recording.current_a,
         recording.phases_a,
@@ -135,9 +135,15 @@ def gaps(run: Run, recording: Recording) -> list[str]:
         if values is not None:
             missing |= ~np.isfinite(values).reshape(recording.size, -1).all(axis=1)
     count = np.count_nonzero(missing)
-    if not count:
-        return []
-    return [f"{run.path}: {count} of {missing.size} samples lack a number and are left out"]
+    said = [
+        f"{run.path}: column {name} mostly holds no number: what axis {other} asks of axis {axis} "
+        "is not looked for"
+        for other, name in run.positions.items()
+        if other not in (axis, *recording.others_rad)
+    ]
+    if count:
+        said.append(f"{run.path}: {count} of {missing.size} samples lack a number and are left out")
+    return said
 
 
 def interpolated(recording: Recording, least_hz: float) -> Recording:

@@ -39,6 +39,20 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
     InputError
         If it is missing, damaged or not of its format, or a library to read it is not installed.
     """
+    require_recording(path)
+    with ExitStack() as stack:
+        with _readable(path):
+            source = stack.enter_context(_opened(path, channels))
+        yield _Guarded(path, source)
+
+
+def require_recording(path: Path) -> None:
+    """Refuse what is no file that may be opened, or an empty one.
+
+    Raises
+    ------
+    InputError
+    """
     if any("\ud800" <= sign <= "\udfff" for sign in str(path)):
         msg = f"{str(path)!r}: its name is not UTF-8; rename it"
         raise InputError(msg)
@@ -53,10 +67,6 @@ def open_source(path: Path, channels: IngestMap) -> Iterator[Source]:
     if path.is_file() and path.stat().st_size == 0:
         msg = f"{path}: is empty (0 bytes); record it again"
         raise InputError(msg)
-    with ExitStack() as stack:
-        with _readable(path):
-            source = stack.enter_context(_opened(path, channels))
-        yield _Guarded(path, source)
 
 
 def _opened(path: Path, channels: IngestMap) -> AbstractContextManager[Source]:

@@ -238,7 +238,7 @@ def _damaged_mesh(c: AxisConstants, windup: float, turn: float) -> tuple[float, 
 
 
 @njit(cache=True, nogil=True)
-def _dead_time(alpha: float, beta: float, ux: float, uy: float, size: float) -> tuple[float, float]:
+def _dead_time(alpha: float, beta: float, size: float) -> tuple[float, float]:
     """Return the current distortion of dead time: fifth, seventh and higher harmonics.
 
     Each phase's error has the sign of its current; the current loop takes out the fundamental,
@@ -447,7 +447,7 @@ def run_axis(
                 alpha, beta = current * ux, current * uy
                 shown = current
                 if c.fx_dead_time != 0.0:
-                    da, db = _dead_time(alpha, beta, ux, uy, c.fx_dead_time)
+                    da, db = _dead_time(alpha, beta, c.fx_dead_time)
                     alpha += da
                     beta += db
                     shown += da * ux + db * uy

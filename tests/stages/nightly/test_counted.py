@@ -12,7 +12,7 @@ import pytest
 from cell_logs import night
 
 from opamc_cli.errors import ExitCode
-from opamc_cli.stages.nightly.settle import _missing
+from opamc_cli.stages.nightly.alarms.missing import missing
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
 from opamc_cli.storage.history.rows import NightRow
@@ -82,7 +82,7 @@ def test_a_usual_day_of_rest_is_none_without_recordings(tmp_path):
         with History(tmp_path / f"{days}.sqlite") as history:
             for row in [*nights["r1"], *nights["r2"]]:
                 history.record_night(row)
-            history.replace_missing(_missing(nights, {}, 7))
+            history.replace_missing(missing(nights, {}, 7))
             (robot, _) = summarise(history).robots
         assert (robot.of_last_night or "healthy", robot.unwatched) == (state, state == "missing")
 

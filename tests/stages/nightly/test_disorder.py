@@ -14,8 +14,8 @@ from cell_logs import night
 
 from opamc_cli.config.cell import load_cell
 from opamc_cli.errors import ExitCode
+from opamc_cli.stages.nightly.alarms.missing import missing
 from opamc_cli.stages.nightly.morning import silent
-from opamc_cli.stages.nightly.settle import _missing
 from opamc_cli.stages.nightly.start import run as stage
 from opamc_cli.stages.nightly.summary import summarise
 from opamc_cli.storage.history.history import History
@@ -99,7 +99,7 @@ def test_robots_without_files_are_one_line_and_reminded_of(cell, logs, opamc):
         assert (gone in said) == (index in (7, 14))
 
 
-def missing(own, days=70):
+def lacks(own, days=70):
     """Return what is said of a robot with files of some days, beside one that has files of all."""
 
     def nights(name, of):
@@ -112,30 +112,30 @@ def missing(own, days=70):
         ]
 
     rows = {"r1": nights("r1", own), "r2": nights("r2", range(days))}
-    return [(event.time, event.text) for event in _missing(rows, {}, 7)]
+    return [(event.time, event.text) for event in missing(rows, {}, 7)]
 
 
 def test_the_weekday_on_which_a_robot_rests_is_not_said_for_ever():
     rests = [day for day in range(1, 70) if day % 7]
-    said = missing(rests)
+    said = lacks(rests)
     assert [time for time, _ in said] == [f"2026-03-{day:02d}" for day in (8, 15, 22, 29)]
     habit = "others have some, as in the 3 weeks before; this weekday is not said again"
     assert said[-1][1] == f"no file of 2026-03-29; {habit}"
     # so with weekends, but not with what goes on after them, nor with another day
     weekends = [day for day in range(1, 70) if day % 7 not in (0, 6)]
-    assert [time for time, _ in missing(weekends)] == [f"2026-03-{n:02d}" for n in (7, 14, 21, 28)]
-    assert len({text for _, text in missing([day for day in rests if day != 57])}) == 5
-    assert len(missing([day for day in rests if day != 53])) == 5
+    assert [time for time, _ in lacks(weekends)] == [f"2026-03-{n:02d}" for n in (7, 14, 21, 28)]
+    assert len({text for _, text in lacks([day for day in rests if day != 57])}) == 5
+    assert len(lacks([day for day in rests if day != 53])) == 5
     # weeks without any file are no habit
     back = [day for day in range(1, 70) if not 7 <= day < 42 and day != 49]
-    assert missing(back)[-1] == ("2026-04-19", "no file of 2026-04-19; others have some")
+    assert lacks(back)[-1] == ("2026-04-19", "no file of 2026-04-19; others have some")
 
 
 def test_a_robot_that_is_dead_after_its_free_day_is_said_again_once():
     """Off on Saturday 7 March, dead from Monday on: nothing was said until Saturday 14."""
 
     def times(own):
-        return [time[-2:] for time, _ in missing(own, days=17)]
+        return [time[-2:] for time, _ in lacks(own, days=17)]
 
     assert times(range(1, 6)) == ["07", "09", "16"]
     # dead from Friday on is said once, whatever days follow
@@ -594,10 +594,10 @@ def test_a_file_that_the_system_refuses_to_read_is_not_remembered(tmp_path):
 def test_a_robot_without_files_whose_clock_is_a_year_off_is_told_so():
     """Its night was judged, and kept as one of last year's, without a word."""
     told = "; it has files of 2025-03-11: is its clock a year off?"
-    said = missing([-355, *range(10), *range(11, 70)])
+    said = lacks([-355, *range(10), *range(11, 70)])
     assert said == [("2026-03-11", f"no file of 2026-03-11; others have some{told}")]
     # one that recorded about that day, too, was there a year ago
-    said = missing([*range(-370, -340), *range(10), *range(11, 70)])
+    said = lacks([*range(-370, -340), *range(10), *range(11, 70)])
     assert ("2026-03-11", "no file of 2026-03-11; others have some") in said
     # and one that has no other night is no reason to give up
-    assert missing([-355])[0][1].startswith("no file of 2026-03-01")
+    assert lacks([-355])[0][1].startswith("no file of 2026-03-01")

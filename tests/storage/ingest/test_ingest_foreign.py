@@ -230,6 +230,11 @@ def test_guesses_that_cannot_be_made_are_refused(tmp_path):
     text.write_text("time,height\n0.00,1\n0.01,2\n0.02,3\n0.03,4\n")
     with pytest.raises(InputError, match="no channel looks like a motor current"):
         guess_map([text])
+    text.write_text("")
+    with pytest.raises(InputError, match="is empty"):
+        guess_map([text])
+    with pytest.raises(InputError, match=r"none.csv: no such file; check the path"):
+        guess_map([tmp_path / "none.csv"])
     with pytest.raises(InputError, match="ending does not tell"):
         guess_map([tmp_path / "log.xyz"])
 

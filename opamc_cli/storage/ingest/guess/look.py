@@ -19,7 +19,7 @@ from opamc_cli.storage.ingest.guess.names import Meant, counts_time, meanings
 from opamc_cli.storage.ingest.guess.values import Guess, are_phases, time_unit
 from opamc_cli.storage.ingest.map.map_file import ColumnMap, IngestMap
 from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion
-from opamc_cli.storage.ingest.opening import open_source
+from opamc_cli.storage.ingest.opening import open_source, require_recording
 from opamc_cli.storage.ingest.source import Array, Name, Rate, Selection, Source
 from opamc_cli.storage.schemas.channels import CURRENTS, Conversion
 
@@ -64,6 +64,7 @@ def look_at(path: Path, encoding: str | None = None) -> Look:
     if kind is None:
         msg = f"{path}: its ending does not tell the format; known: {known_endings()}"
         raise InputError(msg)
+    require_recording(path)
     layout = text_layout(path, encoding) if kind == "csv" else None
     with open_source(path, any_map(kind, layout)) as source:
         # a joint's name is safer than its place in a message
