@@ -210,7 +210,7 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     assert loop["axis"] == 1
     assert loop["declared"] == ["inertia", "gravity", "coulomb", "viscous"]
     assert loop["verdict"] == "closed"
-    assert loop["sealed"] == ["run:2", "run:5"]
+    assert loop["sealed"] == ["run:2", "run:4"]
     step = loop["steps"][0]
     assert step["effect"] == "stribeck"
     assert step["domain"] == "velocity"
