@@ -215,6 +215,19 @@ def test_presliding_is_no_fault_and_has_no_name(seed):
     assert loop.rmse_after_a < 1.1 * made.noise_rms
 
 
+@pytest.mark.parametrize(("builds_up", "verdict"), [(20.0, "closed"), (80.0, "partial")])
+def test_presliding_beside_a_name_leaves_closed_as_long_as_the_name_reaches_the_ceiling(
+    builds_up, verdict
+):
+    made = simulate(3, (), rate=250.0, cycles=8, kind="quintic")
+    hum = 5 * np.sin(2 * np.pi * 50 * np.arange(made.position.size) / 250)
+    beside = hum + builds_up * dahl_state(made.position, 3e-4)
+    _, loop = close_recording(made, made.current + made.noise_rms * beside)
+    assert {s.term.effect.name for s in loop.steps} == {"mains_hum", "unnamed_presliding"}
+    assert loop.verdict == verdict
+    assert (loop.explained_share >= 0.9) == (verdict == "closed")
+
+
 def dead_zone(made):
     """A drive's dead zone: each ampere that it asks for begins above the same small one."""
     return np.sign(np.convolve(made.current, np.ones(15), mode="same"))

@@ -165,6 +165,23 @@ def test_a_declared_viscous_friction_that_drives_is_doubted(viscous, tmp_path, c
     assert said == (viscous < 0)
 
 
+@pytest.mark.parametrize("built_up", [0.9, 0.1])
+def test_dry_friction_that_builds_up_over_a_way_resists_beside_a_negative_rest(
+    built_up, tmp_path, capsys
+):
+    """Of a joint with presliding the declared part alone is below zero, and was doubted."""
+    position, speed, acceleration = moved("cyclic", rate=250.0)
+    state, z = np.zeros(speed.size), 0.0
+    for k, step in enumerate(np.diff(position, prepend=position[0])):
+        state[k] = z = np.sign(step) + (z - np.sign(step)) * np.exp(-abs(step) / 0.05)
+    current = 0.2 * acceleration + np.sin(position) - 0.3 * np.sign(speed) + 0.7 * speed
+    current += built_up * state + np.random.default_rng(7).normal(0.0, 0.02, speed.size)
+    write_run(tmp_path / "run.parquet", 250.0, axis1_current=current, axis1_position=position)
+    close(tmp_path, "--quiet", model=MODEL)
+    said = "the declared coulomb drives the joint" in capsys.readouterr().err
+    assert said == (built_up < 0.3)
+
+
 @pytest.mark.parametrize("declared", ["coulomb, stribeck", "coulomb, viscous, stribeck"])
 def test_a_declared_friction_that_drives_is_doubted(declared, tmp_path, capsys):
     """A Stribeck curve below zero stood for a viscous friction, and nothing was said to lack."""
@@ -194,7 +211,7 @@ def test_close_writes_the_loop_the_tables_and_the_extended_model(folder, capsys)
     assert loop["axis"] == 1
     assert loop["declared"] == ["inertia", "gravity", "coulomb", "viscous"]
     assert loop["verdict"] == "closed"
-    assert loop["sealed"] == ["run:2", "run:5"]
+    assert loop["sealed"] == ["run:2", "run:4"]
     step = loop["steps"][0]
     assert step["effect"] == "stribeck"
     assert step["domain"] == "velocity"

@@ -167,9 +167,10 @@ class Ripple(Effect):
         return [parameters | {"order": other} for other in beside if other > ASIDE[-1] * width]
 
     def ties(self, parameters: Parameters, track: Track) -> tuple[str, ...]:
-        """Tell what the current sensors, where nothing else is logged, may do at such an order."""
+        """Tell what current sensors do at such an order: alone, or by what a drive answers."""
         found = OF_A_SENSOR.get(read_order(parameters["order"], track).kind)
-        return () if found is None or "logged" in track.channels else (found,)
+        itself = "logged" in track.channels and not parameters.get("answer")
+        return () if found is None or itself else (found,)
 
     def interpretation(self, parameters: Parameters, track: Track) -> str:
         """Read the order with the gear ratio and pole pairs that are known."""

@@ -66,7 +66,7 @@ def drag_t(fit: Fit) -> float:
     direction = grid.track.direction[grid.parts.rows]
     weights = [
         direction @ grid.parts.taken(dataset.columns(term, fine=True)) / direction.size
-        if term.effect.domain == "velocity" or term.effect.follows_load
+        if term.effect.resists or term.effect.domain == "velocity"
         else np.zeros(values.size)
         for term, values in zip(fit.terms, fit.coefficients, strict=True)
     ]

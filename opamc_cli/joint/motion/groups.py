@@ -13,7 +13,8 @@ that is sealed, half of that is predicted by the wrong one."""
 SEALED_BLOCKS = (2, 5, 9)
 """Of every twelve. Neither the first nor the last, and not evenly spaced: of a programme of four
 motions that was run three times, every fourth block is the same motion, which nothing open would
-have shown, and the last may be all that there is of a payload, a temperature or a speed."""
+have shown, and the last may be all that there is of a payload, a temperature or a speed: where it
+would be sealed, the one before it is."""
 FEWEST_RUNS = 4
 """Sealed as wholes: of two, a way there and a way back, one alone would show no friction."""
 FEWEST_MOVING = 20 * BLOCKS
@@ -73,7 +74,7 @@ def _cycles(start: int, stop: int, name: str, period: int) -> list[tuple[int, in
 
 
 def _sealed(count: int) -> tuple[int, ...]:
-    return tuple(k for k in range(count) if k % BLOCKS in SEALED_BLOCKS)
+    return tuple(min(k, count - 2) for k in range(count) if k % BLOCKS in SEALED_BLOCKS)
 
 
 def _blocks(

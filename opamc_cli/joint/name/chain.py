@@ -99,8 +99,10 @@ class Chain:
         pairs, grid = self._valued, self.fit.dataset.fine
         way, speed = np.unique(grid.track.direction[grid.fit]), np.abs(grid.track.velocity)
         usual = float(np.median(speed[grid.fit])) if way.size else 0.0
-        # At one speed dry and viscous friction are one, and of one way an offset is both.
+        # At one speed dry and viscous friction are one, and of one way an offset is both; what has
+        # built up over a way is dry friction.
         share = {"coulomb": 1.0, "viscous": usual, "offset": float(way.sum()) * (way.size == 1)}
+        share |= dict.fromkeys(("hysteresis", "unnamed_presliding"), 1.0)
         dry = sum(share.get(term.effect.name, 0.0) * float(values[0]) for term, values in pairs)
         return [
             term.effect.plausible(values, term.parameters)

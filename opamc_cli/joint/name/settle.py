@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from operator import itemgetter
 
 from opamc_cli.joint.fit.model import Term
-from opamc_cli.joint.name.chain import EXACT, PRICE, Chain, extended, without
+from opamc_cli.joint.name.chain import EXACT, HALF, PRICE, Chain, extended, without
 from opamc_cli.joint.name.search import LEAST_SHARE, Pool, Trial, Tried, objection, trials
 from opamc_cli.joint.name.significance import LEAST_T, paired
 
@@ -126,12 +126,15 @@ def _rivals_of(term: Term, unnamed: Pool) -> Pool:
 def _takes_the_name(rival: Chain, best: Chain, parent: Chain, term: Term) -> bool:
     """Whether a smooth function without a name stands in the place of an effect.
 
-    Where a smooth function does as well as a line (another joint's motion is none), it is no line.
-    A name that holds nine tenths of what it explains stays: the rest is asked for beside it.
+    Where a smooth function does as well as a line (another joint's motion is none), it is no line,
+    but for one that still takes half of it beside the function: that explains something else. A
+    name that holds nine tenths of what it explains stays: the rest is asked for beside it.
     """
     difference, error = paired(rival.deviation, best.deviation)
     if term.effect.fast and term.effect.domain != "acceleration":
-        return rival.score < best.score + LEAST_SHARE and difference > -LEAST_T * error
+        alike = rival.score < best.score + LEAST_SHARE and difference > -LEAST_T * error
+        kept = HALF * (parent.score - best.score)
+        return alike and rival.score - extended(rival, term).score < kept
     if rival.score >= best.score - LEAST_SHARE or difference <= LEAST_T * error:
         return False
     named, explained = (parent.mean_square - one.mean_square for one in (best, rival))

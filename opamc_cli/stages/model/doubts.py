@@ -135,10 +135,17 @@ def doubts_of(
     doubts: list[str] = []
     if (placed := sorted(found & OF_THE_PLACE)) and (gaps := track.guessed_s):
         doubts.append(DOUBTED.format(axis, " and ".join(placed), len(gaps), sum(gaps)))
+    # What builds up over a way is dry friction from there on, of which coulomb is a part.
+    built_up = sum(
+        float(values[0])
+        for term, values in zip(loop.after.terms, loop.after.coefficients, strict=True)
+        if term.effect.resists and term.effect.domain == ANGLE and not term.effect.at_a_place
+    )
     declared = zip(loop.before.terms, loop.after.coefficients, sure.standard_errors, strict=False)
     for term, values, errors in declared:
         resists = term.effect.resists and not term.effect.at_a_place
-        if resists and values[0] < -DRIVEN_T * errors[0]:
+        drag = values[0] + built_up * (term.effect.name == "coulomb")
+        if resists and drag < -DRIVEN_T * errors[0]:
             given = "; check its parameters, or give them" if term.parameters else ""
             doubts.append(DRIVES.format(axis, term.effect.name) + given)
     orders = [step.term.parameters["order"] for step in loop.steps if _is_ripple(step.term)]

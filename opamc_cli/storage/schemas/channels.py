@@ -44,7 +44,10 @@ LOGGED = {
             "deg": Conversion(math.pi / 180),
             "rev": Conversion(2 * math.pi),
         },
-        ("pos", "position", "positions", "angle", "angles", "q", "phi", "theta", "enc"),
+        (
+            *("pos", "position", "positions", "angle", "angles", "q", "phi", "theta", "enc"),
+            *("lage", "winkel"),
+        ),
         vague=True,
     ),
     "velocity": Channel(
@@ -55,7 +58,10 @@ LOGGED = {
             "rpm": Conversion(2 * math.pi / 60),
             "rev/s": Conversion(2 * math.pi),
         },
-        ("vel", "velocity", "velocities", "speed", "speeds", "qd", "dq", "omega", "qdot"),
+        (
+            *("vel", "velocity", "velocities", "speed", "speeds", "qd", "dq", "omega", "qdot"),
+            "drehzahl",
+        ),
     ),
     "temperature": Channel(
         "temperature_c",
@@ -64,7 +70,7 @@ LOGGED = {
             "K": Conversion(1.0, -273.15),
             "degF": Conversion(5 / 9, -160 / 9),
         },
-        ("temp", "temps", "temperature", "temperatures"),
+        ("temp", "temps", "temperature", "temperatures", "temperatur"),
     ),
 }
 """By name and quantity, in the order in which a map lists them."""

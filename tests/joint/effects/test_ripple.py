@@ -129,6 +129,8 @@ def test_a_line_of_the_current_sensors_is_tied_with_them_where_they_tell_the_mot
     assert Ripple().ties({"order": order}, track) == ()
     alone = replace(track, channels=track.channels - {"logged"})
     assert Ripple().ties({"order": order}, alone) == effects
+    # Or where a drive answers the torque that they make of its current.
+    assert Ripple().ties({"order": order, "answer": 0.5}, track) == effects
 
 
 @pytest.mark.parametrize("order", [1.0, 1.98, 2.0, 2.01, 2.02, 4.0])

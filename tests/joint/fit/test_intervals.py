@@ -8,7 +8,7 @@ from closing import joint_of, plain_fit
 from scipy.stats import t as student
 
 from opamc_cli.joint.effects.library import built_in_library
-from opamc_cli.joint.fit.intervals import certainty
+from opamc_cli.joint.fit.intervals import certainty, drag_t
 from opamc_cli.joint.fit.model import Term, dataset_of, fit_terms
 from opamc_cli.joint.motion.recordings import grouped_track
 from opamc_cli.joint.motion.track import Joint
@@ -85,3 +85,15 @@ def test_nothing_fitted_is_nothing_to_be_certain_of():
     fitted = plain_fit(joint_of("cyclic", None, rate=100.0), ())
     known = certainty(fitted)
     assert (known.standard_errors, known.inseparable, known.condition_number) == ((), (), 1.0)
+
+
+@pytest.mark.parametrize("built_up", [1.0, 0.3])
+def test_friction_that_builds_up_after_a_reversal_resists_too(built_up):
+    recording = joint_of("cyclic", None, rate=100.0)
+    track, grouping = grouped_track([recording], Joint())
+    terms = (Term(LIBRARY["coulomb"], {}), Term(LIBRARY["hysteresis"], {"length_rad": 0.02}))
+    columns = np.concatenate([term.columns(track) for term in terms], axis=1)
+    noise = np.random.default_rng(1).normal(0.0, 0.02, track.size)
+    current = columns @ np.array([-0.6, built_up]) + noise
+    fitted = fit_terms(dataset_of(replace(track, current_a=current), grouping), terms)
+    assert np.sign(drag_t(fitted)) == np.sign(built_up - 0.6)

@@ -217,6 +217,19 @@ def test_at_one_speed_dry_friction_is_judged_together_with_viscous(per_speed, pl
     assert longer.plausible_beside(made(*declared, added=0)) is plausible
 
 
+@pytest.mark.parametrize("name", ["unnamed_presliding", "hysteresis"])
+@pytest.mark.parametrize(("built_up", "plausible"), [(0.3, True), (0.1, False)])
+def test_dry_friction_is_judged_together_with_what_builds_up_after_a_reversal(
+    name, built_up, plausible
+):
+    """Friction with the load of 5 times the noise lost its name beside presliding."""
+    declared = effect("coulomb"), effect(name)
+    turned = effect("coulomb", plausible=False), effect(name)
+    longer = made(*turned, effect("new", follows_load=True))
+    longer.fit.coefficients[:2] = np.array([-0.2]), np.array([built_up])
+    assert longer.plausible_beside(made(*declared, added=0)) is plausible
+
+
 def test_chains_are_the_same_by_two_digits_of_their_parameters_in_any_order():
     def term(name, keep=None, **parameters):
         return SimpleNamespace(effect=effect(name), parameters=parameters, keep=keep)

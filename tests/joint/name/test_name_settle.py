@@ -117,11 +117,32 @@ def test_a_ripple_that_shakes_the_measured_motion_keeps_its_name(resonance_hz):
 
 
 @pytest.mark.parametrize(
-    ("name", "goes"), [("ripple", True), ("mains_hum", True), ("coupling", False)]
+    ("name", "beside", "goes"),
+    [
+        ("ripple", -1.1, True),
+        ("ripple", -2.1, False),  # it takes as much where the function is, and is no part of it
+        ("mains_hum", -1.1, True),
+        ("coupling", -1.1, False),
+    ],
 )
-def test_a_smooth_function_that_does_as_well_takes_a_line_s_place_and_no_joint_s(name, goes):
+def test_a_smooth_function_that_does_as_well_takes_a_line_s_place_and_no_joint_s(
+    name, beside, goes, monkeypatch
+):
     """Of a UR10's elbow a function of the time took the place of the shoulder, and failed."""
     drawn = np.random.default_rng(0).normal(1.0, 0.01, (2, 40))
     best, rival = (SimpleNamespace(deviation=one, score=-1.0, mean_square=1.0) for one in drawn)
-    parent = SimpleNamespace(mean_square=4.0)
+    parent = SimpleNamespace(mean_square=4.0, score=1.0)
+    both = SimpleNamespace(score=beside)
+    monkeypatch.setattr("opamc_cli.joint.name.settle.extended", lambda chain, term: both)
     assert _takes_the_name(rival, best, parent, term(name)) is goes
+
+
+def test_a_line_keeps_its_name_where_a_smooth_function_of_the_same_size_lacks_too():
+    """Of a joint with three effects a ripple of twice the noise lost its name to presliding."""
+
+    def both(q, v, a, t):
+        return np.cos(40 * q) + 4 * np.sign(v) * np.exp(-(((np.abs(v) - 0.5) / 0.2) ** 2))
+
+    line = term("ripple", order=40.0)
+    _, named = settle(both, line, names=("ripple",))
+    assert [one.term.effect.name for one in named] == ["ripple"]

@@ -110,8 +110,8 @@ def look_at(path: Path, encoding: str | None = None) -> Look:
         # one of a family that is used is named itself
         unused.append(name if pattern in patterns else pattern)
     unused = list(dict.fromkeys(unused))
-    # of nested groups the deeper ones are many, and seldom signals
-    rest = [name for name in unused if "/" not in name[1:]] or unused
+    # of nested groups the deeper ones are many, and seldom signals; a text has none but units
+    rest = [name for name in unused if layout is not None or "/" not in name[1:]] or unused
     repeated = list(dict.fromkeys(each.repeated for each in listed if each.repeated))
     rates = [each.rate for each in listed if each.name in used]
     rate = rates[0] if len({one and one.hz for one in rates}) == 1 else None

@@ -1,10 +1,11 @@
 """What the name of a channel says: which quantity, of which axis, measured or commanded."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from opamc_cli.storage.ingest.map.axes import has_placeholder
+from opamc_cli.storage.ingest.map.axes import MOST_AXES, has_placeholder
 from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torque
 from opamc_cli.storage.ingest.source import Listed, Name
 from opamc_cli.storage.schemas.channels import LOGGED
@@ -129,7 +130,8 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
                     for k in range(channel.width)
                 ]
             continue
-        number, pattern = _numbered(name) if counted else (None, name)
+        number, pattern = _numbered(bare) if counted else (None, bare)
+        pattern += name[len(bare) :]  # of `1/min` the 1 counts no axes
         quantity = "time" if channel.dates else _quantity(_without_unit(pattern)[0], unit)
         if quantity is None or has_placeholder(name):
             continue
@@ -137,6 +139,14 @@ def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
         if unit is None and ODRIVES.search(name):
             unit = IN_TURNS.get(quantity)
         found.append(Meant(quantity, number, pattern, name, None, measured, unit, scale))
+    # a drive's parameter, as in `r0078 Stromistwert`, stands alone: no arm has as many axes
+    alone = Counter(each.pattern for each in found)
+    found = [
+        replace(each, number=None, pattern=str(each.source))
+        if (each.number or 0) > MOST_AXES and alone[each.pattern] == 1
+        else each
+        for each in found
+    ]
     if {"a", "b", "c"} <= {each.quantity for each in found}:
         return found
     # what ends in `_a` and has no `_b` and `_c` beside it is in ampere
@@ -231,8 +241,11 @@ def nearness(pattern: str) -> int:
 
 
 def _words(pattern: str) -> list[str]:
-    """Split a name at everything that is no letter, and where small letters turn to capitals."""
-    spaced = re.sub(r"([a-z])([A-Z])", r"\1 \2", pattern)
+    """Split a name at everything that is no letter, and where small letters turn to capitals.
+
+    German compounds, such as `Stromistwert`, are split before what they say of themselves.
+    """
+    spaced = re.sub(r"([a-z])([A-Z]|(?:ist|soll)wert(?![a-z]))", r"\1 \2", pattern)
     return [word.lower() for word in re.findall(r"[^\W\d_]+", spaced)]
 
 

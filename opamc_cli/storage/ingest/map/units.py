@@ -13,6 +13,7 @@ CONVERSIONS: dict[str, Mapping[str, Conversion]] = {
         "mA": Conversion(1e-3),
         "uA": Conversion(1e-6),
         "kA": Conversion(1e3),
+        "Arms": Conversion(2**0.5),
         "Nm": Conversion(1.0),
         "mNm": Conversion(1e-3),
     },
@@ -55,6 +56,8 @@ ISO8601 = "iso8601"
 
 ALIASES = {
     "µA": "uA",
+    "Aeff": "Arms",
+    "A rms": "Arms",
     "°": "deg",
     "°/s": "deg/s",
     "1/min": "rpm",

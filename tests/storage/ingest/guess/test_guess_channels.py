@@ -28,6 +28,12 @@ def test_joints_keep_their_number_but_those_from_0_and_beyond_any_arms():
         assert axes["position"] == {axis + k: f"q_{n}" for k, n in enumerate(numbers)}
 
 
+def test_a_drives_parameters_are_channels_of_one_axis():
+    names = "r0063 Drehzahlistwert", "r0078 Stromistwert", "r2521 Lageistwert"
+    axes, _ = chosen(*names)
+    assert axes == {"velocity": {1: names[0]}, "current": {1: names[1]}, "position": {1: names[2]}}
+
+
 def test_the_measured_family_with_most_axes_wins():
     axes, over = chosen("target_cur_1", "target_cur_2", "cur_1", "mean_cur_1", "mean_cur_2")
     assert axes["current"] == {1: "mean_cur_1", 2: "mean_cur_2"}

@@ -96,6 +96,12 @@ def test_axes_that_no_number_counts_have_lines_of_their_own(tmp_path):
     ]
 
 
+def test_a_unit_with_a_stroke_is_no_nested_group(tmp_path):
+    names = {"t": T, "IQ [A]": SPEED, "VX [cnt/s]": SPEED, "PX [cnt]": ANGLE}
+    lines, _ = lines_of(table(tmp_path / "a.csv", names))
+    assert lines[-1] == "# not used: VX [cnt/s], PX [cnt]"
+
+
 def test_joints_keep_the_numbers_of_their_names_and_what_is_left_is_named(tmp_path):
     names = {"t": T, **{f"J{n}_cur": SPEED for n in (4, 6)}, **{f"q{n}": ANGLE for n in (3, 4)}}
     lines, _ = lines_of(table(tmp_path / "a.csv", names))

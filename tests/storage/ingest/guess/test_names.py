@@ -6,11 +6,14 @@ from opamc_cli.storage.ingest.guess.names import Meant, meanings
 from opamc_cli.storage.ingest.source import Listed
 
 KNOWN = {
-    "current": "i1 cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1 A1_Strom_1",
+    "current": "i1 cur_1 curr_1 current_1 motor_currents_1 Iq1 amp_1 amps_1 ampere_1 A1_Strom_1 "
+    "Stromistwert_1",
     "torque": "torque_1 torques_1 effort_1 tau_1 moment_1 JointTrq1",
-    "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1",
-    "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1",
-    "temperature": "motor_temp_1 temps_1 temperature_1 temperatures_1",
+    "position": "pos_1 ActualPosition1 positions_1 angle_1 angles_1 q_1 phi_1 theta_1 enc_1 "
+    "Lage_1 IstWinkel_1",
+    "velocity": "vel_1 velocity_1 velocities_1 speed_1 speeds_1 qd_1 dq_1 omega_1 qdot_1 "
+    "Drehzahl_1",
+    "temperature": "motor_temp_1 temps_1 temperature_1 temperatures_1 Temperatur_1",
     "time": "time timestamp timestamps stamp t clock Zeit ts epoch epoch_ms",
 }
 WANTED = (
@@ -108,7 +111,7 @@ def test_a_unit_that_is_counted_in_has_a_scale():
 
 
 def test_a_name_without_a_word_means_what_its_unit_is_one_of():
-    found = [only(n) for n in ("A1.I_eff [A]", "A1 Ieff (mA)", "J2 Winkel [deg]", "n_3 [rpm]")]
+    found = [only(n) for n in ("A1.I_eff [A]", "A1 Ieff (mA)", "J2 Winkel [deg]", "n_3 [1/min]")]
     assert [(each.quantity, each.number) for each in found] == [
         ("current", 1),
         ("current", 1),
@@ -117,6 +120,19 @@ def test_a_name_without_a_word_means_what_its_unit_is_one_of():
     ]
     # neither a torque nor a time is told by its unit: it may be of anything
     assert meanings([Listed("M_1 [Nm]"), Listed("x_1 [s]"), Listed("tool 1 [A]")]) == []
+
+
+def test_a_drives_parameter_is_no_axis_and_a_setpoint_not_measured():
+    names = ("r0078 Stromistwert momentenbildend [Aeff]", "r0062 Drehzahlsollwert [1/min]",
+             "r2521 Lageistwert [LU]")  # fmt: skip
+    found = meanings([Listed(name) for name in names])
+    assert [(m.quantity, m.number, m.measured) for m in found] == [
+        ("current", None, True),
+        ("velocity", None, False),
+        ("position", None, True),
+    ]
+    # of several alike the numbers count
+    assert [m.number for m in meanings([Listed("cur_101"), Listed("cur_102")])] == [101, 102]
 
 
 def test_per_cent_are_of_a_current_or_torque_and_no_motion():

@@ -9,7 +9,14 @@ from opamc_cli.storage.ingest.map.units import CONVERSIONS, conversion, is_torqu
 from opamc_cli.storage.schemas.channels import quantity_of
 
 ONE = {
-    "current": {"A": 1, "mA": 1e-3, "uA": 1e-6, "µA": 1e-6, "kA": 1e3}
+    "current": {
+        "A": 1,
+        "mA": 1e-3,
+        "uA": 1e-6,
+        "µA": 1e-6,
+        "kA": 1e3,
+        **dict.fromkeys(("Arms", "Aeff", "A rms"), 2**0.5),
+    }
     | dict.fromkeys(("Nm", "N·m", "N m"), 1)
     | {"mNm": 1e-3},
     "position": {"rad": 1, "mrad": 1e-3, "rev": 2 * math.pi}
