@@ -168,7 +168,7 @@ class CsvSource:
     def _batches(self, types: Mapping[str, pa.DataType]) -> Iterator[pa.RecordBatch]:
         names = [f"c{i}" for i in range(len(self._first_row))]
         try:
-            reader = pacsv.open_csv(
+            with pacsv.open_csv(
                 self._bytes(),
                 read_options=pacsv.ReadOptions(
                     column_names=names,
@@ -186,8 +186,8 @@ class CsvSource:
                     decimal_point=self._map.decimal,
                     null_values=self._no_number,
                 ),
-            )
-            yield from reader
+            ) as reader:
+                yield from reader
         except UnicodeDecodeError as error:
             raise self._wrong_encoding(error) from error
         except (pa.ArrowException, OSError) as error:
