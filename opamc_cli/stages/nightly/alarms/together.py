@@ -22,7 +22,8 @@ def together(reasons: Sequence[str]) -> list[str]:
     Parameters
     ----------
     reasons
-        Sentences; of those about a recording, "PATH: WHY", those that say the same are one.
+        Sentences; of those about a recording, "PATH: WHY", those that say the same are one. A
+        recording is named by its file and folder: robot and night are said before.
 
     Examples
     --------
@@ -46,8 +47,10 @@ def kind(sentence: str) -> str:
 
 def _said(group: Sequence[tuple[str, str]]) -> str:
     (path, why), n = group[-1], len(group)
-    if n == 1:
-        return f"{path}: {why}" if path else why
+    if not path:
+        return why
     names = ["/".join(one.split("/")[-2:]) for one, _ in group[:MOST_NAMES]]
+    if n == 1:
+        return f"{names[0]}: {why}"
     more = f" and {n - MOST_NAMES} more" if n > MOST_NAMES else ""
     return f"{n} recordings ({', '.join(names)}{more}): {why}"
