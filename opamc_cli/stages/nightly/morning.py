@@ -1,6 +1,6 @@
 """What is said in the morning: who needs a look, and nothing to those who need none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import Any
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.alarms.commands import ACKNOWLEDGE, REBASELINE, to_copy
+from opamc_cli.stages.nightly.alarms.not_judged import NO_AXIS
 from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, said_of_unnamed, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
@@ -193,9 +194,14 @@ def _of_robots(
 def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
     """Say what is a line of its own, of all robots of which it is true at once."""
     said: dict[tuple[int, str], list[str]] = {}
+    at_once: dict[str, dict[str, None]] = {}
+    for event in news:
+        if event.kind == "together" or (event.kind == "failed" and NO_AXIS in event.text):
+            at_once.setdefault(event.time, {})[event.robot] = None
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER:
-            robots = said.setdefault((OVER[event.kind], event.text), [])
+            text = event.text + _exchanged(event, at_once.get(event.time, ()))
+            robots = said.setdefault((OVER[event.kind], text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines = [f"{some(of)} {to_copy(text, of, cell)}" for (_, text), of in said.items()]
@@ -214,6 +220,17 @@ def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
     lines += [f"{name} {said_of_strays(paths)}" for name, paths in sorted(strays.items())]
     lines += [said_of_unnamed(unnamed)] if unnamed else []
     return lines
+
+
+def _exchanged(event: Event, robots: Collection[str]) -> str:
+    """Ask whether two robots that are both unlike themselves since one night are exchanged.
+
+    As a whole, by which joints move together, or fit nothing. Weather moves more of them, or one.
+    """
+    others = [name for name in robots if name != event.robot]
+    if len(others) != 1 or event.robot not in robots or event.kind not in ("together", "failed"):
+        return ""
+    return f"; {others[0]} moved in that night, too: are the files of the two exchanged?"
 
 
 def _alarm_lines(
