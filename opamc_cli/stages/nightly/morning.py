@@ -171,18 +171,22 @@ def _of_robots(
     standing_lines: list[str] = []
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
+        in_full = False
         for joints in robot.alarms_by_joint:
             new = [one for one in joints if one.alarm and as_told(one.alarm) in news]
             first, *again = joints
             if (first.axis, "reminder") in told or len(new) == len(joints):
                 how = "ALARM" if new else "STILL UNDER ALARM"
                 lines += _alarm_lines(how, robot, first, again, out, cell)
+                in_full = True
                 continue
             before = [one for one in joints if one not in new]
             lines += [f"{robot.name} axis {first.axis}: alarm{_also(robot, one)}" for one in new]
             standing_lines += [
                 f"{_place(robot, one)}: alarm since {one.since}, {one.text}" for one in before
             ]
+        if in_full:  # one repair is for all its joints
+            lines.append(to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell))
         said_now = any(e.robot == robot.name and e.kind in ("failed", "missing") for e in news)
         if robot.broken and not said_now:
             of = robot.failure
@@ -250,7 +254,6 @@ def _alarm_lines(
     where = out / joint.report if joint.report else out / files.PAGE
     silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
     yield to_copy(f"  see {where}; silence it with: {silence}", [robot.name], cell)
-    yield to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell)
 
 
 def _also(robot: RobotSummary, joint: JointSummary) -> str:

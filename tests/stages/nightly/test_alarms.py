@@ -369,6 +369,28 @@ def test_an_alarm_that_is_over_is_said_though_another_stands_on_that_axis():
     assert morning.lines == (f"r1 {over}",)
 
 
+def test_what_to_do_after_a_repair_is_said_once_of_a_robots_joints():
+    alarms = [
+        AlarmRow("r1", "", axis, "2026-03-05", "2026-03-04", None, None, "at fault", "{}")
+        for axis in (2, 5)
+    ]
+    joints = tuple(
+        JointSummary(one.axis, "", "fault", "2026-03-05", "", 5.0, one) for one in alarms
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-05", "", "done"))
+    said = [as_told(one) for one in alarms]
+    morning = tell(Summary((robot,)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
+    assert [line.split(":")[0] for line in morning.lines] == [
+        "r1 axis 2",
+        "  at fault",
+        "  see out/index.html; silence it with",
+        "r1 axis 5",
+        "  at fault",
+        "  see out/index.html; silence it with",
+        "  after a repair",
+    ]
+
+
 @pytest.mark.parametrize("others", [0, 1, 2])
 def test_two_robots_that_move_as_a_whole_in_one_night_may_be_exchanged(others):
     """Their exchanged files were two lines, each with the command that would make them stay so."""
