@@ -15,6 +15,12 @@ def test_recordings_that_lack_the_same_are_one_sentence():
     assert together(reasons[:1]) == [f"n/0.parquet: all 10 segments {UNFIT}"]
 
 
+def test_recordings_that_differ_in_a_share_alone_are_one_sentence():
+    reasons = [f"n/{n}.parquet: column axis3_current is clipped in {n}% of it" for n in (6, 7)]
+    said = "2 recordings (n/6.parquet, n/7.parquet): column axis3_current is clipped in 7% of it"
+    assert together(reasons) == [said]
+
+
 def test_other_joints_and_other_reasons_are_not_thrown_together():
     reasons = [f"logs/n/1.parquet: all 9 segments {UNFIT}", "1 recording where each night has 2"]
     other = f"logs/n/2.parquet: all 9 segments {UNFIT.replace('axis 2', 'axis 3')}"

@@ -12,7 +12,7 @@ OF_RECORDING = re.compile(r"(?P<path>\S.*?\.parquet): (?P<why>.*)", re.DOTALL)
 OF_SEVERAL = re.compile(r"\d+ recordings \(.*?\): ")
 """What `together` puts in the place of their names."""
 
-COUNT = re.compile(r"\d[\d.]*(?: of \d+)? segments?")
+COUNT = re.compile(r"\d[\d.]*(?:%|(?: of \d+)? (?:segments?|samples?)\b)")
 """What differs from one recording to the next that lack the same."""
 
 
