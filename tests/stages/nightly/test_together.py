@@ -21,6 +21,13 @@ def test_recordings_that_differ_in_a_share_alone_are_one_sentence():
     assert together(reasons) == [said]
 
 
+def test_joints_of_a_recording_that_lack_the_same_are_one_sentence():
+    """An edited program was a sentence for each joint."""
+    reasons = [f"n/1.parquet: {n} of 6 motions of axis {n} lead elsewhere" for n in (3, 4, 6)]
+    said = "n/1.parquet: 3 of 6 motions of axis 3 (axes 4 and 6 likewise) lead elsewhere"
+    assert together([*reasons, "no more"]) == [said, "no more"]
+
+
 def test_other_joints_and_other_reasons_are_not_thrown_together():
     reasons = [f"logs/n/1.parquet: all 9 segments {UNFIT}", "1 recording where each night has 2"]
     other = f"logs/n/2.parquet: all 9 segments {UNFIT.replace('axis 2', 'axis 3')}"
