@@ -124,6 +124,42 @@ def test_a_joint_that_cannot_be_judged_is_never_passed_over(opamc, baseline, tmp
     assert REASONS[wrong] in " ".join(second["reasons"])
 
 
+def one_infinite(columns):
+    columns["axis2_b"][4321] = np.inf
+
+
+def torn(columns):
+    """Axis 2 alone has another temperature, as a sensor that is torn off tells it."""
+    temperatures(columns)
+    columns["axis2_temperature"][:] = -40.0
+
+
+def temperatures(columns):
+    for axis, warm in ((1, 31.0), (2, 35.0)):
+        columns[f"axis{axis}_temperature"] = np.full_like(columns["axis1_a"], warm)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "usual", "said"),
+    [
+        (one_infinite, lambda _: None, "1 sample of the current of axis 2 is no number"),
+        (torn, temperatures, "the temperature of axis 2 has moved by -75 °C, the others by +0"),
+    ],
+)
+def test_what_a_joint_is_judged_without_is_said_though_it_is_healthy(
+    opamc, tmp_path, wrong, usual, said
+):
+    """One sample that is infinite and a broken thermistor passed without a word."""
+    for seed in range(4):
+        record(tmp_path / "normal" / f"{seed}.parquet", seed, usual)
+    target = record(tmp_path / "tonight.parquet", 9, wrong)
+    ended = diagnose(opamc, tmp_path / "normal", target, tmp_path / "out", "--quiet")
+    assert (ended.code, said in ended.err) == (ExitCode.PARTIAL, True)
+    target = record(tmp_path / "healthy.parquet", 9, usual)
+    ended = diagnose(opamc, tmp_path / "normal", target, tmp_path / "again", "--quiet")
+    assert (ended.code, ended.err) == (ExitCode.DONE, "")
+
+
 def test_a_night_at_another_speed_is_not_judged(opamc, baseline, tmp_path):
     """Of virtual joints three per cent made a fault with p = 1e-224."""
     target = record(tmp_path / "tonight.parquet", 9, faster)

@@ -120,7 +120,7 @@ def order_spectra(compared: Compared, residual: Floats, tapered: bool = False) -
     bins = AngleBins.of(max(travels), top)
     # long strokes carry the energy: their resolution is what the sum has
     resolution = 2 * np.pi / float(np.average(travels, weights=travels))
-    lowest = max(LOWEST_ORDER[track.angle_kind], 2 * resolution)
+    lowest = max(LOWEST_ORDER[track.angle_kind], 3 * resolution)
     first = int(np.searchsorted(bins.orders, lowest))
     power, samples = np.zeros((after.size, bins.orders.size)), np.zeros(after.size)
     for start, stop in pieces:

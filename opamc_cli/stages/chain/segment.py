@@ -1,7 +1,7 @@
 """Stage `segment`: runs in, motions and the largest frequency of their carrier out (3.1, 3.2)."""
 
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -40,6 +40,8 @@ class SegmentOutcome:
     """One sentence for each channel that is doubtful but was used, or axis that stands still."""
     errors: tuple[OpamcError, ...]
     """One for each run, or axis of a run, that could not be used."""
+    missing: Mapping[tuple[str, int], int] = field(default_factory=dict)
+    """Samples of a current that are no numbers, by run and axis."""
 
     def by_axis(self) -> list[dict[str, Any]]:
         """Return segments, time in motion and largest frequency by run, axis and kind."""
@@ -147,7 +149,8 @@ def run(
         inputs=[(source.path, source.sha256) for source in sources],
         extra=sources_record(sources, out),
     )
-    return SegmentOutcome(path, table, tuple(notes), tuple(errors))
+    missing = {(each.run, each.rows[0]["axis"]): each.n_missing for each in results if each.rows}
+    return SegmentOutcome(path, table, tuple(notes), tuple(errors), missing)
 
 
 def _segment_axis(job: _Job) -> AxisSegments:

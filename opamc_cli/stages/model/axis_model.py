@@ -21,7 +21,12 @@ from opamc_cli.signal.motion.signs import friction_drives
 from opamc_cli.signal.plausible.commanded import apart
 from opamc_cli.stages.model.declared_terms import declared_term
 from opamc_cli.stages.model.users_effects import load_user_effects
-from opamc_cli.stages.recordings.axis_recording import gaps, positions_beside, read_recording
+from opamc_cli.stages.recordings.axis_recording import (
+    gaps,
+    positions_beside,
+    read_recording,
+    with_signs,
+)
 from opamc_cli.stages.recordings.mistaken import mistaken
 from opamc_cli.storage.runs.run import Run
 from opamc_cli.storage.schemas.channels import same_clock
@@ -204,14 +209,16 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     NotEnoughDataError
         If a run is too short.
     """
-    recordings = [
-        replace(
-            read_recording(run, axis),
-            others_rad=positions_beside(run, axis),
-            payload_kg=run.info.payload_kg,
-        )
-        for run in runs
-    ]
+    recordings = with_signs(
+        [
+            replace(
+                read_recording(run, axis),
+                others_rad=positions_beside(run, axis),
+                payload_kg=run.info.payload_kg,
+            )
+            for run in runs
+        ]
+    )
     robots = sorted({run.info.robot for run in runs if run.info.robot is not None})
     if len(robots) > 1:
         msg = (

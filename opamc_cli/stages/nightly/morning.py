@@ -1,6 +1,6 @@
 """What is said in the morning: who needs a look, and nothing to those who need none."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date, timedelta
 from pathlib import Path
@@ -9,6 +9,7 @@ from typing import Any
 from opamc_cli.config.cell import CellConfig
 from opamc_cli.errors import ExitCode
 from opamc_cli.stages.nightly.alarms.commands import ACKNOWLEDGE, REBASELINE, to_copy
+from opamc_cli.stages.nightly.alarms.not_judged import NO_AXIS
 from opamc_cli.stages.nightly.inputs.recordings import said_of_strays, said_of_unnamed, some
 from opamc_cli.stages.nightly.start.outcome import CellOutcome
 from opamc_cli.stages.nightly.summary import JointSummary, RobotSummary, Summary
@@ -170,18 +171,22 @@ def _of_robots(
     standing_lines: list[str] = []
     for robot in summary.needing():
         told = {(e.axis, e.kind) for e in news if e.robot == robot.name}
+        in_full = False
         for joints in robot.alarms_by_joint:
             new = [one for one in joints if one.alarm and as_told(one.alarm) in news]
             first, *again = joints
             if (first.axis, "reminder") in told or len(new) == len(joints):
                 how = "ALARM" if new else "STILL UNDER ALARM"
                 lines += _alarm_lines(how, robot, first, again, out, cell)
+                in_full = True
                 continue
             before = [one for one in joints if one not in new]
             lines += [f"{robot.name} axis {first.axis}: alarm{_also(robot, one)}" for one in new]
             standing_lines += [
                 f"{_place(robot, one)}: alarm since {one.since}, {one.text}" for one in before
             ]
+        if in_full:  # one repair is for all its joints
+            lines.append(to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell))
         said_now = any(e.robot == robot.name and e.kind in ("failed", "missing") for e in news)
         if robot.broken and not said_now:
             of = robot.failure
@@ -193,9 +198,14 @@ def _of_robots(
 def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
     """Say what is a line of its own, of all robots of which it is true at once."""
     said: dict[tuple[int, str], list[str]] = {}
+    at_once: dict[str, dict[str, None]] = {}
+    for event in news:
+        if event.kind == "together" or (event.kind == "failed" and NO_AXIS in event.text):
+            at_once.setdefault(event.time, {})[event.robot] = None
     for event in sorted(news, key=lambda e: (OVER.get(e.kind, 9), e.robot, e.time)):
         if event.kind in OVER:
-            robots = said.setdefault((OVER[event.kind], event.text), [])
+            text = event.text + _exchanged(event, at_once.get(event.time, ()))
+            robots = said.setdefault((OVER[event.kind], text), [])
             robots += [] if event.robot in robots[-1:] else [event.robot]
     # one line for all robots of a hall that was switched off, and for all reminders of one thing
     lines = [f"{some(of)} {to_copy(text, of, cell)}" for (_, text), of in said.items()]
@@ -216,6 +226,17 @@ def _of_events(news: Sequence[Event], cell: Path) -> list[str]:
     return lines
 
 
+def _exchanged(event: Event, robots: Collection[str]) -> str:
+    """Ask whether two robots that are both unlike themselves since one night are exchanged.
+
+    As a whole, by which joints move together, or fit nothing. Weather moves more of them, or one.
+    """
+    others = [name for name in robots if name != event.robot]
+    if len(others) != 1 or event.robot not in robots or event.kind not in ("together", "failed"):
+        return ""
+    return f"; {others[0]} moved in that night, too: are the files of the two exchanged?"
+
+
 def _alarm_lines(
     how: str,
     robot: RobotSummary,
@@ -233,7 +254,6 @@ def _alarm_lines(
     where = out / joint.report if joint.report else out / files.PAGE
     silence = ACKNOWLEDGE.replace("ROBOT", f"ROBOT --axis {joint.axis}")
     yield to_copy(f"  see {where}; silence it with: {silence}", [robot.name], cell)
-    yield to_copy(f"  after a repair: {REBASELINE}", [robot.name], cell)
 
 
 def _also(robot: RobotSummary, joint: JointSummary) -> str:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pyarrow as pa
@@ -20,7 +20,7 @@ from opamc_cli.signal.motion.reported import unwrapped
 from opamc_cli.stages.model.kept_tracks import following
 from opamc_cli.stages.model.users_effects import load_user_effects, users_effects_named
 from opamc_cli.stages.processes.kept import KeptResults
-from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording
+from opamc_cli.stages.recordings.axis_recording import interpolated, read_recording, with_signs
 from opamc_cli.stages.verdict.wording.causes import (
     entry,
     of_lag,
@@ -96,12 +96,14 @@ def explain(
     sides, noises, wrong, along = [], [], [], []
     seconds = 60.0 * config.explain_minutes
     rate_hz = baseline[0].info.sampling_rate_hz  # the others' but for a clock's drift
-    for sources, moves in zip((baseline, target), strokes, strict=True):
-        recordings, noise, wrongs, moved, errors = _recordings(
-            axis, sources[-MAX_RUNS:], seconds, moving or {}, moves, rate_hz
-        )
-        if not recordings:
-            raise errors[0]
+    logged = [
+        _as_logged(axis, sources[-MAX_RUNS:], seconds, moving or {}, rate_hz)
+        for sources in (baseline, target)
+    ]
+    signed = iter(with_signs([one.recording for side in logged for one in side]))
+    for side, moves in zip(logged, strokes, strict=True):
+        read = [one._replace(recording=next(signed)) for one in side]
+        recordings, noise, wrongs, moved = _measured(read, moves)
         sides.append(recordings)
         noises.append(noise)
         wrong.append(wrongs)
@@ -141,10 +143,11 @@ def follow_baseline(
         As of `explain`, which finds it there.
     """
     seconds, rate_hz = 60.0 * config.explain_minutes, baseline[0].info.sampling_rate_hz
-    recordings, *_ = _recordings(axis, baseline[-MAX_RUNS:], seconds, moving, {}, rate_hz)
+    logged = _as_logged(axis, baseline[-MAX_RUNS:], seconds, moving, rate_hz)
     follow = following(kept)
-    for recording in recordings:
-        follow(recording, Joint(config.ratio_of(axis), config.poles_of(axis)))
+    for recording in with_signs([one.recording for one in logged]):
+        found = interpolated(recording, LEAST_HZ)
+        follow(found, Joint(config.ratio_of(axis), config.poles_of(axis)))
 
 
 def library_of(config: JointConfig) -> Library:
@@ -178,20 +181,29 @@ def strokes_of(segments: pa.Table) -> dict[int, dict[str, list[tuple[int, int]]]
     return found
 
 
-def _recordings(
+class _Logged(NamedTuple):
+    """A recording as it was logged, and which run's, from which sample on."""
+
+    run: str
+    start: int
+    recording: Recording
+
+
+def _as_logged(
     axis: int,
     sources: Sequence[RunSource],
     seconds: float,
     moving: Mapping[str, tuple[int, int]],
-    strokes: Mapping[str, Spans],
     rate_hz: float,
-) -> tuple[
-    list[Recording], list[Fluctuation], list[SensorErrors], list[list[Course]], list[OpamcError]
-]:
-    found: list[Recording] = []
-    noises: list[Fluctuation] = []
-    wrong: list[SensorErrors] = []
-    along: list[list[Course]] = []
+) -> list[_Logged]:
+    """Read what a model of the joint needs of each run that has it.
+
+    Raises
+    ------
+    OpamcError
+        If none has.
+    """
+    found: list[_Logged] = []
     errors: list[OpamcError] = []
     for source in sources:
         # seconds are those of a log of this rate: a slower one costs no more for being longer
@@ -205,17 +217,29 @@ def _recordings(
                 first, last = min(start for start, _ in spans), max(stop for _, stop in spans)
                 start, stop = max(first - beside, 0), min(last + beside, first + most)
                 recording = replace(read_recording(run, axis, start, stop), rate_hz=rate_hz)
-                found.append(interpolated(recording, LEAST_HZ))
-            noise = _fluctuation(recording, start, strokes.get(source.name, ()))
-            noises += [] if noise is None else [noise]
-            current = _current(recording)
-            added = None if current is None else sensor_errors(current, recording.rate_hz)
-            wrong += [] if added is None else [added]
-            along.append(_courses(recording))
+                found.append(_Logged(source.name, start, recording))
         except OpamcError as error:
             # the run served the chain but not a model, which needs motion beside current
             errors.append(error)
-    return found, noises, wrong, along, errors
+    if not found:
+        raise errors[0]
+    return found
+
+
+def _measured(
+    read: Sequence[_Logged], strokes: Mapping[str, Spans]
+) -> tuple[list[Recording], list[Fluctuation], list[SensorErrors], list[list[Course]]]:
+    """Return one side's recordings for the model, their noise, sensors' errors and courses."""
+    noises: list[Fluctuation] = []
+    wrong: list[SensorErrors] = []
+    for run, start, recording in read:
+        noise = _fluctuation(recording, start, strokes.get(run, ()))
+        noises += [] if noise is None else [noise]
+        current = _current(recording)
+        added = None if current is None else sensor_errors(current, recording.rate_hz)
+        wrong += [] if added is None else [added]
+    found = [interpolated(one.recording, LEAST_HZ) for one in read]
+    return found, noises, wrong, [_courses(one.recording) for one in read]
 
 
 def _current(recording: Recording) -> Floats | None:

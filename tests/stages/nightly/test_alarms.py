@@ -8,7 +8,7 @@ import pytest
 
 from opamc_cli.config.cell import AlarmConfig
 from opamc_cli.errors import NotEnoughDataError
-from opamc_cli.stages.nightly.alarms.not_judged import do_first
+from opamc_cli.stages.nightly.alarms.not_judged import NO_AXIS, do_first
 from opamc_cli.stages.nightly.alarms.robot import settle_robot
 from opamc_cli.stages.nightly.alarms.trend import trend_phrase
 from opamc_cli.stages.nightly.morning import as_told, tell
@@ -367,6 +367,49 @@ def test_an_alarm_that_is_over_is_said_though_another_stands_on_that_axis():
     said = [Event("2026-03-05", "r1", 2, "cleared", over)]
     morning = tell(Summary((robot,)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
     assert morning.lines == (f"r1 {over}",)
+
+
+def test_what_to_do_after_a_repair_is_said_once_of_a_robots_joints():
+    alarms = [
+        AlarmRow("r1", "", axis, "2026-03-05", "2026-03-04", None, None, "at fault", "{}")
+        for axis in (2, 5)
+    ]
+    joints = tuple(
+        JointSummary(one.axis, "", "fault", "2026-03-05", "", 5.0, one) for one in alarms
+    )
+    robot = RobotSummary("r1", joints, NightRow("r1", "2026-03-05", "", "done"))
+    said = [as_told(one) for one in alarms]
+    morning = tell(Summary((robot,)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
+    assert [line.split(":")[0] for line in morning.lines] == [
+        "r1 axis 2",
+        "  at fault",
+        "  see out/index.html; silence it with",
+        "r1 axis 5",
+        "  at fault",
+        "  see out/index.html; silence it with",
+        "  after a repair",
+    ]
+
+
+@pytest.mark.parametrize("others", [0, 1, 2])
+def test_two_robots_that_move_as_a_whole_in_one_night_may_be_exchanged(others):
+    """Their exchanged files were two lines, each with the command that would make them stay so."""
+    names = ["r1", "r2", "r3"][: others + 1]
+    robots = [RobotSummary(name, (), NightRow(name, "2026-03-05", "", "done")) for name in names]
+    said = [
+        Event(
+            "2026-03-05",
+            name,
+            None,
+            *("failed", f"2026-03-05: {NO_AXIS}") if n else ("together", "5 of 6"),
+        )
+        for n, name in enumerate(names)
+    ]
+    found = tell(Summary(tuple(robots)), said, CellOutcome(), Path("out"), Path("cell.yaml"))
+    asked = "moved in that night, too: are the files of the two exchanged?"
+    lines = {f"r1 5 of 6; r2 {asked}", f"r2 2026-03-05: {NO_AXIS}; r1 {asked}"}
+    assert (set(found.lines) == lines) == (others == 1)
+    assert ("exchanged" in " ".join(found.lines)) == (others == 1)
 
 
 def worn(per_night, weather, seed=3, nights=30):

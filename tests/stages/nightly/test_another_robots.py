@@ -35,6 +35,11 @@ def set_robot(path, robot):
     save_run(path, info, {name: table[name].to_numpy() for name in table.column_names})
 
 
+def short(path):
+    """Return a recording's file and folder: the robot stands before it."""
+    return "/".join(path.parts[-2:])
+
+
 GOOD = ["baseline"] * 3 + ["done"] * 2
 
 
@@ -46,7 +51,9 @@ def test_of_two_new_copies_neither_is_judged_until_one_is_gone(cell, logs, opamc
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.PARTIAL
     for robot, path, twin, its in (("r1", one, other, "r3"), ("r3", other, one, "r1")):
-        said = f"{robot} {night(4)}: {path}: has the same bytes as {twin} of {its}; remove it"
+        said = (
+            f"{robot} {night(4)}: {short(path)}: has the same bytes as {twin} of {its}; remove it"
+        )
         assert said in ended.out
         assert states(cell, robot) == [*GOOD[:4], "failed"]
     again = opamc("nightly", cell, "--quiet")
@@ -67,7 +74,7 @@ def test_what_was_judged_stays_its_robots_where_a_copy_turns_up(cell, logs, opam
     assert ended.code == ExitCode.PARTIAL
     (failed,) = json.loads(ended.out)["robots"]["r3"]["failed"]
     whose = f"{run_of(logs, 'r1', 0)} of r1, whose it is"
-    assert failed == {"night": night(4), "why": f"{late}: has the same bytes as {whose}"}
+    assert failed == {"night": night(4), "why": f"{short(late)}: has the same bytes as {whose}"}
     (logs / "kept").replace(late)
     assert opamc("nightly", cell).code == ExitCode.DONE
     assert (states(cell, "r1"), states(cell, "r3")) == (GOOD, GOOD)
@@ -93,11 +100,11 @@ def test_the_metadata_tells_whose_a_recording_is(cell, logs, opamc):
     set_robot(one, "r3")
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.PARTIAL
-    assert f"{one}: is of r3 by its metadata; move it there" in ended.out
+    assert f"{short(one)}: is of r3 by its metadata; move it there" in ended.out
     assert states(cell, "r1")[-1] == "failed"
     shutil.copy(one, other)
     ended = opamc("nightly", cell, "--quiet")
-    assert f"{one}: has the same bytes as {other} of r3, whose it is" in ended.out
+    assert f"{short(one)}: has the same bytes as {other} of r3, whose it is" in ended.out
     assert states(cell, "r3") == GOOD
     set_robot(one, "UR10 20195500123")  # no robot of the cell: a name of its own
     assert opamc("nightly", cell).code == ExitCode.DONE
@@ -134,7 +141,7 @@ def test_a_night_that_is_a_copy_of_another_robots_baseline_is_not_judged(cell, l
     shutil.copy(cell.parent / "normal/r1/0.parquet", late)
     ended = opamc("nightly", cell, *asked, "--quiet")
     assert ended.code == ExitCode.PARTIAL
-    assert f"{late}: has the same bytes as" in ended.out
+    assert f"{short(late)}: has the same bytes as" in ended.out
     assert "normal/r1/0.parquet of r1; remove it where it was not recorded" in ended.out
     assert states(cell, "r3")[-1] == "failed"
     (logs / "kept").replace(late)

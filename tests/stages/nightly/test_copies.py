@@ -20,7 +20,10 @@ def test_a_logger_that_repeats_a_recording_is_no_healthy_robot(cell, logs, opamc
     shutil.copy(logs / "r1" / night(3) / "cycle.parquet", stuck)
     ended = opamc("nightly", cell, "--quiet")
     assert ended.code == ExitCode.PARTIAL
-    assert f"r1 {night(4)}: {stuck}: is a copy of {logs / 'r1' / night(3)}" in ended.out
+    assert (
+        f"r1 {night(4)}: {night(4)}/{stuck.name}: is a copy of {logs / 'r1' / night(3)}"
+        in ended.out
+    )
     assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
 
 
@@ -60,7 +63,10 @@ def test_a_logger_that_writes_its_samples_anew_is_stuck_all_the_same(cell, logs,
     set_clock(again, f"{night(4)}T22:00:00+00:00", scale=1)
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
     assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
-    assert f"r1 {night(4)}: {again}: is a copy of {logs / 'r1' / night(1)}" in first.out
+    assert (
+        f"r1 {night(4)}: {night(4)}/{again.name}: is a copy of {logs / 'r1' / night(1)}"
+        in first.out
+    )
     assert second.out == ""
     assert states(cell) == ["baseline", "baseline", "baseline", "done", "failed"]
 

@@ -38,7 +38,7 @@ def test_a_clock_that_tells_no_night_is_said_until_it_is_set(cell, logs, opamc):
         set_clock(last, f"{year}-03-05T22:00:00+00:00")
         first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
         assert (first.code, second.code) == (ExitCode.PARTIAL, ExitCode.PARTIAL)
-        assert f"r1 {last}: its night {year}-03-05 {said}; check the clock" in first.out
+        assert f"r1 r1/{last.name}: its night {year}-03-05 {said}; check the clock" in first.out
         assert second.out == ""
         # neither the first night of the baseline, nor a last one that no other can follow
         assert states(cell) == ["failed", "baseline", "baseline", "baseline", "done"]
@@ -578,7 +578,10 @@ def test_a_link_to_a_disk_that_is_not_there_is_said_and_read_when_it_is(cell, lo
     file.symlink_to(file.rename(disk))
     disk.rename(cell.parent / "aside")
     first, second = opamc("nightly", cell, "--quiet"), opamc("nightly", cell, "--quiet")
-    assert f"r1 {night(4)}: {file}: cannot be read (No such file or directory)" in first.out
+    assert (
+        f"r1 {night(4)}: {night(4)}/{file.name}: cannot be read (No such file or directory)"
+        in first.out
+    )
     assert (first.code, second.code, second.out) == (ExitCode.PARTIAL, ExitCode.PARTIAL, "")
     (cell.parent / "aside").rename(disk)
     ended = opamc("nightly", cell, "--quiet")

@@ -67,10 +67,8 @@ def test_joints_that_a_payload_moves_are_one_line_with_what_to_do():
             None,
             "3 of 4 joints moved together in 2 nights from 2026-03-02 to 2026-03-03, 4 to 30 times "
             "as far as in a healthy session: check payload, tool, temperature and the currents' "
-            "scale; axis 2: not told from unusual conditions, and a fault that looks alike would "
-            "not be; axes 1 and 3: not judged: It lies 25 to 73 of the baseline's own spreads from "
-            "the baseline; record "
-            f"again; if that is meant to stay: {again}",
+            "scale; axis 2 not told from unusual conditions, axes 1 and 3 not judged: a fault that "
+            f"looks alike would not be told; if that is meant to stay: {again}",
         )
     ]
     # once they are as they were nothing is meant to stay

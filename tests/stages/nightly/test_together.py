@@ -12,13 +12,27 @@ def test_recordings_that_lack_the_same_are_one_sentence():
     assert together(reasons) == [
         f"5 recordings (n/0.parquet, n/1.parquet, n/2.parquet and 2 more): all 14 segments {UNFIT}"
     ]
-    assert together(reasons[:1]) == reasons[:1]
+    assert together(reasons[:1]) == [f"n/0.parquet: all 10 segments {UNFIT}"]
+
+
+def test_recordings_that_differ_in_a_share_alone_are_one_sentence():
+    reasons = [f"n/{n}.parquet: column axis3_current is clipped in {n}% of it" for n in (6, 7)]
+    said = "2 recordings (n/6.parquet, n/7.parquet): column axis3_current is clipped in 7% of it"
+    assert together(reasons) == [said]
+
+
+def test_joints_of_a_recording_that_lack_the_same_are_one_sentence():
+    """An edited program was a sentence for each joint."""
+    reasons = [f"n/1.parquet: {n} of 6 motions of axis {n} lead elsewhere" for n in (3, 4, 6)]
+    said = "n/1.parquet: 3 of 6 motions of axis 3 (axes 4 and 6 likewise) lead elsewhere"
+    assert together([*reasons, "no more"]) == [said, "no more"]
 
 
 def test_other_joints_and_other_reasons_are_not_thrown_together():
     reasons = [f"logs/n/1.parquet: all 9 segments {UNFIT}", "1 recording where each night has 2"]
     other = f"logs/n/2.parquet: all 9 segments {UNFIT.replace('axis 2', 'axis 3')}"
-    assert together([*reasons, other]) == [*reasons, other]
+    said = [one.removeprefix("logs/") for one in (*reasons, other)]
+    assert together([*reasons, other]) == said
 
 
 def test_a_sentence_has_its_kind_however_many_recordings_it_is_of():
@@ -38,5 +52,5 @@ def test_nights_with_the_same_to_say_are_short_however_many_they_are():
         rows.append(NightRow("r1", f"2026-03-{night:02d}", "{}", "partial", 0, why))
     text = [*failed("r1", rows, 7)][-1].text
     assert text.count("fit no motion") == text.count(late) == 1
-    assert f"; 2026-03-09: logs/9/9.parquet: {late}" in text
+    assert f"; 2026-03-09: 9/9.parquet: {late}" in text
     assert len(text) < 400

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from opamc_cli.errors import InputError
-from opamc_cli.stages.recordings.axis_recording import read_recording
+from opamc_cli.stages.recordings.axis_recording import read_recording, with_signs
 from opamc_cli.stages.recordings.mistaken import mistaken
 from opamc_cli.storage.runs.run import Run
 
@@ -52,3 +52,23 @@ def test_one_phase_is_refused(tmp_path):
         pytest.raises(InputError, match=r"has 1 phase current.*or two phases or three"),
     ):
         read_recording(run, 1)
+
+
+def test_a_current_that_keeps_its_sign_in_one_recording_is_no_modulus(tmp_path):
+    """Of one of six the model got a current with the speed's sign, and friction + 30 % no cause."""
+    speed = np.tile(np.r_[np.zeros(100), np.sin(np.linspace(0, 2 * np.pi, 400))], 4)
+    friction, place = 2.0 * np.sign(speed) + 0.3 * speed, np.cumsum(speed) / 100.0
+
+    def read(*currents):
+        found = []
+        for number, current in enumerate(currents):
+            file = logged(tmp_path / f"{number}.parquet", current=current, position=place)
+            with Run(file) as run:
+                found.append(read_recording(run, 1))
+        return [one.current_a for one in with_signs(found)]
+
+    for logs in ([abs(friction), friction, friction], [abs(friction), friction]):
+        for own, logged_as in zip(read(*logs), logs, strict=True):
+            np.testing.assert_allclose(own, logged_as, atol=1e-6)
+    for own in read(abs(friction), abs(friction), friction):
+        assert own.min() < -1.0

@@ -389,7 +389,8 @@ def test_a_spike_of_the_position_hides_no_motion(tmp_path):
         columns["axis1_position"] = columns["axis1_position"].copy()
         columns["axis1_position"][1000] = 1e6
         save_run(source.path, source.info, columns)
-    found, *_ = cause._recordings(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), {}, 100.0)
+    logged = cause._as_logged(1, sources, 300.0, dict.fromkeys("012", (300, 2700)), 100.0)
+    found, *_ = cause._measured(logged, {})
     assert [recording.size for recording in found] == [2600] * 3
 
 

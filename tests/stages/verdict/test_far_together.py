@@ -33,6 +33,11 @@ def test_a_change_that_is_certain_and_small_is_called_small(p_adjusted, effect, 
     assert said in found[1][0]
 
 
+def test_a_joint_of_which_no_witness_shows_any_effect_is_not_far():
+    """Of a hundred files beside a baseline of single ones a healthy robot was not judged."""
+    assert far_together(verdict((33.0, 1e-9, 0.0), (20.5, 1e-9, 0.0)), ScoreConfig()) == {}
+
+
 def test_joints_that_are_far_together_are_no_small_changes():
     found = far_together(verdict((40.0, 1e-9, 0.05), (50.0, 1e-9, 0.05)), ScoreConfig())
     assert list(found) == [1, 2]

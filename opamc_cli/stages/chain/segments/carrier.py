@@ -114,7 +114,8 @@ def carrier_segments(run: Run, channels: AxisChannels, config: SegmentConfig) ->
         make_rows(run, channels, segments, signal),
         probe.notes + notes,
         f"axis {channels.axis}: S(t) reaches {strongest:.2f}, {config.threshold_on:g} is motion",
-        lost(channels.axis, missing),
+        lost(channels.axis, missing / run.n_samples),
+        missing,
     )
 
 
@@ -163,7 +164,7 @@ def _look(run: Run, names: Sequence[str], config: SegmentConfig) -> _Probe:
 
 def _gather(
     run: Run, names: Sequence[str], band: MotionBand, probe: _Probe, config: SegmentConfig
-) -> tuple[Evidence, tuple[str, ...], float]:
+) -> tuple[Evidence, tuple[str, ...], int]:
     """Read the whole run once, block by block, and keep its frames only."""
     fs_hz = run.sampling_rate_hz
     step = frame_step(fs_hz)
@@ -222,7 +223,7 @@ def _gather(
         noise_a=probe.noise_a,
         f_floor_hz=band.f_min_hz,
     )
-    return evidence, notes, max(n_missing.values()) / run.n_samples
+    return evidence, notes, max(n_missing.values())
 
 
 def _current(phases: Sequence[Floats]) -> npt.NDArray[np.inexact]:

@@ -109,6 +109,7 @@ def joint_segments(
         f"axis {channels.axis}: the joint reaches {float(np.nanmax(np.abs(velocity))):.3g} rad/s, "
         f"{config.min_speed_rad_s:g} is motion where it lasts for {shortest_s:.2g} s",
         lost(channels.axis, 1 - known.size / current.size),
+        current.size - known.size,
     )
 
 

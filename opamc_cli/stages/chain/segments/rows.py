@@ -45,6 +45,8 @@ class AxisSegments(NamedTuple):
     """Why there is no row, or None."""
     lost: str | None = None
     """One sentence if so many samples are no numbers that motions are likely among them."""
+    n_missing: int = 0
+    """Samples of its current that are no numbers."""
 
 
 def lost(axis: int, share: float) -> str | None:

@@ -115,20 +115,18 @@ def _at_once(nights: Sequence[Sequence[Row]], where: str, remind_after: int) -> 
         last = found[-1]
         total = next(len(joints) for joints in nights if joints[0]["night"] == dates[-1])
         ratios = sorted(math.exp(row["distance"] or 0.0) for row in last)
-        excused = axes_phrase([row["axis"] for row in last if _is_excused(row)])
+        of = {"not told from unusual conditions": True, "not judged": False}
+        which = {
+            how: [row["axis"] for row in last if _is_excused(row) == excused]
+            for how, excused in of.items()
+        }
         text = (
             f"{len(last)} of {total} joints moved together{where} in {span(dates)}, "
             f"{ratios[0]:.2g} to {ratios[-1]:.2g} times as far as in a healthy session: check "
-            f"payload, tool, temperature and the currents' scale; {excused}: not told from unusual "
-            "conditions, and a fault that looks alike would not be"
+            "payload, tool, temperature and the currents' scale; "
+            + ", ".join(f"{axes_phrase(axes)} {how}" for how, axes in which.items() if axes)
+            + ": a fault that looks alike would not be told"
         )
-        unjudged: dict[str, list[Row]] = {}
-        for row in last:
-            if not _is_excused(row):
-                unjudged.setdefault(NUMBER.sub("#", row["reason"]), []).append(row)
-        for rows in unjudged.values():
-            axes, why = axes_phrase([row["axis"] for row in rows]), [row["reason"] for row in rows]
-            text += f"; {axes}: not judged: {alike(why).removesuffix('.')}"
         if dates[-1] == nights[-1][0]["night"]:
             text += f"; if that is meant to stay: {REBASELINE.replace('DATE', _begun(nights))}"
         yield Event(dates[index], last[0]["robot"], None, "together", text)

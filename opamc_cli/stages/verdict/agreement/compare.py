@@ -1,6 +1,6 @@
 """The questions of this package in the order of a diagnosis."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from opamc_cli.stages.verdict.agreement.unjudged import (
     sentence,
     unjudged,
 )
-from opamc_cli.stages.verdict.agreement.whole import not_whole
+from opamc_cli.stages.verdict.agreement.whole import not_whole, of_odd_warmth, with_gaps
 from opamc_cli.storage.schemas.tables import MOTIONS
 from opamc_cli.storage.sources import read_sources
 from opamc_cli.storage.tables import read_table, record_at
@@ -33,7 +33,8 @@ class Agreement:
     """When segments are a cycle."""
     measured: dict[str, Sequence[Measured]] = field(default_factory=dict)
     found: dict[str, Sequence[Finding]] = field(default_factory=dict)
-    """With `measured`: by role."""
+    missing: dict[str, Mapping[tuple[str, int], int]] = field(default_factory=dict)
+    """With `measured`, `found`: by role."""
     _reference: Reference | None = None
 
     def check(
@@ -64,7 +65,7 @@ class Agreement:
         own = measure(read_sources(segmented.path), segmented.table, kept)
         if self._reference is None:
             self._reference = reference_of(own)
-        self.measured[role] = own
+        self.measured[role], self.missing[role] = own, segmented.missing
         found = findings(own, self._reference)
         if motions is not None:
             table = read_table(motions, "identify", MOTIONS)
@@ -93,8 +94,10 @@ class Agreement:
                 record_at(path).get(OTHER_SPEEDS, {}),
                 match_rule(self.config),
                 record_at(path).get(TWO_SPEEDS, ()),
+                self.missing[role],
             )
             for role, path in (("baseline", baseline), ("target", target))
         ]
         found = unjudged(sides[0], sides[1])
-        return replace(found, errors=(*found.errors, *not_whole(sides[0], sides[1])))
+        of_target = (*not_whole(*sides), *with_gaps(*sides), *of_odd_warmth(*sides))
+        return replace(found, errors=(*found.errors, *of_target))

@@ -44,6 +44,8 @@ class Side:
     """When segments are a cycle."""
     two_speeds: Collection[str] = ()
     """Runs of which some cycles are left out, as is said: they are of another speed."""
+    missing: Mapping[tuple[str, int], int] = field(default_factory=dict)
+    """Samples of a current that are no numbers, by run and axis."""
 
     def moving_axes(self) -> set[int]:
         """Return the axes that move in any run, whether they are compared or not."""

@@ -1,4 +1,4 @@
-"""Recordings of which much is missing, or of another program: what is left may look healthy."""
+"""Recordings of which a part is missing, or of another program: what is left may look healthy."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -10,12 +10,21 @@ import pyarrow as pa
 
 from opamc_cli.errors import InputError
 from opamc_cli.stages.verdict.agreement.unjudged import Side
+from opamc_cli.storage.schemas.channels import axes_phrase
 
 FEW_CYCLES = 0.6
 """Of the fewest cycles, or else motions, that a recording of the baseline holds."""
 
 ALIKE = 0.1
 """Of these, a cycle at least: baseline recordings that differ by more have no usual length."""
+
+MORE_GAPS = 2
+"""Times as many samples without a number as any baseline recording has, from which on it is said: a
+logger that loses some each night loses about as many."""
+
+LONE_WARMTH_C = 25.0
+"""By which a joint's logged temperature has moved beyond the middle of the others': a sensor that
+is torn off tells -40 or 0 °C, one that is short-circuited 150; seasons move all joints."""
 
 MUCH_UNKNOWN = 0.4
 """Share of a recording's segments that fit nothing: about half, of two programs that were glued."""
@@ -69,6 +78,79 @@ def not_whole(baseline: Side, target: Side) -> list[InputError]:
             continue
         errors.append(InputError(f"{paths[run]}: {why}", axes=of))
     return errors
+
+
+def with_gaps(baseline: Side, target: Side) -> list[InputError]:
+    """Return one error for each of the target's recordings that lacks samples as none usually does.
+
+    What they touch is left out, and might hide a fault.
+    """
+    usual: dict[int, int] = {}
+    for (_, axis), count in baseline.missing.items():
+        usual[axis] = max(count, usual.get(axis, 0))
+    found: dict[str, dict[int, int]] = {}
+    for (run, axis), count in target.missing.items():
+        if count > MORE_GAPS * usual.get(axis, count):
+            found.setdefault(run, {})[axis] = count
+    paths = {own.run: own.path for own in target.measured}
+    return [
+        InputError(
+            f"{paths[run]}: {_no_numbers(max(lacking.values()), sorted(lacking))}, in the "
+            f"baseline's recordings {max(usual[axis] for axis in lacking)} at most; what that "
+            "touches is not judged: check sensor, cable and log",
+            axes=lacking,
+        )
+        for run, lacking in found.items()
+    ]
+
+
+def _no_numbers(count: int, axes: Sequence[int]) -> str:
+    are = "sample of the current of {} is no number"
+    if count > 1:
+        are = "samples of the current of {} are no numbers"
+    return f"{count} {are.format(axes_phrase(axes))}"
+
+
+def of_odd_warmth(baseline: Side, target: Side) -> list[InputError]:
+    """Return one error for each temperature that is logged no more, or has moved far alone."""
+    usual = {axis: list(of.values()) for axis, of in _warmths(baseline).items()}
+    n_runs = len({own.run for own in baseline.measured})
+    now = _warmths(target)
+    moved = {
+        (axis, run): warm - float(np.median(usual[axis]))
+        for axis, of in now.items()
+        if axis in usual
+        for run, warm in of.items()
+    }
+    found = []
+    for own in target.measured:
+        name = f"{own.path}: the temperature of axis {own.axis}"
+        others = [by for (axis, run), by in moved.items() if run == own.run and axis != own.axis]
+        theirs = float(np.median(others)) if others else 0.0
+        mine = moved.get((own.axis, own.run))
+        if not own.moves or len(usual.get(own.axis, ())) < n_runs:
+            continue
+        if mine is None:
+            why = f"{name} is told no more, in each of the baseline's recordings it is"
+        elif abs(mine - theirs) > LONE_WARMTH_C:
+            why = f"{name} has moved by {mine:+.0f} °C, the others by {theirs:+.0f}"
+        else:
+            continue
+        found.append(InputError(f"{why}: check its sensor and cable", axes=[own.axis]))
+    return found
+
+
+def _warmths(side: Side) -> dict[int, dict[str, float]]:
+    """Return mean logged temperatures by axis and run."""
+    found: dict[int, dict[str, list[float]]] = {}
+    for row in side.motions.select(["run", "axis", "temperature_c"]).to_pylist():
+        if row["temperature_c"] is not None:
+            of_axis = found.setdefault(row["axis"], {})
+            of_axis.setdefault(row["run"], []).append(row["temperature_c"])
+    return {
+        axis: {run: float(np.mean(values)) for run, values in of.items()}
+        for axis, of in found.items()
+    }
 
 
 def _much_unknown(own: _Held, others: Sequence[_Held]) -> bool:
