@@ -102,6 +102,12 @@ class Beside:
             self.fast_part = fast[self.parts.rows]
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses
+        self.counts = self.parts.counts[self.counted]
+        self.left = float(deviation_of(self.before[self.counted], self.counts).sum())
+        # Averaged, less is left, of which a guess takes several times the share: it is asked, as
+        # fast ones are, for what it takes off the error at the full rate.
+        share = (self.left / self.counts.sum()) ** 2 / max(chain.mean_square, 1e-300)
+        self.of_error = 1.0 if self.fine else min(share, 1.0)
 
     def products(self, columns: Floats, kept: Products | None = None) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k).
@@ -199,7 +205,5 @@ class Beside:
             + np.sum(gamma * ((own @ gamma[..., None])[..., 0] - 2 * moment), axis=-1)
             + 2 * np.sum(gamma * (beta[:, :, None] @ cross)[:, :, 0], axis=-1)
         )
-        counts = self.parts.counts[self.counted]
-        before = deviation_of(self.before[self.counted], counts).sum()
-        after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
-        return np.asarray(1.0 - (after / max(before, 1e-300)) ** 2)
+        after = deviation_of(error[self.counted], self.counts[:, None]).sum(axis=0)
+        return np.asarray(self.of_error * (1.0 - (after / max(self.left, 1e-300)) ** 2))

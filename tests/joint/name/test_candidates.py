@@ -1,5 +1,7 @@
 """What a candidate would take off the held-out error, against fitting it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closing import joint_of, plain_fit
@@ -50,7 +52,10 @@ def test_the_gain_of_a_guess_is_that_of_the_chain_with_it(slow_chain, name):
 
 
 def slow_gain(chain, columns, fine):
-    """Leave units out one by one, with all regressors, by least squares."""
+    """Leave units out one by one, with all regressors, by least squares.
+
+    Of the averaged data what it takes, as a share of what the chain leaves at the full rate.
+    """
     dataset = chain.fit.dataset
     parts = dataset.parts[0 if fine else 1]
     current = dataset.grid_of(fine).track.current_a
@@ -67,16 +72,18 @@ def slow_gain(chain, columns, fine):
     both = np.concatenate([base, columns], axis=1)
     target = current[parts.rows]
     unit = np.repeat(parts.unit, [b - a for a, b in parts.slices])
-    deviation = [0.0, 0.0]
+    deviation, count = [0.0, 0.0], 0
     for (start, stop), number, judged in zip(parts.slices, parts.unit, parts.judged, strict=True):
         rest, mine = unit != number, slice(start, stop)
         for place, design in enumerate((base, both)):
             scale = np.linalg.norm(design[rest], axis=0)
             values = np.linalg.lstsq(design[rest] / scale, target[rest], rcond=1e-6)[0] / scale
             if judged or not fine:
+                count += (stop - start) * (place == 0)
                 error = target[mine] - design[mine] @ values
                 deviation[place] += (stop - start) * float(np.sqrt(np.mean(error**2)))
-    return 1 - (deviation[1] / deviation[0]) ** 2
+    whole = deviation[0] ** 2 if fine else count**2 * chain.mean_square
+    return (deviation[0] ** 2 - deviation[1] ** 2) / whole
 
 
 @pytest.mark.parametrize("fine", [long(True), False])
@@ -90,6 +97,19 @@ def test_the_gain_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chai
         for columns, gain in zip(np.split(batch.columns, len(gains), axis=1), gains, strict=True):
             slow = slow_gain(fast_chain, columns, fine)
             assert gain == pytest.approx(slow, rel=2e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["stribeck", "position_drag"])
+def test_a_slow_guess_promises_no_more_than_it_takes_at_the_full_rate(name):
+    """What smooths a coarse encoder's motion takes a ripple out of the averaged current, too."""
+    rippling = joint_of("cyclic", lambda q, v, a, t: np.sin(100 * q) + 0.3 * stribeck(q, v, a, t))
+    coarse = replace(rippling, position_rad=np.round(rippling.position_rad, 3))
+    chain = chain_of(plain_fit(coarse), 0)
+    dataset, beside = chain.fit.dataset, Beside(chain, False)
+    found = beside.candidates(batches_of(dataset, guessed(LIBRARY[name], dataset), False))
+    best = max(found, key=lambda one: one.gain)
+    taken, _ = extended(chain, best.term).gain_over(chain)
+    assert best.gain < taken + 0.02
 
 
 def test_what_the_model_holds_already_takes_nothing(slow_chain):
