@@ -1,7 +1,7 @@
 """Every effect on a coarse grid of its parameters, and what each would take off a chain's error."""
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -24,6 +24,15 @@ class Candidate:
     term: Term
     gain: float
     score: float
+    of_error: float = 1.0
+    """Share of the full rate's error that its grid holds: averaged, less is left, of which a guess
+    takes several times the share."""
+
+    @property
+    def promise(self) -> float:
+        """The score that this would be at the full rate, by which it comes before others."""
+        left, all_left = (max(1 - of * self.gain, LEAST_LEFT) for of in (1.0, self.of_error))
+        return self.score + float(np.log(all_left / left))
 
 
 @dataclass(frozen=True)
@@ -102,6 +111,10 @@ class Beside:
             self.fast_part = fast[self.parts.rows]
         self.blocks = [dataset.cache.rows(block, self.parts, self.fine) for block in blocks]
         self.before, self.inverses = self.sums.held_out(), self.sums.inverses
+        self.counts = self.parts.counts[self.counted]
+        self.left = float(deviation_of(self.before[self.counted], self.counts).sum())
+        share = (self.left / self.counts.sum()) ** 2 / max(chain.mean_square, 1e-300)
+        self.of_error = 1.0 if self.fine else min(share, 1.0)
 
     def products(self, columns: Floats, kept: Products | None = None) -> Floats:
         """Products of the chain's regressors with others over each part, shape (p, b, k).
@@ -124,8 +137,9 @@ class Beside:
 
     def candidates(self, batches: Sequence[Batch]) -> list[Candidate]:
         """Judge guesses, many at once: the chain's own regressors are read once for all."""
+        track = self.dataset.fine.track
         return [
-            judged(term, float(gain), batch.own.shape[-1], self.dataset.fine.track)
+            replace(judged(term, float(gain), batch.own.shape[-1], track), of_error=self.of_error)
             for batch in batches
             for term, gain in zip(batch.terms, self.gains(batch), strict=True)
         ]
@@ -199,7 +213,5 @@ class Beside:
             + np.sum(gamma * ((own @ gamma[..., None])[..., 0] - 2 * moment), axis=-1)
             + 2 * np.sum(gamma * (beta[:, :, None] @ cross)[:, :, 0], axis=-1)
         )
-        counts = self.parts.counts[self.counted]
-        before = deviation_of(self.before[self.counted], counts).sum()
-        after = deviation_of(error[self.counted], counts[:, None]).sum(axis=0)
-        return np.asarray(1.0 - (after / max(before, 1e-300)) ** 2)
+        after = deviation_of(error[self.counted], self.counts[:, None]).sum(axis=0)
+        return np.asarray(1.0 - (after / max(self.left, 1e-300)) ** 2)

@@ -163,6 +163,7 @@ def candidates(chain: Chain, pool: Pool, every: bool = False) -> list[Candidate]
     # Two lines of one kind are two candidates; so is a line that follows the model without it.
     track = dataset.fine.track
     best = _best_of_each(found, lambda t: (t.effect.name, t.form, line_of(t, track), t.is_constant))
+    best.sort(key=lambda one: one.promise)
     least = np.inf if every else 0.0
     better = []
     for candidate in [one for one in best if one.score < least][:TRIED]:

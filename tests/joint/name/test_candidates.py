@@ -1,5 +1,7 @@
 """What a candidate would take off the held-out error, against fitting it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from closing import joint_of, plain_fit
@@ -90,6 +92,21 @@ def test_the_gain_is_that_of_least_squares_unit_by_unit_on_either_grid(fast_chai
         for columns, gain in zip(np.split(batch.columns, len(gains), axis=1), gains, strict=True):
             slow = slow_gain(fast_chain, columns, fine)
             assert gain == pytest.approx(slow, rel=2e-3, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["stribeck", "position_drag"])
+def test_a_slow_guess_promises_no_more_than_it_takes_at_the_full_rate(name):
+    """What smooths a coarse encoder's motion takes a ripple out of the averaged current, too."""
+    rippling = joint_of("cyclic", lambda q, v, a, t: np.sin(100 * q) + 0.3 * stribeck(q, v, a, t))
+    coarse = replace(rippling, position_rad=np.round(rippling.position_rad, 3))
+    chain = chain_of(plain_fit(coarse), 0)
+    dataset, beside = chain.fit.dataset, Beside(chain, False)
+    found = beside.candidates(batches_of(dataset, guessed(LIBRARY[name], dataset), False))
+    best = max(found, key=lambda one: one.gain)
+    taken, _ = extended(chain, best.term).gain_over(chain)
+    assert best.gain > taken + 0.05
+    own_price = best.score - np.log(1 - best.gain)
+    assert best.promise > np.log(1 - taken - 0.02) + own_price
 
 
 def test_what_the_model_holds_already_takes_nothing(slow_chain):
