@@ -244,7 +244,8 @@ def objection(child: Chain, parent: Chain, pool: Pool) -> str | None:
     followed = "logged" not in child.fit.dataset.fine.track.channels
     beside = followed and any(not term.effect.unnamed for term in parent.terms)
     if share - (LEAST_T if beside else 1.0) * error < (least := pool.least_share):
-        return f"takes {share:.1%} ± {error:.1%} off the error; {least:.0%} is asked beyond that"
+        some = f"{share:.1%} ± {error:.1%}" if share > 0 else "nothing"
+        return f"takes {some} off the error; {least:.0%} is asked beyond that"
     if "sign" not in pool.without and not child.plausible_beside(parent):
         return "its sign, or its size, is not physical"
     if "decoys" not in pool.without and not _is_known(child.terms[-1], parent):

@@ -243,7 +243,10 @@ def recordings_of(runs: Sequence[Run], axis: int, opposite: bool | None = None) 
     recordings = [replace(recording, rate_hz=rate_hz) for recording in recordings]
     for recording, run in zip(recordings, runs, strict=True):
         if recording.size < 64:
-            msg = f"{run.path}: {recording.size} samples of axis {axis}; record at least one cycle"
+            msg = (
+                f"{run.path}: {recording.size} samples of axis {axis} at {rate_hz:g} Hz are "
+                "too few for a model; record for longer, or at a higher rate"
+            )
             raise NotEnoughDataError(msg)
     in_part = [
         note for run, one in zip(runs, recordings, strict=True) for note in gaps(run, axis, one)
