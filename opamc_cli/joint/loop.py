@@ -280,8 +280,9 @@ def _opened(
     predicts |= r2_after > 1 - ROUNDING
     # Where a form holds a part of its curve, or a function stands beside the names, more lacks.
     # But for what any lag between the channels makes of the model, and any bearing of reversals.
-    healthy = (one.term.effect.from_terms or one.term.effect.resists for one in steps)
-    of_parts = [one for one, sound in zip(steps, healthy, strict=True) if one.named or not sound]
+    effects = [one.term.effect for one in steps]
+    parts = [not (e.unnamed and (e.from_terms or e.builds_up)) for e in effects]
+    of_parts = [one for one, part in zip(steps, parts, strict=True) if part]
     whole = not any(one.approximate for one in of_parts)
     if any(step.named for step in steps):
         verdict = "closed" if reached >= EXACT and predicts and whole else "partial"

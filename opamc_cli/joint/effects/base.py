@@ -65,6 +65,8 @@ class Effect:
     """True where the regressors are in proportion to the load's magnitude."""
     resists: bool = False
     """True for friction: its first coefficient is above 0, or it would drive the joint."""
+    builds_up: bool = False
+    """True for friction that is dry friction once the joint has gone some way from a reversal."""
     at_a_place: bool = False
     """True for friction that is more at some place, or less, down to none."""
     per: tuple[str, ...] | None = None

@@ -21,6 +21,7 @@ class Hysteresis(Effect):
     searches = ("length_rad",)
     meaning = "torque that lags behind after reversals: check gear preload and backlash"
     resists = True
+    builds_up = True
     from_motion = True
 
     lengths = (1 / 100, 1 / 2, 9)

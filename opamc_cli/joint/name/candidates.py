@@ -1,7 +1,7 @@
 """Every effect on a coarse grid of its parameters, and what each would take off a chain's error."""
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -71,10 +71,10 @@ def batches_of(dataset: Dataset, terms: Sequence[Term], fine: bool) -> list[Batc
     return batches
 
 
-def judged(term: Term, gain: float, width: int, track: Track) -> Candidate:
+def judged(term: Term, gain: float, width: int, track: Track, of_error: float = 1.0) -> Candidate:
     """Turn a share of the held-out mean square error into a candidate's score."""
     left = max(1.0 - gain, LEAST_LEFT)
-    return Candidate(term, gain, float(np.log(left)) + price_of(term, width, track))
+    return Candidate(term, gain, float(np.log(left)) + price_of(term, width, track), of_error)
 
 
 def best_forms(dataset: Dataset, beside: "Beside", full: Term) -> list[Candidate]:
@@ -139,7 +139,7 @@ class Beside:
         """Judge guesses, many at once: the chain's own regressors are read once for all."""
         track = self.dataset.fine.track
         return [
-            replace(judged(term, float(gain), batch.own.shape[-1], track), of_error=self.of_error)
+            judged(term, float(gain), batch.own.shape[-1], track, self.of_error)
             for batch in batches
             for term, gain in zip(batch.terms, self.gains(batch), strict=True)
         ]

@@ -102,8 +102,10 @@ class Chain:
         # At one speed dry and viscous friction are one, and of one way an offset is both; what has
         # built up over a way is dry friction.
         share = {"coulomb": 1.0, "viscous": usual, "offset": float(way.sum()) * (way.size == 1)}
-        share |= dict.fromkeys(("hysteresis", "unnamed_presliding"), 1.0)
-        dry = sum(share.get(term.effect.name, 0.0) * float(values[0]) for term, values in pairs)
+        dry = sum(
+            share.get(term.effect.name, float(term.effect.builds_up)) * float(values[0])
+            for term, values in pairs
+        )
         return [
             term.effect.plausible(values, term.parameters)
             or (term.effect.at_a_place and values[0] > -dry)

@@ -135,11 +135,11 @@ def doubts_of(
     doubts: list[str] = []
     if (placed := sorted(found & OF_THE_PLACE)) and (gaps := track.guessed_s):
         doubts.append(DOUBTED.format(axis, " and ".join(placed), len(gaps), sum(gaps)))
-    # What builds up over a way is dry friction from there on, of which coulomb is a part.
+    # Coulomb is a part of the dry friction beside it.
     built_up = sum(
         float(values[0])
         for term, values in zip(loop.after.terms, loop.after.coefficients, strict=True)
-        if term.effect.resists and term.effect.domain == ANGLE and not term.effect.at_a_place
+        if term.effect.builds_up
     )
     declared = zip(loop.before.terms, loop.after.coefficients, sure.standard_errors, strict=False)
     for term, values, errors in declared:

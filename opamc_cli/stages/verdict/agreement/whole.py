@@ -133,7 +133,8 @@ def of_odd_warmth(baseline: Side, target: Side) -> list[InputError]:
         if mine is None:
             why = f"{name} is told no more, in each of the baseline's recordings it is"
         elif abs(mine - theirs) > LONE_WARMTH_C:
-            why = f"{name} has moved by {mine:+.0f} °C, the others by {theirs:+.0f}"
+            why = f"{name} has moved by {mine:+.0f} °C"
+            why += f", the others by {theirs:+.0f}" if others else ""
         else:
             continue
         found.append(InputError(f"{why}: check its sensor and cable", axes=[own.axis]))
