@@ -20,12 +20,7 @@ Model = TypeVar("Model", bound=BaseModel)
 def load_config(path: Path | None = None, overrides: Sequence[str] = ()) -> Config:
     """Return the configuration of a file, with `key=value` overrides applied.
 
-    Parameters
-    ----------
-    path
-        YAML file; None for the defaults.
-    overrides
-        Such as ``patterns.gamma=1``; values are YAML.
+    The defaults without a file; an override is such as ``patterns.gamma=1``, its value YAML.
 
     Raises
     ------
@@ -41,14 +36,7 @@ def read_values(
 ) -> dict[str, Any]:
     """Return the mapping of a YAML file (empty without one), with `key=value` overrides applied.
 
-    Parameters
-    ----------
-    path
-        The file; None: no file.
-    overrides
-        Such as ``patterns.gamma=1``; values are YAML.
-    prepare
-        Applied to the text of the file and of every override before it is read.
+    `prepare` is applied to the text of the file and of every override before it is read.
 
     Raises
     ------

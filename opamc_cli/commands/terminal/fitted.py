@@ -18,16 +18,8 @@ GAP = 3
 class FittedTable:
     """A table whose columns are chosen when it is printed.
 
-    Parameters
-    ----------
-    headings
-        Of the columns.
-    right
-        Places of the columns that are flush right.
-    dropped
-        Headings of the columns that may be left out, the first one first.
-    wraps
-        Headings of the columns of words.
+    Given are the places of columns that are flush right, the headings of those that may be left
+    out, the first one first, and of those that hold words.
     """
 
     def __init__(

@@ -61,24 +61,14 @@ def remembered(
 ) -> Callable[[Job], Result]:
     """Return a stage's function for one job, made to look for the job's result first.
 
-    Parameters
-    ----------
-    function
-        A pure function of its job; its errors are not kept.
-    kept
-        Where results lie; None: the function itself is returned.
+    It has to be a pure function of its job; errors are not kept. The function itself where there is
+    no place for results.
     """
     return function if kept is None else _Remembered(function, kept)
 
 
 class KeptResults:
-    """A folder of results by the hash of the jobs that they are the results of.
-
-    Parameters
-    ----------
-    folder
-        Made when something is kept.
-    """
+    """A folder of results by the hash of the jobs that they are the results of."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder

@@ -102,10 +102,7 @@ def compared(inputs: ReportInputs) -> list[dict[str, Any]]:
 def loop_view(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the page says of a closed loop.
 
-    Parameters
-    ----------
-    entry
-        One object of loop.json's `axes`.
+    Of one object of loop.json's `axes`.
     """
     return {
         "axis": int(entry["axis"]),

@@ -63,12 +63,7 @@ def _to_read(path: Path) -> str:
 class History:
     """An open history.
 
-    Parameters
-    ----------
-    path
-        The file; made if it is not there, unless `read_only`.
-    read_only
-        For those who look only.
+    Made if it is not there, but for those who look only.
 
     Raises
     ------
@@ -352,16 +347,8 @@ class History:
     ) -> None:
         """Replace what follows from a robot's nights.
 
-        Parameters
-        ----------
-        robot
-            Its name.
-        alarms
-            All its alarms.
-        standing
-            Program, axis and night of every night in which the alarm rule stands.
-        events
-            What is worth saying.
+        All its alarms, program, axis and night of every night in which the rule stands, and what is
+        worth saying.
         """
         found, values = list(events), (robot, *OF_ROBOT)
         of = f"WHERE robot = ? AND kind IN ({_marks(OF_ROBOT)})"

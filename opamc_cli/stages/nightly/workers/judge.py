@@ -37,10 +37,7 @@ from opamc_cli.storage.tables import read_table
 def compute(job: NightJob) -> tuple[ProgramResult, ...]:
     """Judge one robot's night.
 
-    Returns
-    -------
-    tuple of ProgramResult
-        The program that is worst off first.
+    The program that is worst off comes first.
 
     Raises
     ------

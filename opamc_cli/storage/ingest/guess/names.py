@@ -105,12 +105,7 @@ class Meant:
 def meanings(listed: Sequence[Listed], counted: bool = True) -> list[Meant]:
     """Return what the channels of a recording seem to be; those without a meaning are left out.
 
-    Parameters
-    ----------
-    listed
-        The channels.
-    counted
-        Numbers in names count axes; else they are part of a joint's name, as in `wrist_1`.
+    `counted`: numbers in names count axes; else they are part of a joint's name, as in `wrist_1`.
     """
     found: list[Meant] = []
     for channel in listed:
