@@ -32,14 +32,7 @@ def one_off(
 ) -> OneOff | None:
     """Find the motion without which the series would be cycles of the reference; or None.
 
-    Parameters
-    ----------
-    reference
-        One cycle.
-    segments
-        A series in which no cycle is found, at least one segment.
-    rule
-        When a window is a cycle.
+    Of a series, at least one segment, in which no cycle is found.
     """
     found: list[tuple[tuple[float, float], OneOff]] = []
     if len(reference) > FEWEST:
