@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from opamc_cli.config import Config
 from opamc_cli.errors import ExitCode, InputError, NotEnoughDataError, OpamcError
-from opamc_cli.stages import report
 from opamc_cli.stages.chain import score, to_patterns
 from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
+from opamc_cli.stages.report import assemble as report
 from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
