@@ -17,6 +17,7 @@ from opamc_cli.signal.motion.signs import lacks_sign
 from opamc_cli.signal.motion.windows import carrier_windows
 from opamc_cli.signal.plausible.quality import LIMITS, clipped_share
 from opamc_cli.stages.chain.segments.rows import (
+    STILL_SHARE,
     AxisSegments,
     Segment,
     lost,
@@ -31,9 +32,6 @@ from opamc_cli.storage.runs.run import Run
 USUAL_GEAR_RATIO = 100.0
 """Stands in for an unknown ratio in f_d,max, which motions are then compared by: strain wave gears
 of robot arms have 50 to 160. Delays are chosen by the current itself, see stage `identify`."""
-
-STILL_SHARE = 0.05
-"""A recording that stands still for less than this share never stands still."""
 
 
 def joint_segments(

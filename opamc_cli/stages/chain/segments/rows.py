@@ -15,6 +15,9 @@ from opamc_cli.storage.runs.writing import ROW_GROUP_SAMPLES
 EDGE_S = 0.05
 """A motion that begins or ends this near to the recording's edge may have been cut by it."""
 
+STILL_SHARE = 0.05
+"""A recording that stands still for less than this share never stands still."""
+
 
 @dataclass(frozen=True)
 class Segment:
