@@ -10,7 +10,7 @@ from typer.core import TyperGroup
 
 from opamc_cli.commands.terminal.options import Jobs, Json, Quiet
 from opamc_cli.commands.terminal.output import Output
-from opamc_cli.errors import OpamcError, UsageError
+from opamc_cli.errors import UsageError
 
 if TYPE_CHECKING:
     from opamc_cli.config.cell import CellConfig
@@ -324,6 +324,3 @@ def _today() -> date:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-__all__ = ["OpamcError", "app"]
