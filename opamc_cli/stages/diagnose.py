@@ -14,7 +14,6 @@ from opamc_cli.stages.chain.compared.side import Sides, read_side
 from opamc_cli.stages.chain.to_patterns import run_chain
 from opamc_cli.stages.processes.kept import KeptResults
 from opamc_cli.stages.processes.parallel import Steps, unshown
-from opamc_cli.stages.report import assemble as report
 from opamc_cli.stages.verdict import findings, verdict
 from opamc_cli.stages.verdict.agreement.compare import Agreement
 from opamc_cli.stages.verdict.agreement.duplicates import repeated
@@ -187,6 +186,8 @@ def _diagnose(
     head = verdict.header(sources, every_note, out, tables)
     written = verdict.write(decided, scored, config, out, found, head)
     progress("report")
+    from opamc_cli.stages.report import assemble as report  # a mistake is told sooner without it
+
     title = config.report.title
     page = report.run(out, title=title, figures_of_healthy=figures_of_healthy, kept=kept)
     return DiagnoseOutcome(
